@@ -134,7 +134,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.jobs = Jobs(store, dispatcher, settings)
     engine.start()
     dispatcher.start()
-    # in the background: requests that need no database do not wait for it
+    # in the background: requests without a database do not wait for it
     opening = asyncio.create_task(store.open())
     yield
     await dispatcher.stop()
@@ -149,7 +149,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
     """Adds the middleware, the innermost first."""
     app.add_middleware(Transfers, bodies=app.state.bodies, keys=keys)
     if settings.cors_origins:
-        # no cookies are used, so that a page may send any header, which is its own
+        # There are no cookies: a page may send any of its own headers.
         app.add_middleware(
             CORSMiddleware,
             allow_origins=settings.cors_origins,

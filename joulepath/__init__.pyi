@@ -49,8 +49,9 @@ from .optimizer.identify.errors import (
 from .optimizer.identify.identify import Identification, identify
 from .optimizer.identify.logs.log import Log, LogMove
 from .optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
+from .optimizer.identify.logs.log_options import LogOptions
 from .optimizer.identify.logs.log_report import LogReport
-from .optimizer.identify.logs.reading import LogOptions, LogReading, read_log
+from .optimizer.identify.logs.reading import LogReading, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
 from .optimizer.identify.results import Advice, Parameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
@@ -84,7 +85,7 @@ from .optimizer.problem.scene import (
 )
 from .optimizer.problem.stop_path import StopPath
 from .optimizer.problem.stops import Stop
-from .optimizer.problem.targets import AnyOf, PosesAround
+from .optimizer.problem.targets import AnyOf, SampledPoses
 from .optimizer.problem.tool import Tool, load_tool
 from .optimizer.problem.tool_cone import ToolCone
 from .optimizer.problem.tool_path import ToolPath
@@ -234,7 +235,6 @@ __all__ = [
     "PlannedTorques",
     "Points",
     "Pose",
-    "PosesAround",
     "Problem",
     "Program",
     "RapidOptions",
@@ -246,6 +246,7 @@ __all__ = [
     "Rest",
     "Robot",
     "Ros2Options",
+    "SampledPoses",
     "Samples",
     "SavingInterval",
     "SavingRange",

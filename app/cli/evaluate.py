@@ -77,10 +77,10 @@ def evaluate(
     deadline: float,
     **options: Any,
 ) -> None:
-    """Computes the energy of a given motion, and the limits that it violates.
+    """Computes the energy of a given motion, and its violated limits.
 
     FILE is the JSON of `POST /evaluate`, a CSV with one column per joint and optionally a column t,
-    a log as `POST /logs` takes it, or - for standard input. Options win over the fields of
+    a log in a format of `POST /logs`, or - for standard input. Options win over the fields of
     `--settings`.
     """
     kind = given or ("csv" if file.lower().endswith(".csv") else "json")
@@ -105,7 +105,7 @@ def evaluate(
 def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadline: float) -> bytes:
     from joulepath.app.api.evaluate.task import EvaluateTask
 
-    # as the query of POST /evaluate has them: each is JSON
+    # in the form of the query of POST /evaluate: JSON values
     query = {name: orjson.dumps(value).decode() for name, value in fields.items()}
     request_id = new_id()
     with terminal.progress(f"Evaluating for at most {deadline:g} s"):

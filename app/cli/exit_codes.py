@@ -1,8 +1,10 @@
-"""Exit codes of `joulepath`. Its `--help` explains them."""
+"""Exit codes of `joulepath`, see `joulepath --help`."""
 
 from __future__ import annotations
 
-ANSWERED, PROBLEM, INVALID = 0, 1, 2
+ANSWERED = 0
+PROBLEM = 1
+INVALID = 2
 # 128 + SIGINT, as shells report it
 INTERRUPTED = 130
 

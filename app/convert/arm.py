@@ -15,13 +15,19 @@ from joulepath.app.schemas import arm as asked
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
-from joulepath.optimizer.problem.arm import INVERTER_PARTS, LIMIT_NAMES, Arm, Inverter, Payload
+from joulepath.optimizer.problem.arm import (
+    INVERTER_COEFFICIENTS,
+    LIMIT_NAMES,
+    Arm,
+    Inverter,
+    Payload,
+)
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
 
 def robot_named(name: str) -> Robot:
-    """The robot with this name: one that comes with the library, or the own robot of this request.
+    """The bundled robot of this name, or the own robot of this request.
 
     Raises UnknownRobot or InvalidProblem.
     """
@@ -47,7 +53,7 @@ def to_arm(request: asked.ArmRequest) -> Arm:
         limits=to_limits(request.limits, robot),
         friction=request.friction,
         inverter=Inverter(
-            **{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}
+            **{name: getattr(request.drives.inverter, name) for name in INVERTER_COEFFICIENTS}
         ),
         bus=_to_bus(request.bus),
         link_mass_scale=np.array(request.link_mass_scale),
@@ -87,9 +93,7 @@ def to_payload(payload: asked.Payload | None) -> Payload:
 
 
 def to_limits(limits: asked.MoveLimits, robot: Robot) -> Limits:
-    """The limits of the library: those of the robot, with the given ones in their place. Raises
-    InvalidProblem.
-    """
+    """The robot's limits, updated by the request. Raises InvalidProblem."""
     tighter = {
         name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq)
         for public, name in LIMIT_NAMES.items()

@@ -1,4 +1,4 @@
-"""What a cycle saves against other cycles in the same time, the waiting priced."""
+"""Savings of a cycle against other cycles in the same time, with the energy of waiting."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Literal
 
 import numpy as np
 
-from joulepath.optimizer.cycle.cycle_baselines import compared
+from joulepath.optimizer.cycle.cycle_baselines import cycle_baseline
 from joulepath.optimizer.cycle.cycle_solution import (
     CycleBaseline,
+    CycleEnergies,
     CycleMove,
     CycleSolution,
-    Needed,
 )
-from joulepath.optimizer.cycle.rests import rest_energy, rest_sensitivity
+from joulepath.optimizer.cycle.rest_energy import rest_energy, rest_sensitivity
 from joulepath.optimizer.dynamics.dwell import holding_power
-from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from joulepath.optimizer.problem.cycle import Cycle
@@ -26,52 +26,51 @@ from joulepath.optimizer.result.solution import Baseline, Solution
 OTHER_MOTIONS: tuple[Literal["ruckig_slowed", "straight"], ...] = ("ruckig_slowed", "straight")
 
 
-def in_equal_times(asked: Cycle, found: CycleSolution) -> CycleSolution:
-    """The cycle with every saving in the same cycle time, and none against a cycle that breaks a
-    limit; and with the same stops and times by other motions.
+def in_equal_times(cycle: Cycle, found: CycleSolution) -> CycleSolution:
+    """The cycle with savings in equal cycle times, and with further baselines of the same times.
 
-    Where no `time` is asked for, cycles differ in duration. The shorter one then waits until the
-    longer one ends, where the answer waits for least.
+    A baseline beyond a limit has no saving. Without a requested `time`, cycles differ in duration:
+    the shorter one then waits for the end of the longer one at the cheapest stop of the answer.
     """
     if not found.baselines:
         return found
-    others = [_by_motions(asked, found, name) for name in OTHER_MOTIONS]
+    others = [_by_motions(cycle, found, name) for name in OTHER_MOTIONS]
     table = [*found.baselines, *(each for each in others if each is not None)]
-    return replace(found, baselines=[_priced(asked, found, each) for each in table])
+    return replace(found, baselines=[_priced(cycle, found, each) for each in table])
 
 
-def _priced(asked: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBaseline:
-    """The baseline, its saving that of both cycles in the longer one's time."""
+def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBaseline:
+    """The baseline with the saving in the time of the longer cycle."""
     if not each.within_limits:
         return replace(each, saving=None, saving_interval=None)
     wait = each.duration - found.duration
-    if asked.objective != "electrical" or abs(wait) <= RATIO_TOLERANCE * found.duration:
+    if cycle.objective != "electrical" or abs(wait) <= RATIO_TOLERANCE * found.duration:
         return each
     stops = [move for move in found.moves if move.planned.at_stop]
     more = min(
-        (_rest(asked, move, abs(wait)) for move in stops or found.moves[-1:]),
+        (_rest(cycle, move, abs(wait)) for move in stops or found.moves[-1:]),
         key=lambda rest: rest.energy,
     )
-    ours, theirs = found.needed, each.needed
+    ours, theirs = found.energies, each.energies
     if wait > 0:
         ours = replace(ours, electrical=_sum(ours.electrical, more))
     else:
         theirs = replace(theirs, electrical=_sum(theirs.electrical, more))
-    again = compared(asked, each.name, each.duration, theirs, True, ours)
+    again = cycle_baseline(cycle, each.name, each.duration, theirs, True, ours)
     return replace(each, saving=again.saving, saving_interval=again.saving_interval)
 
 
-def _rest(asked: Cycle, move: CycleMove, length: float) -> Known:
+def _rest(cycle: Cycle, move: CycleMove, length: float) -> MotionEnergy:
     """A wait of `length` [s] after a move."""
     q, arm = move.solution.goal.q, move.planned.arm_after
     still = np.zeros((1, len(q)))
     hold = float(holding_power(arm, Plant(arm).torques(q[None], still, still)[0]))
-    energy = rest_energy(asked, move.planned, length, hold)
-    return Known(energy, rest_sensitivity(asked, move.planned, length, q), 0.0)
+    energy = rest_energy(cycle, move.planned, length, hold)
+    return MotionEnergy(energy, rest_sensitivity(cycle, move.planned, length, q), 0.0)
 
 
-def _sum(first: Known, second: Known) -> Known:
-    return Known(
+def _sum(first: MotionEnergy, second: MotionEnergy) -> MotionEnergy:
+    return MotionEnergy(
         first.energy + second.energy,
         first.sensitivity + second.sensitivity,
         first.duration + second.duration,
@@ -79,10 +78,15 @@ def _sum(first: Known, second: Known) -> Known:
 
 
 def _by_motions(
-    asked: Cycle, found: CycleSolution, name: Literal["ruckig_slowed", "straight"]
+    cycle: Cycle, found: CycleSolution, name: Literal["ruckig_slowed", "straight"]
 ) -> CycleBaseline | None:
-    """The same configurations and times, by other motions between them: along lines and paths by
-    the answer's own. None where a move has no such motion, or a storage values the whole cycle.
+    """Baseline with other motions between the same configurations in the same times.
+
+    Lines and paths keep the motions of the answer.
+
+    Returns:
+        The baseline; None if a free move has no such motion, or an energy storage couples the
+        moves.
     """
     if found.storage is not None:
         return None
@@ -93,21 +97,21 @@ def _by_motions(
         if not same and move.planned.tool_path is None:
             return None
         parts.append(same[0] if same else None)
-    ours, needed = found.needed, found.needed
+    ours, energies = found.energies, found.energies
     for move, part in zip(found.moves, parts, strict=True):
         if part is not None:
-            needed = _with_motion(needed, move.solution, part)
+            energies = _with_motion(energies, move.solution, part)
     changed = [part for part in parts if part is not None]
     if not changed:
         return None
     held = all(part.within_limits for part in changed)
-    return compared(asked, name, found.duration, needed, held, ours)
+    return cycle_baseline(cycle, name, found.duration, energies, held, ours)
 
 
-def _with_motion(needed: Needed, own: Solution, other: Baseline) -> Needed:
-    """What a cycle needs with another motion in place of its own."""
-    known, gone = needed.electrical, own.sensitivity
-    return Needed(
+def _with_motion(energies: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:
+    """Energies of a cycle with one motion replaced."""
+    known, gone = energies.electrical, own.sensitivity
+    return CycleEnergies(
         replace(
             known,
             energy=known.energy + other.electrical - own.energy.electrical.total,
@@ -115,5 +119,5 @@ def _with_motion(needed: Needed, own: Solution, other: Baseline) -> Needed:
             + other.sensitivity
             + Sensitivity(-gone.gradient, -gone.shift),
         ),
-        needed.mechanical + other.mechanical - own.energy.mechanical.total,
+        energies.mechanical + other.mechanical - own.energy.mechanical.total,
     )

@@ -1,4 +1,4 @@
-"""The solution of a problem: the motion with its samples, baselines and limits, in SI units."""
+"""The solution of a problem: motion, samples, baselines and limits, in SI units."""
 
 from __future__ import annotations
 
@@ -127,8 +127,9 @@ class Baseline:
 
 @dataclass(frozen=True)
 class LimitsInForce:
-    """The limits that the motion was held to: those of the robot, or the tighter ones of the
-    request. Lists are per joint, from base to flange; null: no limit."""
+    """Limits of the motion: those of the robot, or the tighter ones of the request. Lists are per
+    joint, from base to flange; null: no limit.
+    """
 
     position_min: Annotated[PerJoint, Unit("rad")]
     """Least joint position."""
@@ -151,8 +152,7 @@ class LimitsInForce:
     def of(
         cls, joints: Limits, tcp_speed: float | None, elbow_speed: float | None
     ) -> LimitsInForce:
-        """The limits of the joints, and those on the speeds of TCP and elbow [m/s]; None: no
-        limit."""
+        """Limits of the joints and of the speeds of TCP and elbow [m/s]; None is no limit."""
         rates = (joints.v_max, joints.a_max, joints.j_max, joints.tau_max)
         return cls(joints.q_min, joints.q_max, *rates, tcp_speed, elbow_speed)
 
@@ -177,10 +177,25 @@ class SolverReport:
 class Solution:
     """The motion of least energy, with its lower bound and certificate.
 
-    Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or
-    goal. Then `status` is `feasible`, and the lower bound covers the motions between those that may
-    be missing. `sensitivity` is that of the electrical energy. `unmodelled` are contacts of bodies
-    that stand in for a tool or a payload without a shape, see `collision.stand_ins`.
+    Attributes:
+        status: `optimal` if no candidate can need less energy.
+        start: configuration at the start.
+        goal: configuration at the goal.
+        trajectory: the motion and its samples.
+        energy: energy of the motion.
+        limits: limits of the motion.
+        sensitivity: sensitivity of the electrical energy.
+        lower_bound: proven lower bound of the objective [J]. If not `complete`, it also covers
+            motions between configurations that may be missing.
+        baselines: motions of other planners.
+        candidates: outcome of every candidate.
+        unreachable: targets without candidates.
+        certificate: independent check of the motion.
+        unmodelled: contacts of bodies that stand in for a tool or payload without a shape; see
+            `collision.stand_ins`.
+        solver: effort.
+        complete: whether all configurations at start and goal were found. If not, `status` is
+            `feasible`.
     """
 
     status: Literal["optimal", "feasible"]
@@ -201,5 +216,5 @@ class Solution:
 
     @property
     def duration(self) -> float:
-        """Length of the motion [s]."""
+        """Duration of the motion [s]."""
         return self.trajectory.spline.duration

@@ -25,7 +25,8 @@ from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory, PathInfeasible
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.path_retiming import PathRetiming, RetimingProgram
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
+from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but
@@ -219,7 +220,7 @@ def test_a_least_speed_that_no_motion_keeps_says_so() -> None:
 
 def test_the_gradient_of_the_least_speed_is_that_of_its_slack() -> None:
     prepared = PreparedProblem.of(cornered())
-    path = prepared.joint_path(HOME)
+    path = prepared.followed.joint_path(HOME)
     assert path is not None
     retiming = PathRetiming(
         prepared, path, duration_intervals(prepared, path.control_points[-1])[0]

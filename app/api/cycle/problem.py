@@ -27,7 +27,7 @@ from joulepath.optimizer.problem.targets import Target
 
 
 def to_cycle(request: CycleRequest, deadline: float) -> Cycle:
-    """The cycle of a request, of whose time `deadline` [s] is left.
+    """The cycle of a request with a remaining time of `deadline` [s].
 
     Raises UnknownRobot, InvalidProblem, OutsideLimits or DeadlineExceeded.
     """
@@ -66,7 +66,7 @@ def _to_order(request: CycleRequest) -> FreeOrder | None:
 
 def _to_stop(k: int, stop: StopRequest, robot: Robot, tool: str | Tool) -> Stop:
     try:
-        # left out: what is carried stays
+        # Without this field, the payload stays.
         part = to_payload(stop.payload) if "payload" in stop.model_fields_set else None
         payload = None if part is None else with_tool(tool, part)
         limits = None if stop.limits == MoveLimits() else to_limits(stop.limits, robot)
@@ -90,7 +90,7 @@ def _to_stop(k: int, stop: StopRequest, robot: Robot, tool: str | Tool) -> Stop:
 
 
 def _target(stop: StopRequest, robot: Robot) -> Target:
-    """The target of a stop: where its path starts, if it has one."""
+    """The target of a stop, or the start of its path."""
     if stop.path is not None:
         return to_target_pose(stop.path.points[0], robot)
     assert stop.target is not None

@@ -1,5 +1,4 @@
-"""What `POST /ik` takes and answers, and its work in a worker, because its meshes may take
-seconds."""
+"""Request and answer of `POST /ik`, and its work in a worker: meshes may take seconds."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ from joulepath.models.robot import Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.inverse_kinematics import IKSolution, inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 class IKRequest(CellRequest):
@@ -49,19 +48,19 @@ class IKRequest(CellRequest):
         10.0,
         default=10.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class IKAnswer(Answer):
-    """All arm configurations within the joint range that reach the pose."""
+    """All arm configurations of the pose within the joint ranges."""
 
     solutions: tuple[IKSolution, ...]
     """One entry per configuration."""
     complete: bool
-    """Whether every branch is among them. False for an arm whose inverse kinematics is not proven
-    to find all: some may be missing."""
+    """Whether the solutions contain every branch. False for an arm without a complete inverse: some
+    may be missing."""
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,7 @@ from joulepath.optimizer.search.errors import (
 
 _OUT_OF_REACH = (
     "The goal pose is 0.12 m out of reach in this orientation: move the position closer to the "
-    "robot's workspace, or "
-    "change the orientation."
+    "robot's workspace, or change the orientation."
 )
 _COLLIDES = "it collides: table and forearm miss 0.031 m of clearance"
 _CANDIDATE = CandidateReport(
