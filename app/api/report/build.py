@@ -9,7 +9,7 @@ from joulepath.app.api.report.assumptions import assumptions, interval_note
 from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.costs import Money, cost_table, costs_note, cycle_time, facts
 from joulepath.app.api.report.drawings import Course, Leg, Stop, drawn
-from joulepath.app.api.report.numbers import digits, down, percent, up
+from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
 from joulepath.app.api.report.report import Part, Report, Rival
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.picture.cell_picture import cell_picture, stops_of
@@ -62,7 +62,7 @@ def report_of(bundle: Bundle, program: Program) -> Report:
     return Report(
         title=bundle.title or ("A cycle of stops" if bundle.kind == "cycle" else "A motion"),
         subtitle=f"Energy report · {made:%-d %B %Y} · {robot.figures['title']}",
-        lead=_lead(bundle),
+        lead=tuple(map(unbroken, _lead(bundle))),
         facts=facts(bundle, money),
         picture=cell_picture(program),
         caption=_caption(program),
@@ -78,10 +78,10 @@ def report_of(bundle: Bundle, program: Program) -> Report:
         costs=cost_table(bundle, money),
         currency=money.currency,
         costs_note=costs_note(money),
-        proven=_proven(answer),
+        proven=unbroken(_proven(answer)),
         check=_check(answer),
         assumptions=assumptions(bundle, program),
-        assumptions_note=interval_note(answer["energy"]["electrical"].get("interval")),
+        assumptions_note=unbroken(interval_note(answer["energy"]["electrical"].get("interval"))),
         foot=f"Computed, not measured. Never run on hardware by us. joulepath {bundle.version}",
     )
 
