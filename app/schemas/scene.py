@@ -21,10 +21,10 @@ from joulepath.app.schemas.common import (
 from joulepath.app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.models.shape_sizes import SIZES
-from joulepath.optimizer.problem.arm import MOST_TOOL_PARTS
-from joulepath.optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
+from joulepath.optimizer.problem.arm import ARM_RANGES
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES
 from joulepath.optimizer.problem.names import LONGEST_NAME
-from joulepath.optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
+from joulepath.optimizer.problem.scene import SCENE_RANGES
 
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 _POSE_TEXT = (
@@ -85,7 +85,9 @@ class Mesh(_Shape):
     """
 
     shape: Literal["mesh"] = described("Kind of shape.", None, "mesh")
-    vertices: Annotated[list[Vector3], Field(min_length=4, max_length=MOST_VERTICES)] = described(
+    vertices: Annotated[
+        list[Vector3], Field(min_length=4, max_length=SCENE_RANGES.max_vertices)
+    ] = described(
         "Points [x, y, z] in the frame of the pose. Their convex hull must have a volume.",
         "m",
         [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]],
@@ -105,10 +107,12 @@ class Points(_Shape):
     """
 
     shape: Literal["points"] = described("Kind of shape.", None, "points")
-    points: Annotated[list[Vector3], Field(min_length=1, max_length=MOST_POINTS)] = described(
-        "Points [x, y, z] in the frame of the pose.",
-        "m",
-        [[0.4, 0.1, 0.0], [0.4, 0.12, 0.0], [0.4, 0.14, 0.01]],
+    points: Annotated[list[Vector3], Field(min_length=1, max_length=CLOUD_RANGES.max_points)] = (
+        described(
+            "Points [x, y, z] in the frame of the pose.",
+            "m",
+            [[0.4, 0.1, 0.0], [0.4, 0.12, 0.0], [0.4, 0.14, 0.01]],
+        )
     )
     radius: Size = described(
         "Radius of the ball about each point: at least half of the distance between neighbours, so "
@@ -122,7 +126,8 @@ class VoxelBits(Request):
     """The occupied cells of a grid as one bit each."""
 
     dimensions: Annotated[
-        list[Annotated[int, Field(ge=1, le=MOST_ALONG_EDGE)]], Field(min_length=3, max_length=3)
+        list[Annotated[int, Field(ge=1, le=CLOUD_RANGES.max_along_edge)]],
+        Field(min_length=3, max_length=3),
     ] = described(
         "Number of cells along x, y and z; at most 8,388,608 cells in all.", None, [4, 2, 2]
     )
@@ -148,11 +153,16 @@ class Voxels(_Shape):
         Annotated[
             list[
                 Annotated[
-                    list[Annotated[int, Field(ge=-MOST_ALONG_EDGE, le=MOST_ALONG_EDGE)]],
+                    list[
+                        Annotated[
+                            int,
+                            Field(ge=-CLOUD_RANGES.max_along_edge, le=CLOUD_RANGES.max_along_edge),
+                        ]
+                    ],
                     Field(min_length=3, max_length=3),
                 ]
             ],
-            Field(min_length=1, max_length=MOST_VOXELS),
+            Field(min_length=1, max_length=CLOUD_RANGES.max_voxels),
         ]
         | None
     ) = described(
@@ -205,7 +215,7 @@ class _Obstacle(Request):
         "Required clearance between the arm and this obstacle; 0 allows contact.",
         "m",
         0.02,
-        default=DEFAULT_MARGIN,
+        default=SCENE_RANGES.default_margin,
         ge=0,
         le=1,
     )
@@ -329,7 +339,7 @@ Obstacle = Annotated[
 class Scene(Request):
     """The surroundings of the arm."""
 
-    obstacles: Annotated[list[Obstacle], Field(max_length=MOST_OBSTACLES)] = described(
+    obstacles: Annotated[list[Obstacle], Field(max_length=SCENE_RANGES.max_obstacles)] = described(
         "Obstacles around the arm.",
         None,
         [{"name": "floor", "shape": "half_space", "pose": at(0.0, 0.0, -0.1)}],
@@ -354,7 +364,7 @@ class ToolCapsule(Request):
 class Tool(Request):
     """The shape of the tool, for collision checking."""
 
-    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_TOOL_PARTS)] = described(
+    capsules: Annotated[list[ToolCapsule], Field(max_length=ARM_RANGES.max_tool_parts)] = described(
         "Capsules that enclose the tool.",
         None,
         TOOL["capsules"],

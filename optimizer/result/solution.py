@@ -127,8 +127,9 @@ class Baseline:
 
 @dataclass(frozen=True)
 class LimitsInForce:
-    """The limits that the motion was held to: those of the robot, or the tighter ones of the
-    request. Lists are per joint, from base to flange; null: no limit."""
+    """Limits of the motion: those of the robot, or the tighter ones of the request. Lists are per
+    joint, from base to flange; null: no limit.
+    """
 
     position_min: Annotated[PerJoint, Unit("rad")]
     """Least joint position."""

@@ -17,9 +17,9 @@ class Beads:
 
     def __init__(self, arrays: PairArrays) -> None:
         self._arrays = arrays
-        self._centres = arrays.bead_centres.transpose(1, 2, 0).copy()
+        self._centres = arrays.cover_centres.transpose(1, 2, 0).copy()
         self._T_core = pose_columns(arrays.T_link_core.reshape(-1, 4, 4))
-        self._half_sizes = arrays.form_sizes.T.copy()
+        self._half_sizes = arrays.primitive_half_sizes.T.copy()
 
     def distances(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
         """Lower bounds (k,) [m] on the distances of the cores of pairs (k,) at configurations (k,),
@@ -29,27 +29,27 @@ class Beads:
         cylinder get -inf, and so do those whose cores may overlap.
         """
         arrays, result = self._arrays, np.full(len(pair), -np.inf)
-        bounded = np.flatnonzero(arrays.formed[pair] >= 0)
+        bounded = np.flatnonzero(arrays.primitive[pair] >= 0)
         if not bounded.size:
             return result
         configuration, pair = configuration[bounded], pair[bounded]
-        formed, beaded = arrays.formed[pair], arrays.beaded[pair]
+        primitive, covered = arrays.primitive[pair], arrays.covered[pair]
         T, links = pose_columns(frames), frames.shape[1]
         points = placed(
-            picked(T, configuration * links + arrays.links[beaded]), picked(self._centres, beaded)
+            picked(T, configuration * links + arrays.links[covered]), picked(self._centres, covered)
         )
         # obstacles are in the frame of the base, which most pairs need no step into
-        moving = np.flatnonzero(arrays.links[formed] > 0)
+        moving = np.flatnonzero(arrays.links[primitive] > 0)
         if moving.size:
-            T_moving = picked(T, configuration[moving] * links + arrays.links[formed[moving]])
+            T_moving = picked(T, configuration[moving] * links + arrays.links[primitive[moving]])
             points[..., moving] = into(T_moving, points[..., moving])
-        local = np.abs(into(picked(self._T_core, formed), points))
-        is_cycle = np.flatnonzero(arrays.is_cycle[formed])
-        if is_cycle.size:
-            local[:, 0, is_cycle] = np.hypot(local[:, 0, is_cycle], local[:, 1, is_cycle])
-            local[:, 1, is_cycle] = 0.0
-        outside = np.maximum(local - picked(self._half_sizes, formed), 0.0)
+        local = np.abs(into(picked(self._T_core, primitive), points))
+        is_cylinder = np.flatnonzero(arrays.is_cylinder[primitive])
+        if is_cylinder.size:
+            local[:, 0, is_cylinder] = np.hypot(local[:, 0, is_cylinder], local[:, 1, is_cylinder])
+            local[:, 1, is_cylinder] = 0.0
+        outside = np.maximum(local - picked(self._half_sizes, primitive), 0.0)
         square = (outside[:, 0] ** 2 + outside[:, 1] ** 2 + outside[:, 2] ** 2).min(axis=0)
-        bound = np.sqrt(square) - arrays.bead_radii[beaded]
+        bound = np.sqrt(square) - arrays.cover_radii[covered]
         result[bounded] = np.where(bound > 0, bound, -np.inf)
         return result

@@ -46,7 +46,7 @@ class NumpyDistances:
             # the ball around a shelf encloses half of the cell: a second bound leaves out most of
             # these pairs
             near = configuration, column
-            bound = self.bead_bounds(frames, configuration, pairs[column])
+            bound = self.cover_bounds(frames, configuration, pairs[column])
             distance[near] = np.maximum(distance[near], bound)
             chosen = bound <= within
             configuration, column = configuration[chosen], column[chosen]
@@ -72,7 +72,7 @@ class NumpyDistances:
         distance[:, self._half_space_first[pairs]] = -np.inf
         return np.asarray(distance)
 
-    def bead_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
+    def cover_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
         """Lower bounds (k,) [m] on the signed distances of pairs (k,) at configurations (k,); -inf
         if it has none.
         """

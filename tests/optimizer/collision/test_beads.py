@@ -7,7 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.optimizer.collision.clearance_constraint import COUNTED, ClearanceConstraint
+from joulepath.optimizer.collision.clearance_constraint import (
+    CLEARANCE_CONSTRAINT,
+    ClearanceConstraint,
+)
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.pair_arrays import PairArrays
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
@@ -28,7 +31,7 @@ def test_beads_bound_the_distances_from_below(seed: int) -> None:
     frames, pairs = model.frames(q), np.arange(len(model.pairs))
     configuration, pair = (index.ravel() for index in np.indices((len(q), len(pairs))))
     exact = model.pair_distances(frames).distance.ravel()
-    bound = model.geometry.bead_bounds(frames, configuration, pair)
+    bound = model.geometry.cover_bounds(frames, configuration, pair)
     assert (bound <= exact + ITERATED).all()
     balls = (
         NumpyDistances(PairArrays.of(model.bodies, model.pairs))
@@ -42,8 +45,8 @@ def test_beads_bound_the_distances_from_below(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_distances_bounded_by_earlier_ones_are_those_that_count(seed: int) -> None:
-    """Whatever was computed before, all distances up to COUNTED are exact, and the others are lower
-    bounds.
+    """Whatever was computed before, all distances up to the gradient distance are exact, and the
+    others are lower bounds.
     """
     arm = arm_in_cell(LOADS[seed], cell(seed))
     model, limits = CollisionModel(arm), arm.active_limits
@@ -58,7 +61,7 @@ def test_distances_bounded_by_earlier_ones_are_those_that_count(seed: int) -> No
             frames, near, np.zeros_like(near)
         )
         exact = model.pair_distances(frames).distance
-        counted = exact <= COUNTED
+        counted = exact <= CLEARANCE_CONSTRAINT.gradient_distance
         np.testing.assert_array_equal(found.value[counted], fresh.value[counted])
         np.testing.assert_array_equal(found.by_q[counted], fresh.by_q[counted])
 
