@@ -29,6 +29,7 @@ from joulepath.app.api.logs import route as logs
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
 from joulepath.app.api.replay import route as replay
+from joulepath.app.api.report import route as report
 from joulepath.app.api.robots import route as robots
 from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
@@ -70,6 +71,7 @@ ROUTES = (
     identifications,
     answers,
     export,
+    report,
     robots,
     tools,
     figures,

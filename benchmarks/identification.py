@@ -9,8 +9,8 @@
   from the other.
 - `synthetic`: simulated UR10e with known figures: share of the figures within three standard
   deviations, and of the energies of unseen moves between P5 and P95; the same with moves that draw
-  a power of their own beside the model's. Gates allow for two standard errors of the runs. 200 runs
-  take some minutes.
+  a power of their own beside the model's. The gates are those of 200 runs, which take some minutes;
+  fewer runs have a margin for their sampling error.
 - `standins`: simulated logs in place of real logs that are not public: another motion of the same
   day and other days of a UR10e, a payload from two logs of different days, halves of a log of a
   Panda.
@@ -50,8 +50,9 @@ DRAWS = 100
 MOVES_OF_A_DRAW = 5
 # share of the runs in which a figure is told, for its own share to count
 OFTEN = 0.2
-# standard errors by which the share of a sample of runs may miss its gate
-SAMPLING = 2.0
+# runs of the gates of shares; fewer runs get a margin of so many of their further standard errors
+GATED_RUNS = 200
+MARGIN = 2.0
 # W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a
 # move's energy
 MOVE_EFFECT = 0.6
@@ -192,9 +193,9 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
     )
     every = [near for each in within.values() for near in each]
     worst = min(often, key=lambda each: float(np.mean(each)))
-    # each figure has a gate only if the model holds; few runs are a small sample
-    least = 0.0 if effect else 0.95 - SAMPLING * float(np.sqrt(0.95 * 0.05 / len(worst)))
-    margin = SAMPLING * float(np.std(shares) / np.sqrt(runs))
+    # each figure has a gate only if the model holds
+    least = 0.0 if effect else 0.95 - sampling_margin(np.sqrt(0.95 * 0.05), len(worst))
+    margin = sampling_margin(float(np.std(shares)), runs)
     return [
         Gate(f"{title}: figures within 3 standard deviations", float(np.mean(every)), 0.95, 1.0),
         Gate(f"{title}: the same of the worst figure", float(np.mean(worst)), least, 1.0),
@@ -205,6 +206,16 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
             0.95 + margin,
         ),
     ]
+
+
+def sampling_margin(sd: float, runs: int) -> float:
+    """Margin of a mean over few runs: the standard errors beyond those of `GATED_RUNS` runs.
+
+    Args:
+        sd: standard deviation of one run.
+        runs: number of runs.
+    """
+    return float(MARGIN * sd * max(0.0, runs**-0.5 - GATED_RUNS**-0.5))
 
 
 def _true(truth: Truth, figure: str, joint: int | None) -> float:

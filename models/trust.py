@@ -24,16 +24,22 @@ _GROUPS = {
 
 def energy_trust(figures: dict[str, Any]) -> str:
     """One sentence on the figures behind the energies of a robot, by their trust letters."""
-    by_letter: dict[str, list[str]] = {letter: [] for letter in _GROUPS}
-    for words, section in _energy_figures(figures).items():
-        by_letter[worst_letter(section)].append(words)
     groups = [
-        f"{_GROUPS[letter]} ({', '.join(names)})" for letter, names in by_letter.items() if names
+        f"{_GROUPS[letter]} ({', '.join(names)})"
+        for letter, names in figures_by_letter(figures).items()
     ]
     *first, last = groups
     return (
         f"Energies rest on {', '.join(first)} and {last}." if first else f"Energies rest on {last}."
     )
+
+
+def figures_by_letter(figures: dict[str, Any]) -> dict[str, list[str]]:
+    """What an energy depends on, in words, by the trust letters, best first."""
+    by_letter: dict[str, list[str]] = {letter: [] for letter in _GROUPS}
+    for words, section in _energy_figures(figures).items():
+        by_letter[worst_letter(section)].append(words)
+    return {letter: names for letter, names in by_letter.items() if names}
 
 
 def _energy_figures(figures: dict[str, Any]) -> dict[str, Any]:

@@ -23,8 +23,8 @@ from joulepath.optimizer.problem.problem import Problem, narrowed
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.incumbent import SLACK
 from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.state import ENERGY_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
     if (
         certificate.valid
         and not deadline.passed
-        and (found is None or same < found.energy.of(objective) * (1 - SLACK))
+        and (found is None or same < found.energy.of(objective) * (1 - ENERGY_TOLERANCE))
     ):
         again = _from_known(problem, spline, deadline)
         known = [each for each in (found, again) if each is not None]
@@ -127,5 +127,5 @@ def _from_known(problem: Problem, spline: Spline, deadline: Deadline) -> Solutio
         return run(WHAT_IF.warm_start_share, [spline]).solution()
     with suppress(JoulepathError):
         last = run(1.0, [])
-        return last.as_it_is(spline) if last.incumbent.allows(spline.duration) else None
+        return last.as_it_is(spline) if last.state.allows(spline.duration) else None
     return None

@@ -18,6 +18,7 @@ from joulepath.app.cli.interrupts import interruptible
 from joulepath.app.cli.keys import keys
 from joulepath.app.cli.optimize import optimize
 from joulepath.app.cli.replay import replay
+from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
 from joulepath.app.cli.serve import serve
 from joulepath.app.cli.tools import tools
@@ -54,6 +55,8 @@ for command in (
     export,
     identify,
     replay,
+    report,
+    check,
     robots,
     tools,
     keys,

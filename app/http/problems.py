@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationError, create_model
 
 from joulepath.app.answers.declared import model_of, shown_fields
 from joulepath.app.convert.fields import location
-from joulepath.app.exceptions import access, base, queue, stored, transport
+from joulepath.app.exceptions import access, base, queue, report, stored, transport
 from joulepath.app.exceptions.base import FieldError, InternalError, InvalidRequest
 from joulepath.app.http.validation_messages import told
 from joulepath.app.schemas.problem_details import ProblemDetails
@@ -31,7 +31,7 @@ MOST_ERRORS = 20
 
 _MODULES = (
     *(base, library, search, sequence, given_motions, exports, logs, identification, excitation),
-    *(stored, queue, access, transport),
+    *(stored, queue, access, transport, report),
 )
 """Modules with declared errors, in the order of the reference."""
 

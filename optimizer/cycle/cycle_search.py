@@ -271,27 +271,25 @@ class CycleSearch(LazySearch):
             return self.out_of_time()
         except JoulepathError:
             return np.inf
-        incumbent, (candidate,) = run.incumbent, run.incumbent.candidates
+        state, (candidate,) = run.state, run.state.candidates
         if candidate.status is CandidateStatus.INFEASIBLE:
             return np.inf
         if candidate.energy is None:
             motions = solver.known_motions
             key = motions.key("tried", run.problem)
             known = motions.recall(key)
-            candidate.attempt = result = (
-                solve(incumbent, candidate) if known is None else known.result
-            )
-            if result.spline is not None and not incumbent.cut_short:
+            candidate.attempt = result = solve(state, candidate) if known is None else known.result
+            if result.spline is not None and not state.cut_short:
                 motions.keep(key, KnownMotion(result.spline, result.stationarity))
             if result.status is SolveStatus.OUT_OF_TIME:
                 return self.out_of_time()
             self.failed |= result.spline is None
-            if settled(incumbent, candidate, result, result.message) is None:
+            if settled(state, candidate, result, result.message) is None:
                 self.causes[k] = result.message
                 return np.inf
         self._runs[pair] = run
         self._times.append(self.clock() - run.began)
-        incumbent.end = self.end
+        state.end = self.end
         assert candidate.energy is not None
         return candidate.energy
 
@@ -309,7 +307,7 @@ class CycleSearch(LazySearch):
     def motion(self, k: int, s: int, g: int) -> Spline | None:
         """First motion of a pair; None if there is none."""
         run = self._runs.get((k, s, g))
-        return None if run is None else run.incumbent.candidates[0].spline
+        return None if run is None else run.state.candidates[0].spline
 
     def finish(self, k: int, s: int, g: int, share: float = 1.0) -> None:
         """Optimise the motion of a pair to convergence and certify it.

@@ -1,4 +1,4 @@
-"""What a cycle saves against other cycles in the same time, the waiting priced."""
+"""Savings of a cycle against other cycles in the same time, with the energy of waiting."""
 
 from __future__ import annotations
 
@@ -27,11 +27,10 @@ OTHER_MOTIONS: tuple[Literal["ruckig_slowed", "straight"], ...] = ("ruckig_slowe
 
 
 def in_equal_times(cycle: Cycle, found: CycleSolution) -> CycleSolution:
-    """The cycle with every saving in the same cycle time, and none against a cycle that breaks a
-    limit; and with the same stops and times by other motions.
+    """The cycle with savings in equal cycle times, and with further baselines of the same times.
 
-    Where no `time` is cycle for, cycles differ in duration. The shorter one then waits until the
-    longer one ends, where the answer waits for least.
+    A baseline beyond a limit has no saving. Without a requested `time`, cycles differ in duration:
+    the shorter one then waits for the end of the longer one at the cheapest stop of the answer.
     """
     if not found.baselines:
         return found
@@ -41,7 +40,7 @@ def in_equal_times(cycle: Cycle, found: CycleSolution) -> CycleSolution:
 
 
 def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBaseline:
-    """The baseline, its saving that of both cycles in the longer one's time."""
+    """The baseline with the saving in the time of the longer cycle."""
     if not each.within_limits:
         return replace(each, saving=None, saving_interval=None)
     wait = each.duration - found.duration
@@ -81,8 +80,13 @@ def _sum(first: MotionEnergy, second: MotionEnergy) -> MotionEnergy:
 def _by_motions(
     cycle: Cycle, found: CycleSolution, name: Literal["ruckig_slowed", "straight"]
 ) -> CycleBaseline | None:
-    """The same configurations and times, by other motions between them: along lines and paths by
-    the answer's own. None where a move has no such motion, or a storage values the whole cycle.
+    """Baseline with other motions between the same configurations in the same times.
+
+    Lines and paths keep the motions of the answer.
+
+    Returns:
+        The baseline; None if a free move has no such motion, or an energy storage couples the
+        moves.
     """
     if found.storage is not None:
         return None
@@ -93,20 +97,20 @@ def _by_motions(
         if not same and move.planned.tool_path is None:
             return None
         parts.append(same[0] if same else None)
-    ours, needed = found.energies, found.energies
+    ours, energies = found.energies, found.energies
     for move, part in zip(found.moves, parts, strict=True):
         if part is not None:
-            needed = _with_motion(needed, move.solution, part)
+            energies = _with_motion(energies, move.solution, part)
     changed = [part for part in parts if part is not None]
     if not changed:
         return None
     held = all(part.within_limits for part in changed)
-    return cycle_baseline(cycle, name, found.duration, needed, held, ours)
+    return cycle_baseline(cycle, name, found.duration, energies, held, ours)
 
 
-def _with_motion(needed: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:
-    """What a cycle needs with another motion in place of its own."""
-    known, gone = needed.electrical, own.sensitivity
+def _with_motion(energies: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:
+    """Energies of a cycle with one motion replaced."""
+    known, gone = energies.electrical, own.sensitivity
     return CycleEnergies(
         replace(
             known,
@@ -115,5 +119,5 @@ def _with_motion(needed: CycleEnergies, own: Solution, other: Baseline) -> Cycle
             + other.sensitivity
             + Sensitivity(-gone.gradient, -gone.shift),
         ),
-        needed.mechanical + other.mechanical - own.energy.mechanical.total,
+        energies.mechanical + other.mechanical - own.energy.mechanical.total,
     )

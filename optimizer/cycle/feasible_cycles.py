@@ -27,7 +27,7 @@ from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, retimed
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.incumbent import SLACK
+from joulepath.optimizer.search.state import ENERGY_TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ FEASIBLE = FeasibleCycleSettings()
 class FeasibleCycle:
     """A cycle with known motions.
 
-    Args:
+    Attributes:
         timing: search in the given time.
         nodes: chain of the cycle.
         motions: motion of every move.
@@ -222,7 +222,7 @@ def _solved_in(timing: TimedSearch, pair: Pair, length: float) -> Solution:
         if best is None:
             raise
     if best is None or (
-        found is not None and found.energy.of(objective) <= cost_of(best) * (1 + SLACK)
+        found is not None and found.energy.of(objective) <= cost_of(best) * (1 + ENERGY_TOLERANCE)
     ):
         assert found is not None
         return found

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.least_displacement import ROUNDING
+from joulepath.optimizer.bounds.least_displacement import LIMIT_TOLERANCE
 from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.cycle.chains import LeastChain
@@ -121,11 +121,8 @@ class FreeEndsChain:
         self.quick = dict[int, SingleJointBound]()
         self.costs = [self._costs(k) for k in range(len(legs))]
         # pairs of cells of two layers with the bound of their displacement
-        self.tightened = {
-            k: np.zeros(cost.shape, dtype=bool)
-            for k, cost in enumerate(self.costs)
-            if self._is_inner(k)
-        }
+        inner = (k for k in range(len(legs)) if self._is_inner(k))
+        self.tightened = {k: np.zeros(self.costs[k].shape, dtype=bool) for k in inner}
 
     @classmethod
     def of(cls, cycle: Cycle, legs: Sequence[Leg]) -> FreeEndsChain | None:
@@ -341,7 +338,9 @@ def _is_start_of_path(cycle: Cycle, layer: Layer) -> bool:
 def _is_within_half_turn(cycle: Cycle, layer: Layer) -> bool:
     """Whether every joint of the known nodes is within half a turn of the middle of its range."""
     limits = cycle.arm.active_limits
-    return bool((np.abs(layer.q - (limits.q_min + limits.q_max) / 2) <= np.pi + ROUNDING).all())
+    return bool(
+        (np.abs(layer.q - (limits.q_min + limits.q_max) / 2) <= np.pi + LIMIT_TOLERANCE).all()
+    )
 
 
 def _indices_of_least(values: Array, count: int) -> Indices:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.bounds.least_displacement import ROUNDING
+from joulepath.optimizer.bounds.least_displacement import LIMIT_TOLERANCE
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
@@ -48,7 +48,7 @@ COVER = LayerCoverSettings()
 class CoverCells:
     """Cells of the angle of the tool, with the boxes of their configurations.
 
-    Args:
+    Attributes:
         angle: middle of every cell, shape (n,) [rad].
         width: half width of every cell, shape (n,) [rad].
         branch: branch of the arm, shape (n,).
@@ -200,7 +200,7 @@ class LayerCover:
         part, shift = np.arange(len(split)), np.zeros_like(centre)
         for j in range(centre.shape[1]):
             # boxes are narrower than a turn: one more turn on either side of the range suffices
-            least, most = lowest[j] - ROUNDING, highest[j] + ROUNDING
+            least, most = lowest[j] - LIMIT_TOLERANCE, highest[j] + LIMIT_TOLERANCE
             reach = int(np.ceil(max(-least, most) / (2 * np.pi))) + 1
             turns = 2 * np.pi * np.arange(-reach, reach + 1)
             at, half = (

@@ -18,6 +18,8 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.lower_bound import priced_bounds
+from joulepath.optimizer.bounds.priced_work import priced_work_bounds
+from joulepath.optimizer.cycle.kinds import displacements_between, kinds_of
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
@@ -26,7 +28,6 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.search.priced_work import priced_work_bounds
 
 
 @dataclass(frozen=True)
@@ -267,39 +268,6 @@ def check_size(moves: Sequence[PlannedMove], layers: Mapping[str, Layer]) -> Non
             f"{LEG.most_pairs_of_cycle}: give fewer stops or targets, a `branch`, or `windings` "
             "false.",
         )
-
-
-def kinds_of(
-    start: Layer, goal: Layer, prepared: PreparedProblem
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Kind (s, g) of every pair, and the pair (k, 2) of every kind farthest from the limits."""
-    lowest, highest = (f(np.vstack([start.turns, goal.turns]), axis=0) for f in (np.min, np.max))
-    base = 2 * (highest - lowest) + 1
-    place = np.concatenate([[1], np.cumprod(base[:-1])])
-    turned = (goal.turns @ place)[None, :] - (start.turns @ place)[:, None]
-    ends = start.end[:, None] * len(goal.ends) + goal.end[None, :]
-    code = ends * (2 * int(np.abs(turned).max(initial=0)) + 1) + turned
-    limits = prepared.arm.active_limits
-    middle, half = (limits.q_max + limits.q_min) / 2, (limits.q_max - limits.q_min) / 2
-    edge = [(np.abs(layer.q - middle) / half).max(axis=1) for layer in (start, goal)]
-    order = np.argsort(np.maximum(edge[0][:, None], edge[1][None, :]), axis=None, kind="stable")
-    _, first, kind = np.unique(code.ravel()[order], return_index=True, return_inverse=True)
-    of_pair = np.empty(code.size, dtype=np.intp)
-    of_pair[order] = kind
-    return of_pair.reshape(code.shape), np.column_stack(np.unravel_index(order[first], code.shape))
-
-
-def displacements_between(
-    prepared: PreparedProblem, start: Layer, goal: Layer, pair: npt.NDArray[np.intp]
-) -> tuple[Array, Array]:
-    """Displacements (k, nq) [rad] of pairs (k, 2), and potential energies (k, 2) [J] at their
-    ends.
-    """
-    ends = [(layer, layer.end[nodes]) for layer, nodes in zip((start, goal), pair.T, strict=True)]
-    levels = [
-        np.array([prepared.potential(end.q) for end in layer.ends])[own] for layer, own in ends
-    ]
-    return goal.q[pair[:, 1]] - start.q[pair[:, 0]], np.column_stack(levels)
 
 
 def _pair_costs(of_kind: Array, kind: npt.NDArray[np.intp], dwell: Array) -> Array:

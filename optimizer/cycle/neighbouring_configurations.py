@@ -26,12 +26,12 @@ from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.sliding import FIXED
+from joulepath.optimizer.search.sliding import POSE_FREEDOMS
 
 
 @dataclass(frozen=True)
 class NeighbourSettings:
-    """Settings of the configurations that are tried with_neighbours a found one."""
+    """Settings of the configurations tried beside a found one."""
 
     singular: float = 1e-2
     """Singular values below this share of the largest are cut off, so that steps stay short near a
@@ -71,7 +71,7 @@ def has_free_postures(cycle: Cycle) -> bool:
 def _is_free(arm: Arm, stop: Stop) -> bool:
     if not isinstance(stop.target, Pose) or stop.path is not None:
         return False
-    if arm.robot.nq > FIXED:
+    if arm.robot.nq > POSE_FREEDOMS:
         return True
     kinematics = required_inverse_kinematics(arm.robot, stop.name)
     found = kinematics.solve(

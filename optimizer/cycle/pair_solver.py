@@ -73,7 +73,7 @@ class PairSolver:
         run = Run(problem, known, self.clock, models=self.legs[k].prepared.models)
         trace = self.legs[k].trace_of(problem)
         if trace is not None:
-            run.incumbent.prepared.followed.keep(trace)
+            run.state.prepared.followed.keep(trace)
         return run
 
     def confirms(self, k: int, s: int, g: int, spline: Spline) -> bool:
@@ -137,10 +137,10 @@ class PairSolver:
         if found is None and run is None:
             found = self._kept(key, self.run(k, problem, known).solution())
         elif found is None and run is not None:
-            run.incumbent.end = end
-            if run.incumbent.cut_short and known:
+            run.state.end = end
+            if run.state.cut_short and known:
                 # its share of the search's time was too short
-                run.incumbent.cut_short = False
+                run.state.cut_short = False
                 run.warm_start(known[0])
             found = self._kept(key, run.search())
         assert found is not None

@@ -16,8 +16,9 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import travel_bounds
+from joulepath.optimizer.cycle.kinds import displacements_between, kinds_of
 from joulepath.optimizer.cycle.layers import Layer
-from joulepath.optimizer.cycle.legs import Leg, bounds_of, displacements_between, kinds_of
+from joulepath.optimizer.cycle.legs import Leg, bounds_of
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.motion.passing import pass_times

@@ -8,7 +8,11 @@ from itertools import product
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.free_ends_bound import bound_between_free_ends, reversed_problem
+from joulepath.optimizer.bounds.free_goal_bound import family_bound
 from joulepath.optimizer.bounds.lower_bound import LeastBound
+from joulepath.optimizer.bounds.self_motion_bound import self_motion_bound
+from joulepath.optimizer.bounds.subdivide import SearchLimits
 from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.free_ends_chain import FreeEndsChain
 from joulepath.optimizer.cycle.layers import Layer
@@ -21,9 +25,6 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
-from joulepath.optimizer.search.free_goal_bound import family_bound
-from joulepath.optimizer.search.self_motion_bound import self_motion_bound
 
 
 def proven_bound(cycle: Cycle, legs: Sequence[Leg], deadline: Deadline) -> float:
@@ -88,18 +89,18 @@ def _bound_of_free_poses(leg: Leg, enough: float, deadline: Deadline) -> float:
     """
     problem, start, goal = leg.prepared.freed(), leg.start, leg.goal
     if start.free_pose is not None and goal.free_pose is not None:
-        return bound_between(
+        return bound_between_free_ends(
             PreparedProblem.of(problem), start.free_pose, goal.free_pose, deadline, enough
         )
     if goal.free_pose is not None:
         q = np.array([end.q for end in start.ends])
-        return family_bound(
-            PreparedProblem.of(problem), goal.free_pose, q, deadline=deadline, enough=enough
-        )
+        limits = SearchLimits(deadline=deadline, enough=enough)
+        return family_bound(PreparedProblem.of(problem), goal.free_pose, q, limits)
     assert start.free_pose is not None
-    back = PreparedProblem.of(backwards(problem, problem.goal, problem.start))
+    back = PreparedProblem.of(reversed_problem(problem, problem.goal, problem.start))
     q = np.array([end.q for end in goal.ends])
-    return family_bound(back, start.free_pose, q, deadline=deadline, enough=enough)
+    limits = SearchLimits(deadline=deadline, enough=enough)
+    return family_bound(back, start.free_pose, q, limits)
 
 
 def _bound_of_self_motions(leg: Leg, deadline: Deadline) -> float:

@@ -16,6 +16,7 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.cycle.layers import Layer, arms_at, layer_of
 from joulepath.optimizer.cycle.legs import LEG
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, traces_of_each
@@ -31,7 +32,7 @@ from joulepath.optimizer.problem.stops import APPROACH, RETREAT, Stop
 from joulepath.optimizer.problem.targets import SampledPoses, Target
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.search.end_feasibility import check_configurations
-from joulepath.optimizer.search.ends import EndConfiguration, label_of
+from joulepath.optimizer.search.ends import label_of
 from joulepath.optimizer.search.errors import PathAttempt, PathInfeasible
 from joulepath.optimizer.search.path_ends import attempt_of
 

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 PARALLEL_SINE = 1e-12
@@ -37,6 +38,29 @@ def nearest_orientation(pose: ConeOrientedPose, R: Array) -> Array:
         return R
     beyond = tilt(pose, R)
     return np.asarray(pin.exp3(-beyond * (excess / np.linalg.norm(beyond))) @ R)
+
+
+def within_cone(arm: Arm, pose: ConeOrientedPose, share: float = 1.0) -> ConeOrientedPose:
+    """The pose without the orientations that the cone of the arm's tool excludes.
+
+    It is the pose itself unless both cones have the same axes or the pose allows any orientation.
+    With the excluded orientations, few samples would lie in a narrow cone, and a lower bound would
+    count motions that are not allowed.
+
+    Args:
+        arm: arm with the tool.
+        pose: pose of partly free orientation.
+        share: largest share of the tool cone's half angle that the pose may use.
+    """
+    cone = arm.tool_cone
+    if cone is None:
+        return pose
+    is_free = pose.half_angle == np.pi
+    same_axes = np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)
+    if not is_free and not same_axes:
+        return pose
+    half_angle = min(pose.half_angle, share * cone.half_angle)
+    return ConeOrientedPose(pose.position, cone.axis, cone.direction, half_angle)
 
 
 def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:

@@ -22,9 +22,8 @@ class Clearance:
     time: Seconds
     """Time of this sample, from the start of the motion."""
     points: Annotated[tuple[list[float], list[float]], Unit("m")] | None = None
-    """Nearest points of the two bodies at that time, in the base frame, without the margin. Null in
-    answers of an earlier version.
-    """
+    """The nearest points of the two bodies at that time, in the base frame, without the margin.
+    Null in answers of an earlier version."""
 
     @property
     def message(self) -> str:
@@ -34,8 +33,8 @@ class Clearance:
 
 
 class WorstRatio(TypedDict):
-    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The entries after
-    `torque` exist only if the request limits them.
+    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The fields after
+    `torque` are present only if the request limits their quantity.
     """
 
     position: Ratio
@@ -96,10 +95,10 @@ class Certificate:
     clearance: Clearance | None
     """Smallest clearance; null if `collisions` is false."""
     close_pass: Annotated[Clearance | None, Internal]
-    """Least distance without margins; None unless it may be below 2 mm."""
+    """The least distance without margins; None unless it may be below 2 mm."""
 
     POSITION_TOLERANCE = 1e-6
-    # Rounding of control points (1e-16 rad) over the square of the shortest knot span.
+    # rounding of control points (1e-16 rad) over the square of the shortest knot span
     REST_TOLERANCE = 1e-7
     ENERGY_TOLERANCE = 1e-3
 

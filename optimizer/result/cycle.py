@@ -26,10 +26,10 @@ class StopConfiguration(Configuration):
 
 @dataclass(frozen=True, kw_only=True)
 class Pass(StopConfiguration):
-    """A stop that a move passes through, and the arm configuration there."""
+    """A stop passed by a move, with the arm configuration there."""
 
     t: Seconds
-    """Time of the pass, from the start of the move."""
+    """When it passes, from the start of the move."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,30 +38,28 @@ class LegReport:
 
     kind: Literal["move", "line", "path", "dwell", "wait"]
     """`move`; `line` into or out of a stop; `path` of a stop; `dwell` at a stop; `wait` there for
-    the rest of the time.
-    """
+    what is left of the time."""
     start: StopConfiguration
-    """Configuration at its start."""
+    """Where it begins."""
     goal: StopConfiguration
-    """Configuration at its end; equal to `start` for a dwell and a wait."""
+    """Where it ends; of a dwell and a wait, where it began."""
     passes: list[Pass]
     """Stops that the move passes through, in their order."""
     t0: Seconds
-    """Time of its start, from the start of the cycle."""
+    """When it begins, from the start of the cycle."""
     duration: Seconds
-    """Duration."""
+    """How long it takes."""
     electrical: Joules
     """Electrical energy drawn from the supply."""
     mechanical: Joules
     """Mechanical work."""
     lower_bound: Joules
-    """Lower bound of the objective between these configurations; for a rest, its contribution to
-    the objective.
-    """
+    """Lower bound of the objective between these configurations; of a rest, what it adds to the
+    objective."""
     payload_mass: Annotated[float, Unit("kg")]
     """Mass of the payload that the arm carries."""
     charge: Joules | None
-    """Charge of the energy storage on the bus at its end; null without one."""
+    """Charge of the energy storage on the bus when it ends; null without one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,12 +67,12 @@ class CycleClearance(Clearance):
     """Smallest clearance over all moves."""
 
     leg: int
-    """Index in `legs`, from 0, of the move with the smallest clearance."""
+    """Index in `legs`, from 0, of the move that comes so close."""
 
 
 @dataclass(frozen=True)
 class CycleCertificate:
-    """Certificates of all moves, and the jumps between the moves."""
+    """The certificates of all moves, and how the moves fit together."""
 
     worst_ratio: Annotated[dict[str, float], Keys(WorstRatio)]
     """Largest value / limit over all moves, for each limit."""
@@ -97,8 +95,8 @@ class CycleSearchReport:
     pairs: Count
     """Pairs of arm configurations, over all moves."""
     distinct: Count
-    """Number of pairs that differ in more than full turns of both ends; each has a proven bound."""
+    """Of these, those that differ in more than full turns of both ends; each has a proven bound."""
     solved: Count
-    """Number of distinct pairs for which a motion was sought."""
+    """Of these, those for which a motion was sought."""
     wall_time: Seconds
     """Wall time."""

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
 
+# minimised quantity: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
-"""Minimised quantity: energy drawn from the supply, or mechanical work."""
 
 JointJoules = Annotated[PerJoint, Unit("J")]
 
@@ -32,7 +32,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class EnergyInterval:
-    """Uncertainty of the energy, from the possible errors of the figures of the arm."""
+    """Uncertainty of the energy from the errors of the arm's figures."""
 
     p5: Joules
     """The energy is above this with 95 % probability."""
@@ -41,15 +41,14 @@ class EnergyInterval:
     sd: Joules
     """Standard deviation."""
     shares: Annotated[dict[str, float], Unit("1")]
-    """Share of the variance by its source; the shares add up to 1. A figure of the arm: measuring
-    the figure with the greatest share helps most. `session`: day-to-day change of friction. `move`:
-    model error of a motion.
-    """
+    """Share of the variance by its source; they add up to 1. A figure of the arm: the greatest
+    share is the one to measure. `session`: friction differs from day to day. `move`: what the
+    model cannot express of a motion."""
 
 
 @dataclass(frozen=True)
 class SavingInterval:
-    """Uncertainty of a saving. Both motions share the errors of the figures."""
+    """How well a saving is known. Both motions share the errors of the figures."""
 
     p5: Ratio
     """The saving is above this with 95 % probability."""
@@ -83,17 +82,15 @@ class ElectricalEnergy:
     braking: Joules
     """Regenerated energy that no joint uses and no energy storage takes."""
     recovered: Joules
-    """Part of `braking` taken back by the supply; zero or negative. The brake resistor dissipates
-    the sum of the two.
-    """
+    """The part of `braking` that the supply takes back; zero or negative. The brake resistor
+    dissipates the sum of the two."""
     storage_loss: Joules = 0.0
     """Loss in the energy storage on the bus."""
     dwell: Joules = 0.0
     """Energy drawn while the arm waits at the goal until the end of the dwell."""
     interval: EnergyInterval | None = None
-    """Uncertainty of the total. Null for a part of a motion, and in answers stored by an earlier
-    version.
-    """
+    """How well the total is known. Null for a part of a motion, and in answers stored by an earlier
+    version."""
 
     @property
     def parts_sum(self) -> float:
@@ -169,11 +166,11 @@ class Energy:
     """Mean power drawn from the supply during the motion."""
 
     def of(self, objective: Objective) -> float:
-        """Minimised energy of an objective [J]."""
+        """The energy that an objective minimises [J]."""
         return self.electrical.total if objective == "electrical" else self.mechanical.total
 
     def with_dwell(self, dwell: float) -> Energy:
-        """This energy with the energy [J] of a subsequent dwell."""
+        """The same with the energy [J] of a dwell afterwards."""
         electrical = self.electrical
         return replace(
             self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell)

@@ -11,16 +11,15 @@ from joulepath.optimizer.result.solution import Solution
 
 @dataclass(frozen=True)
 class Dropped:
-    """A solved duration that is not a point of the front."""
+    """A solved duration without a point on the front."""
 
     duration: Seconds
     """The duration."""
     energy: Joules | None
     """Energy of the motion found, of the objective; null if none was found."""
     reason: str
-    """Reason: no motion was found, a faster motion needs no more energy, or the motion is the same
-    optimum as the last point.
-    """
+    """Why it is not a point: no motion was found, a faster motion needs no more energy, or the
+    motion is the same optimum as the last point."""
 
 
 @dataclass(frozen=True)

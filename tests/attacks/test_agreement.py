@@ -22,7 +22,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.second_attempt import WITHIN_TIGHTER
+from joulepath.optimizer.search.tightened_limits import WITHIN_TIGHTER
 from joulepath.optimizer.solve.methods import sqp_method
 from tests.selection import long_but
 
@@ -145,7 +145,7 @@ def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_li
 
 def test_what_is_rejected_twice_is_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sqp_method, "path_excess", lambda *_: np.zeros(2))
-    monkeypatch.setattr("joulepath.optimizer.search.second_attempt.BEYOND", -0.02)
+    monkeypatch.setattr("joulepath.optimizer.search.tightened_limits.LIMIT_RESERVE", -0.02)
     try:
         answer = solved(SLOW_TOOL)
     except (NoTrajectory, DeadlineExceeded):

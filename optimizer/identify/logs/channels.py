@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.logs.columns import Columns, Group
+from joulepath.optimizer.identify.logs.columns import Columns
 from joulepath.optimizer.identify.logs.filters import noise
 from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_report import Channel
 
 _UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "power": "W", "temperature": "°C"}
 _EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}
 
 
-def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Channel, ...]:
+def channels_of(log: Log, columns: Columns, effort: ChannelName | None) -> tuple[Channel, ...]:
     """All channels of a log.
 
     Args:
@@ -25,9 +26,9 @@ def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Chann
     return tuple(_channels(log, columns, effort))
 
 
-def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Channel]:
+def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterator[Channel]:
     units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
-    sources: dict[str, Group | None] = {
+    sources: dict[str, ChannelName | None] = {
         "q": "q",
         "v": "v",
         "a": "a",

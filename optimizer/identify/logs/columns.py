@@ -5,102 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identify.logs.log_formats import FORMATS, ChannelName, LogFormat
 
-Group = Literal[
-    "q",
-    "v",
-    "a",
-    "current",
-    "torque",
-    "effort",
-    "temperature",
-    "commanded",
-    "power",
-    "payload",
-    "wrench",
-]
-"""Channel of columns: joint positions, speeds, accelerations, currents, torques, efforts of unknown
-meaning, temperatures, commanded speeds; power of the arm, or voltage and current that multiply to
-it; mass and centre of the payload; force and torque on a sensor beneath the base."""
 WRENCH_COLUMNS = 6
 """Columns of a wrench: three of the force, then three of the torque."""
 
 
-@dataclass(frozen=True)
-class LogFormat:
-    """Names of the columns of one kind of log, as regular expressions.
-
-    The first group of an expression, if any, is the number of a joint.
-    """
-
-    name: str
-    time: str
-    joints: Mapping[Group, str]
-    power: tuple[str, ...] = ()
-    payload: tuple[str, ...] = ()
-    wrench: tuple[str, ...] = ()
-
-
-JOINT_NUMBER = r"[._\[ ]?([0-9]{1,3})\]?"
-"""Number of a joint, behind a bracket, underscore, point or space."""
-_PREFIX = r"(?:.*[./])?(?:joint_?|measured_?|msr_?|actual_?|motor_?)*"
-"""Prefix of a topic or a structure, as in `/joint_states/position[0]` or `state.q[0]`, and words
-for a measurement.
-"""
-FORMATS = (
-    LogFormat(
-        "rtde",
-        "timestamp",
-        {
-            "q": f"actual_q{JOINT_NUMBER}",
-            "v": f"actual_qd{JOINT_NUMBER}",
-            "a": f"target_qdd{JOINT_NUMBER}",
-            "current": f"actual_current{JOINT_NUMBER}",
-            "temperature": f"joint_temperatures{JOINT_NUMBER}",
-            "commanded": f"target_qd{JOINT_NUMBER}",
-        },
-        ("actual_robot_voltage", "actual_robot_current"),
-        ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2"),
-    ),
-    LogFormat(
-        "own",
-        "t",
-        {
-            "q": "q([0-9]{1,3})",
-            "v": "v([0-9]{1,3})",
-            "a": "a([0-9]{1,3})",
-            "current": "i([0-9]{1,3})",
-            "torque": "tau([0-9]{1,3})",
-        },
-        ("p",),
-        wrench=("fx", "fy", "fz", "mx", "my", "mz"),
-    ),
-    LogFormat(
-        "ros",
-        "%?time",
-        {
-            "q": rf"(?:.*[./])?position{JOINT_NUMBER}",
-            "v": rf"(?:.*[./])?velocity{JOINT_NUMBER}",
-            "effort": rf"(?:.*[./])?effort{JOINT_NUMBER}",
-        },
-    ),
-    LogFormat(
-        "numbered",
-        "time",
-        {
-            "q": rf"{_PREFIX}(?:q|pos|positions?|angles?|mp|axisqmsr_\w*?){JOINT_NUMBER}",
-            "v": rf"{_PREFIX}(?:dq|qd|v|vel|velocity|velocities|speeds?){JOINT_NUMBER}",
-            "current": rf"{_PREFIX}(?:i|currents?){JOINT_NUMBER}",
-            "torque": rf"{_PREFIX}(?:tau|tau_j|torques?|mt|axistaumsr_\w*?){JOINT_NUMBER}",
-            "effort": rf"{_PREFIX}(?:efforts?){JOINT_NUMBER}",
-            "temperature": rf"{_PREFIX}(?:temperatures?|temp){JOINT_NUMBER}",
-        },
-        ("power",),
-    ),
-)
 _TIME = (
     r"(?:.*[./])?(?:__|%)?(?:time|timestamp|t|stamp|rosbagtimestamp|duration)(?:[_ "
     r"]?(?:n|u|µ|m)?s(?:ec)?)?"
@@ -123,7 +36,7 @@ class Columns:
     """Names of all columns."""
     time: tuple[int, ...]
     """Column of the time, or columns of its seconds and nanoseconds."""
-    groups: Mapping[Group, tuple[int, ...]]
+    groups: Mapping[ChannelName, tuple[int, ...]]
     """Columns of each channel; one per joint for channels of joints."""
 
     MAPPED: ClassVar[tuple[str, ...]] = (
@@ -141,7 +54,7 @@ class Columns:
     )
     """Keys of a map of columns."""
 
-    def without_empty(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
+    def without_empty(self, first: Sequence[str]) -> tuple[Columns, list[ChannelName]]:
         """Remove channels without a number in the first row, except positions.
 
         Args:
@@ -150,7 +63,7 @@ class Columns:
         Returns:
             The remaining columns, and the removed channels.
         """
-        removed: list[Group] = [
+        removed: list[ChannelName] = [
             group
             for group, indices in self.groups.items()
             if group != "q" and all(_is_empty(first[k]) for k in indices)
@@ -178,24 +91,26 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
     Raises:
         InvalidTable: the header is in none of the formats, or lacks columns.
     """
-    for form in FORMATS:
+    for log_format in FORMATS:
         found = {
             group: indices
-            for group, pattern in form.joints.items()
+            for group, pattern in log_format.joints.items()
             if (indices := _numbered(names, pattern))
         }
         if "q" not in found:
             continue
-        time = time_of(names, form.time)
+        time = time_of(names, log_format.time)
         if not time:
             raise InvalidTable(
                 f"The header has joint positions, as {names[found['q'][0]]}, but no column "
-                f"`{form.time.strip('%?')}`: a log needs the time [s] of every row.",
+                f"`{log_format.time.strip('%?')}`: a log needs the time [s] of every row.",
                 1,
-                form.time.strip("%?"),
+                log_format.time.strip("%?"),
             )
         _check_counts(found, names, nq)
-        return Columns(form.name, names, time, found | dict(_columns_without_joint(form, names)))
+        return Columns(
+            log_format.name, names, time, found | dict(_columns_without_joint(log_format, names))
+        )
     raise InvalidTable(
         f"The header names no joint positions that are known: begin it with {_KNOWN_HEADERS}.", 1
     )
@@ -204,10 +119,10 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
 def other_positions(names: Sequence[str], columns: Columns) -> str | None:
     """Name of a column with positions in another format, which is not read; None if there is
     none."""
-    for form in FORMATS:
+    for log_format in FORMATS:
         for name in names:
             if (
-                re.fullmatch(form.joints["q"], name)
+                re.fullmatch(log_format.joints["q"], name)
                 and names.index(name) not in columns.groups["q"]
             ):
                 return name
@@ -269,17 +184,17 @@ def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
 
 
 def _columns_without_joint(
-    form: LogFormat, names: Sequence[str]
-) -> Iterator[tuple[Group, tuple[int, ...]]]:
+    log_format: LogFormat, names: Sequence[str]
+) -> Iterator[tuple[ChannelName, tuple[int, ...]]]:
     """Columns of channels that belong to no joint."""
-    if form.power and all(name in names for name in form.power):
-        yield "power", tuple(names.index(name) for name in form.power)
-    if form.wrench and all(name in names for name in form.wrench):
-        yield "wrench", tuple(names.index(name) for name in form.wrench)
-    present = tuple(names.index(name) for name in form.payload if name in names)
-    if form.payload and form.payload[0] in names:
+    if log_format.power and all(name in names for name in log_format.power):
+        yield "power", tuple(names.index(name) for name in log_format.power)
+    if log_format.wrench and all(name in names for name in log_format.wrench):
+        yield "wrench", tuple(names.index(name) for name in log_format.wrench)
+    present = tuple(names.index(name) for name in log_format.payload if name in names)
+    if log_format.payload and log_format.payload[0] in names:
         # the centre only if all of it is there
-        yield "payload", present if len(present) == len(form.payload) else present[:1]
+        yield "payload", present if len(present) == len(log_format.payload) else present[:1]
 
 
 def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
@@ -316,7 +231,7 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
             )
         found[group] = tuple(_index(names, each) for each in wanted)
     time = (*found.pop("time"), *found.pop("nanoseconds", ()))
-    groups: dict[Group, tuple[int, ...]] = found  # type: ignore[assignment]
+    groups: dict[ChannelName, tuple[int, ...]] = found  # type: ignore[assignment]
     _check_counts(
         {group: indices for group, indices in groups.items() if group not in ("power", "wrench")},
         names,
@@ -334,7 +249,9 @@ def _index(names: Sequence[str], name: str) -> int:
     return names.index(name.lower())
 
 
-def _check_counts(groups: Mapping[Group, tuple[int, ...]], names: Sequence[str], nq: int) -> None:
+def _check_counts(
+    groups: Mapping[ChannelName, tuple[int, ...]], names: Sequence[str], nq: int
+) -> None:
     for indices in groups.values():
         if len(indices) != nq:
             name = names[indices[0]] if indices else None

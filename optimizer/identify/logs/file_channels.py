@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.logs.columns import Columns, Group
+from joulepath.optimizer.identify.logs.columns import Columns
 from joulepath.optimizer.identify.logs.file_rows import FileRows, LogSource
 from joulepath.optimizer.identify.logs.filters import noise
 from joulepath.optimizer.identify.logs.grid import Grid, grid_of
 from joulepath.optimizer.identify.logs.head import head_of
 from joulepath.optimizer.identify.logs.header_columns import columns_of_rows
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
 from joulepath.optimizer.identify.logs.possible import (
@@ -27,11 +28,11 @@ from joulepath.optimizer.identify.logs.possible import (
     without_whole_turns,
 )
 
-_ANGULAR: tuple[Group, ...] = ("q", "v", "a", "commanded")
-_DOUBLE_PRECISION: tuple[Group, ...] = ("q", "payload")
+_ANGULAR: tuple[ChannelName, ...] = ("q", "v", "a", "commanded")
+_DOUBLE_PRECISION: tuple[ChannelName, ...] = ("q", "payload")
 """Channels that are differentiated twice, or compared. All others have fewer digits than single
 precision, which takes half of the memory."""
-_ONE_VALUE: tuple[Group, ...] = ("commanded", "power")
+_ONE_VALUE: tuple[ChannelName, ...] = ("commanded", "power")
 """Channels with one value per row."""
 
 
@@ -60,10 +61,10 @@ class FileChannels:
     columns: Columns
     dropped: int
     """Number of dropped lines."""
-    values: dict[Group, Array]
+    values: dict[ChannelName, Array]
     """Values (rows, k) of each channel."""
 
-    def take(self, group: Group) -> Array | None:
+    def take(self, group: ChannelName) -> Array | None:
         """Remove a channel and resample it to the grid; None if it was not logged."""
         values = self.values.pop(group, None)
         if values is None:
@@ -88,7 +89,7 @@ def read_channels(
         LogTooLarge: the file is too large.
         InvalidProblem: an option does not fit the file or the robot.
     """
-    scales: dict[Group, float] = dict.fromkeys(
+    scales: dict[ChannelName, float] = dict.fromkeys(
         _ANGULAR, pi / 180 if options.units == "deg" else 1.0
     )
     scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
@@ -104,8 +105,8 @@ def read_channels(
 
 
 def _read_rows(
-    rows: FileRows, columns: Columns, robot: Robot, scales: Mapping[Group, float]
-) -> tuple[Array, Array, dict[Group, Array]]:
+    rows: FileRows, columns: Columns, robot: Robot, scales: Mapping[ChannelName, float]
+) -> tuple[Array, Array, dict[ChannelName, Array]]:
     """Times (n,), numbers of the lines (n,), and values (n, k) of each channel in SI units."""
     names, used = columns.names, columns.used
     where = {group: [used.index(k) for k in indices] for group, indices in columns.groups.items()}
@@ -131,7 +132,7 @@ def _read_rows(
 
 
 def _check_positions(
-    channels: dict[Group, Array],
+    channels: dict[ChannelName, Array],
     grid: Grid,
     lines: Array,
     robot: Robot,
@@ -157,7 +158,7 @@ def _check_positions(
     check_leaps(q, grid, lines, robot, [columns.names[k] for k in columns.groups["q"]])
 
 
-def _reduced(group: Group, values: Array, before: array[float]) -> Array:
+def _reduced(group: ChannelName, values: Array, before: array[float]) -> Array:
     """The part of a block of values (n, k) to keep, because a log can fill half of the memory.
 
     Kept are the largest commanded speed, the product of voltage and current, and changes of the

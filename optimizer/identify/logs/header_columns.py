@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.logs.columns import (
     Columns,
-    Group,
     mapped,
     other_positions,
     recognised,
 )
 from joulepath.optimizer.identify.logs.file_rows import FileRows
 from joulepath.optimizer.identify.logs.joint_names import by_joint_name, in_order_of_joints
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.units import check_units, is_line_of_units, split_units
 
@@ -35,7 +35,7 @@ def columns_of_rows(
     rows: FileRows,
     robot: Robot,
     options: LogOptions,
-    scales: Mapping[Group, float],
+    scales: Mapping[ChannelName, float],
     remarks: list[str],
 ) -> Columns:
     """Columns by the header and the first row; a line of units below the header is skipped.

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.columns import JOINT_NUMBER, Columns, Group, time_of
+from joulepath.optimizer.identify.logs.columns import Columns, time_of
+from joulepath.optimizer.identify.logs.log_formats import JOINT_NUMBER, ChannelName
 
-_WORDS: Mapping[Group, str] = {
+_WORDS: Mapping[ChannelName, str] = {
     "q": "position|pos|q",
     "v": "velocity|vel|speed|v|qd",
     "effort": "effort",

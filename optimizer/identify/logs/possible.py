@@ -11,8 +11,8 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.columns import Group
 from joulepath.optimizer.identify.logs.grid import GRID, Grid
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 
 TWO_PI = 2 * np.pi
 
@@ -49,8 +49,8 @@ def check_sizes(
     lines: Array,
     names: Sequence[str],
     used: Sequence[int],
-    where: Mapping[Group, Sequence[int]],
-    scales: Mapping[Group, float],
+    where: Mapping[ChannelName, Sequence[int]],
+    scales: Mapping[ChannelName, float],
 ) -> None:
     """Check a block of rows for numbers too large for a robot.
 
@@ -65,7 +65,7 @@ def check_sizes(
     Raises:
         InvalidTable: a number is too large.
     """
-    limits: Mapping[Group, float] = {
+    limits: Mapping[ChannelName, float] = {
         "v": PLAUSIBLE.max_speed,
         "commanded": PLAUSIBLE.max_speed,
         "a": PLAUSIBLE.max_acceleration,

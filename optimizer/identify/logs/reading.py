@@ -12,7 +12,6 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.logs.channels import channels_of
-from joulepath.optimizer.identify.logs.columns import Group
 from joulepath.optimizer.identify.logs.effort import EffortReport, effort_report
 from joulepath.optimizer.identify.logs.effort_checks import (
     check_signs,
@@ -25,6 +24,7 @@ from joulepath.optimizer.identify.logs.head import head_of
 from joulepath.optimizer.identify.logs.header_columns import columns_of_header
 from joulepath.optimizer.identify.logs.lag import effort_lag, power_lag
 from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.log_report import LogReport
 from joulepath.optimizer.identify.logs.log_warnings import held_warning, log_warnings
@@ -39,7 +39,7 @@ from joulepath.optimizer.identify.logs.usable_effort import check_measured, choo
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.arrays import frozen
 
-_EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
+_EFFORTS: tuple[ChannelName, ...] = ("current", "torque", "effort")
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class LogReading:
 
 
 class _Efforts(NamedTuple):
-    group: Group
+    group: ChannelName
     values: Array
     report: EffortReport
 

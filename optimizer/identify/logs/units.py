@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.columns import Columns, Group
+from joulepath.optimizer.identify.logs.columns import Columns
 from joulepath.optimizer.identify.logs.head import is_number
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 
 _DIGITS = frozenset("0123456789")
 _NUMBER_START = re.compile(r"[-+]?[.,]?[0-9]")
@@ -22,7 +23,7 @@ def _unit(pattern: str) -> re.Pattern[str]:
 class _UnitCheck:
     """Units of some groups of columns."""
 
-    groups: tuple[Group, ...]
+    groups: tuple[ChannelName, ...]
     other: re.Pattern[str]
     """Units other than the SI unit."""
     si: re.Pattern[str]
@@ -74,7 +75,7 @@ def is_line_of_units(cells: Sequence[str]) -> bool:
 
 
 def check_units(
-    columns: Columns, units: Sequence[str], row: int, scales: Mapping[Group, float]
+    columns: Columns, units: Sequence[str], row: int, scales: Mapping[ChannelName, float]
 ) -> None:
     """Check that named units are the units in which the columns are read.
 

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.logs.columns import Group
 from joulepath.optimizer.identify.logs.effort import EffortReport
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 
 OTHER_CAUSES = (
     "Otherwise the log is of another robot, a column never changes, the joints are in another "
@@ -19,7 +19,7 @@ OTHER_CAUSES = (
     "`current_units`, `payload` or `gravity` are not as given."
 )
 """Other causes of efforts that do not fit the arm."""
-_NAMED: dict[Group, EffortMeaning] = {"current": "current", "torque": "torque"}
+_NAMED: dict[ChannelName, EffortMeaning] = {"current": "current", "torque": "torque"}
 
 
 def check_measured(effort: Array) -> None:
@@ -39,7 +39,7 @@ def check_measured(effort: Array) -> None:
 
 def choose_meaning(
     found: EffortReport,
-    group: Group,
+    group: ChannelName,
     requested: EffortMeaning | Literal["auto"],
     remarks: list[str],
 ) -> EffortReport:

@@ -25,6 +25,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.tool_path import TOOL_PATH
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.solve.methods.limit_repair import path_excess, repair_factors
+from joulepath.optimizer.solve.methods.retimed_path import instants_in_spans
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 
@@ -235,7 +236,7 @@ class EvenSpeed:
         duration = length / self.speed + (first + last) / 2
         for spans in numbers:
             breaks = _breaks(spans, first / duration, last / duration)
-            t = _within(breaks, EVEN_SPEED.fitted_per_span) * duration
+            t = instants_in_spans(breaks, EVEN_SPEED.fitted_per_span) * duration
             gone = np.where(
                 t < duration / 2,
                 _ramped(t, first, self.speed),
@@ -252,7 +253,7 @@ class EvenSpeed:
     def _deviation(self, motion: Spline, first: float, last: float) -> float:
         """Largest deviation of the speed, relative to its tolerance; on ramps, excess alone."""
         assert self.prepared.problem.tool_path is not None
-        t = _within(np.unique(motion.knots), EVEN_SPEED.checked_per_span)
+        t = instants_in_spans(np.unique(motion.knots), EVEN_SPEED.checked_per_span)
         q, v, _ = sample(motion, t)
         off = self._speeds(q, v) / self.speed - 1
         even = (t >= first) & (t <= motion.duration - last)
@@ -279,12 +280,6 @@ def _breaks(spans: int, first: float, last: float) -> Array:
     breaks = breaks[np.append(True, np.diff(breaks) > EVEN_SPEED.least_span / spans)]
     breaks[-1] = 1.0
     return np.asarray(breaks)
-
-
-def _within(breaks: Array, count: int) -> Array:
-    """A number of instants in every span between `breaks` (k,), and the last break."""
-    inside = np.linspace(0.0, 1.0, count, endpoint=False)
-    return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * inside).ravel(), breaks[-1])
 
 
 def _ramped(t: Array, ramp: float, speed: float) -> Array:

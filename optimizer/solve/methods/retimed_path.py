@@ -153,7 +153,11 @@ class RetimedPath:
     @cached_property
     def at_rates(self) -> Array:
         """Derivatives (3, M, n) of orders 1 to 3 of the space's basis where rates are bounded."""
-        edges = np.unique(self.space.knots)
-        inside = np.linspace(0.0, 1.0, RETIMED_PATH.rate_points, endpoint=False)
-        points = np.append((edges[:-1, None] + np.diff(edges)[:, None] * inside).ravel(), 1.0)
+        points = instants_in_spans(np.unique(self.space.knots), RETIMED_PATH.rate_points)
         return np.stack([self.space.matrix(points, d) for d in range(1, 4)])
+
+
+def instants_in_spans(breaks: Array, count: int) -> Array:
+    """A number of instants in every span between `breaks` (k,), and the last break."""
+    inside = np.linspace(0.0, 1.0, count, endpoint=False)
+    return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * inside).ravel(), breaks[-1])

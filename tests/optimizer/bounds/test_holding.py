@@ -11,17 +11,16 @@ import pytest
 from scipy.integrate import simpson
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.holding import Cells
 from joulepath.optimizer.bounds.holding_cells import HoldingCells
-from joulepath.optimizer.bounds.lower_bound import NetEnergy
+from joulepath.optimizer.bounds.holding_planes import HoldingTerms
+from joulepath.optimizer.bounds.net_energy import NetEnergy
 from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import peak_rates, sample, spline_of
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.search.baselines import guesses
-from tests.optimizer.moves import limits, problem
-from tests.optimizer.search.test_lower_bound import (
+from tests.optimizer.bounds.test_lower_bound import (
     CONDITIONS,
     QUADRATURE,
     Torques,
@@ -29,6 +28,7 @@ from tests.optimizer.search.test_lower_bound import (
     ends,
     motions,
 )
+from tests.optimizer.moves import limits, problem
 from tests.selection import long_but
 
 MOVES = 6
@@ -168,14 +168,14 @@ def linear_ratios(
         share = rng.random(2) * 0.05
         edges = np.array([[max(least, duration / (1 + share[0])), duration * (1 + share[1])]])
         eta = rng.random() * net.multiplier(edges[:, 0])[:, None]
-        cells = Cells(holding.bound, line, edges, eta)
+        terms = HoldingTerms(holding.bound, line, edges, eta)
         dry = law.torque(v)
         tau = torques(q, v, a) + dry
         for scale in (0.1, 0.5, 1.0):
             omega = scale * rng.choice([-1, 1], 6) * rng.random(6) * most
             if rng.random() < 0.5:
-                omega = scale * joints * cells.model[0, 0]
-            planes = cells.planes(omega[None, None], side[None], net.deficit)
+                omega = scale * joints * terms.approximate_omega[0, 0]
+            planes = terms.planes(omega[None, None], side[None], net.deficit)
             value = planes.at(
                 np.array([0]), (goal - nearest)[None], np.zeros((1, 6)), np.array([gain])
             )[0]

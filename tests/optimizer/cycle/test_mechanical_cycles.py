@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
+from joulepath.optimizer.bounds.priced_work import PRICED_WORK, priced_work_bounds
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.stop_layers import layers_of
@@ -22,7 +23,6 @@ from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but
@@ -126,13 +126,15 @@ def test_what_the_price_bounds_holds_for_every_duration() -> None:
     exact = mechanical_bounds(prepared, start, goal, levels)
     assert (free <= exact * (1 + ROUNDING)).all()
     # the table's works are so far apart
-    assert (free >= exact - (exact + np.abs(levels).sum(axis=1)) * (1000 ** (1 / WORKS) - 1)).all()
+    assert (
+        free >= exact - (exact + np.abs(levels).sum(axis=1)) * (1000 ** (1 / PRICED_WORK.works) - 1)
+    ).all()
     shortest = shortest_duration(goal - start, own)
     for price in (0.5, 5.0, 50.0):
         bound = priced_work_bounds(prepared, start, goal, levels, price, 5.0)
         assert (bound >= free - ROUNDING).all() and (bound >= price * shortest - ROUNDING).all()
         for k in range(30):
-            for duration in np.geomspace(shortest[k], 5.0, CELLS):
+            for duration in np.geomspace(shortest[k], 5.0, PRICED_WORK.cells):
                 work = prepared.energy(quintic_spline(start[k], goal[k], duration)).mechanical.total
                 assert bound[k] <= work + price * duration
 

@@ -22,6 +22,7 @@ from joulepath.optimizer.exceptions import (
     OutsideLimits,
     UnreachablePose,
 )
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -34,7 +35,6 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.errors import StopInCollision
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place, poses

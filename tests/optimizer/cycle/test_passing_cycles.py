@@ -73,7 +73,9 @@ def of(*stops: Stop, **given: Any) -> Cycle:
 
 
 def against(found: CycleSolution) -> dict[str, float]:
-    return {each.name: each.saving for each in found.baselines}
+    """Relative differences to the energies of the baselines in their own times."""
+    own = found.energy.electrical.total
+    return {each.name: 1 - own / each.electrical for each in found.baselines}
 
 
 @pytest.mark.parametrize("seed", long_but([0], range(6)))
@@ -84,9 +86,10 @@ def test_passing_is_never_worse_than_the_best_cycle_that_stops(seed: int) -> Non
     own = found.energy.electrical.total
     (stopping,) = (each for each in found.baselines if each.name == "stopping")
     assert stopping.electrical == pytest.approx(theirs.energy.electrical.total, rel=QUADRATURE)
-    assert own <= stopping.electrical and stopping.saving == pytest.approx(
-        1 - own / stopping.electrical
-    )
+    assert own <= stopping.electrical
+    # the saving is one in equal times: the shorter cycle waits for the longer one
+    assert stopping.saving is not None
+    assert stopping.saving <= 1 - own / stopping.electrical + ROUNDING
     assert found.lower_bound <= own and found.lower_bound <= theirs.lower_bound + ROUNDING
     assert found.order == ["0", "1", "2"] and found.joins < ROUNDING
     assert all(move.solution.certificate.valid for move in found.moves)
@@ -147,7 +150,7 @@ def test_routes_come_in_the_order_of_their_bounds_and_none_is_left_out() -> None
         q = [leg.start.q[0], *leg.configurations(route), leg.goal.q[2]]
         run = Run(Problem(arm=ARM, start=q[0], goal=q[-1], passes=q[1:-1], deadline=AMPLE))
         run.prepare()
-        assert run.incumbent.candidates[0].lower_bound == pytest.approx(bound)
+        assert run.state.candidates[0].lower_bound == pytest.approx(bound)
 
 
 def test_a_cycle_of_passes_alone_comes_back() -> None:
@@ -156,7 +159,8 @@ def test_a_cycle_of_passes_alone_comes_back() -> None:
     assert len(move.passes) == 3 and found.order == ["0", "1", "2"] and found.status == "optimal"
     ends = move.solution.trajectory.spline.control_points[[0, -1]]
     assert np.abs(ends - HOME).max() < ROUNDING
-    assert against(found)["stopping"] > 0.03
+    (stopping,) = (each for each in found.baselines if each.name == "stopping")
+    assert found.energy.electrical.total < 0.97 * stopping.electrical
 
 
 @pytest.mark.parametrize("factor", long_but([0.99], [1.25, 0.99]))

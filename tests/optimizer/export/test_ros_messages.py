@@ -82,7 +82,7 @@ def test_a_jump_of_the_acceleration_is_followed_as_closely() -> None:
 
 
 def test_what_no_points_can_follow_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(points_module, "MOST_POINTS", 5)
+    monkeypatch.setattr(points_module, "QUINTICS", points_module.QuinticSettings(max_points=5))
     with pytest.raises(FormatUnsuitable, match="ros2"):
         to_ros2(one_move())
 

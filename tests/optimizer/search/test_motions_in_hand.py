@@ -21,9 +21,9 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search import refinement
-from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search import baseline_comparison
 from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods import METHODS
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
@@ -31,7 +31,7 @@ from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
 from tests.selection import long_but
 
-# relative: the error of the quadratures that are compared, `incumbent.SLACK`
+# relative: the error of the quadratures that are compared, `state.ENERGY_TOLERANCE`
 SLACK = 1e-6
 # s: the quintic, and motions like it, are within all limits
 SLOW = 3.0
@@ -62,28 +62,28 @@ def _name(spline: Spline) -> str:
     return f"{spline.duration:g} s"
 
 
-def incumbent_with(*splines: Spline) -> Incumbent:
-    """An incumbent whose only candidate got these motions, one after the other."""
+def incumbent_with(*splines: Spline) -> SearchState:
+    """The state of a search whose only candidate got these motions, one after the other."""
     run = Run(problem(), clock=still)
     run.prepare()
     for spline in splines:
         result = SolveResult(
             SolveStatus.SOLVED, SolveReason.BASELINE, spline=spline, figures=(_name(spline),)
         )
-        run.incumbent.accept_if_better(
-            run.incumbent.candidates[0], result, run.incumbent.prepared.energy(spline)
+        run.state.accept_if_better(
+            run.state.candidates[0], result, run.state.prepared.energy(spline)
         )
-    return run.incumbent
+    return run.state
 
 
 def test_a_refused_motion_leaves_the_one_before_it() -> None:
     slow, faster, best = (quintic_spline(START, GOAL, duration) for duration in (9.0, 6.0, SLOW))
-    incumbent = incumbent_with(slow, faster, best)
-    (candidate,) = incumbent.candidates
+    state = incumbent_with(slow, faster, best)
+    (candidate,) = state.candidates
     for spline in (best, faster, slow):
         assert candidate.spline is spline and _name(spline) in candidate.message
-        assert candidate.energy == incumbent.prepared.cost_of(spline)
-        incumbent.reject(candidate)
+        assert candidate.energy == state.prepared.cost_of(spline)
+        state.reject(candidate)
     assert (
         candidate.energy is None
         and candidate.attempt is None
@@ -92,17 +92,17 @@ def test_a_refused_motion_leaves_the_one_before_it() -> None:
 
 
 def test_a_refused_candidate_takes_certified_motions_alone() -> None:
-    incumbent = incumbent_with(quintic_spline(START, GOAL, 9.0), quintic_spline(START, GOAL, 6.0))
-    (candidate,) = incumbent.candidates
-    incumbent.reject(candidate)
+    state = incumbent_with(quintic_spline(START, GOAL, 9.0), quintic_spline(START, GOAL, 6.0))
+    (candidate,) = state.candidates
+    state.reject(candidate)
     best = quintic_spline(START, GOAL, SLOW)
     result, energy = (
         SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, spline=best),
-        incumbent.prepared.energy(best),
+        state.prepared.energy(best),
     )
-    incumbent.accept_if_better(candidate, result, energy)
+    state.accept_if_better(candidate, result, energy)
     assert candidate.duration == 9.0
-    incumbent.accept_if_better(candidate, result, energy, certified=True)
+    state.accept_if_better(candidate, result, energy, certified=True)
     assert candidate.spline is best
 
 
@@ -122,7 +122,7 @@ def test_what_the_certificate_refuses_is_not_all_that_was_found(
             return replace(honest, start_error=(1.0, 0.0))
         return honest
 
-    monkeypatch.setattr("joulepath.optimizer.search.incumbent.certify", judge)
+    monkeypatch.setattr("joulepath.optimizer.search.state.certify", judge)
     found = Run(asked, [known]).solution()
     assert refused
     assert found.certificate.valid and found.energy.electrical.total == cost_of(known)
@@ -191,10 +191,10 @@ def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(
     def late(*_: Any) -> Any:
         raise DeadlinePassed
 
-    monkeypatch.setattr(refinement, "_accept_certified", late)
+    monkeypatch.setattr(baseline_comparison, "_accept_certified", late)
     found = optimize(problem(**fixed(SLOW)))
     (quintic,) = (each for each in found.baselines if each.name == "quintic")
-    assert quintic.saving is None and quintic.reason == refinement.NOT_CONFIRMED
+    assert quintic.saving is None and quintic.reason == baseline_comparison.NOT_CONFIRMED
     assert quintic.electrical < found.energy.electrical.total
     assert all(each >= -SLACK for each in own_kind(found, "bspline"))
 

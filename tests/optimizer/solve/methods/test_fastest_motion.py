@@ -26,27 +26,27 @@ def prepared(**given: object) -> Run:
 
 
 def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
-    incumbent = prepared().incumbent
-    models = incumbent.prepared
+    state = prepared().state
+    models = state.prepared
 
     def cost(interval: DurationInterval) -> float:
-        return FreeSpline(
-            SolveContext.of(models, START, GOAL, incumbent.deadline, interval)
-        ).cost_of(SPLINE)
+        return FreeSpline(SolveContext.of(models, START, GOAL, state.deadline, interval)).cost_of(
+            SPLINE
+        )
 
     energy = models.cost_of(SPLINE)
     own = DurationInterval(models.objective_parameters, DURATIONS.least, DURATIONS.longest)
     assert cost(own) == energy
     assert cost(replace(own, price=30.0)) == pytest.approx(energy + 30.0 * SPLINE.duration)
     assert cost(fastest(models)) == SPLINE.duration
-    assert FreeSpline(SolveContext.of(models, START, GOAL, incumbent.deadline, own)).cost_of(
+    assert FreeSpline(SolveContext.of(models, START, GOAL, state.deadline, own)).cost_of(
         None
     ) == float("inf")
 
 
 def test_a_known_motion_counts_if_it_is_certified() -> None:
     """A polynomial is slower than a known spline, which is then the fastest motion unchanged."""
-    splines, polynomials = prepared().incumbent, prepared(method="lagrange").incumbent
+    splines, polynomials = prepared().state, prepared(method="lagrange").state
     known = fastest_of(splines, splines.candidates[0])
     candidate = polynomials.candidates[0]
     own = fastest_of(polynomials, candidate)

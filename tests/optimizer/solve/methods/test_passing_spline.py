@@ -80,8 +80,8 @@ def test_a_motion_that_misses_a_pass_is_not_certified() -> None:
     missed[1, 3] += 2e-6
     run = Run(through(missed))
     run.prepare()
-    candidate, spline = run.incumbent.candidates[0], found.trajectory.spline
-    certificate = run.incumbent.certified(candidate, spline, run.incumbent.prepared.energy(spline))
+    candidate, spline = run.state.candidates[0], found.trajectory.spline
+    certificate = run.state.certified(candidate, spline, run.state.prepared.energy(spline))
     assert 1e-6 < certificate.pass_error < 2.1e-6 and not certificate.valid
     # a motion through the passes in another order is not valid either
     turned = Run(through(q[[0, 2, 1, 3]]))
@@ -89,8 +89,8 @@ def test_a_motion_that_misses_a_pass_is_not_certified() -> None:
     with pytest.raises(NoTrajectory):
         Run(through(missed)).as_it_is(spline)
     assert Run(through(q)).as_it_is(spline).energy.electrical.total == found.energy.electrical.total
-    other = turned.incumbent.certified(
-        turned.incumbent.candidates[0], spline, run.incumbent.prepared.energy(spline)
+    other = turned.state.certified(
+        turned.state.candidates[0], spline, run.state.prepared.energy(spline)
     )
     assert not other.valid
 

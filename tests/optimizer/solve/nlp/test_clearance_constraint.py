@@ -70,9 +70,8 @@ POST = Scene((low_post(),))
 Fields = dict[str, Any]
 
 
-def solved(*obstacles: Obstacle, **given: object) -> Solution:
-    problem = problem_with(HOME, GOAL, windings=False, scene=Scene(obstacles), **given)  # type: ignore[arg-type]
-    return optimize(problem)
+def solved(*obstacles: Obstacle, **given: Any) -> Solution:
+    return optimize(problem_with(HOME, GOAL, windings=False, scene=Scene(obstacles), **given))
 
 
 def least_distance(solution: Solution, *obstacles: Obstacle) -> float:

@@ -24,10 +24,8 @@ from tests.optimizer.moves import AMPLE
 from tests.optimizer.solve.nlp.test_sliding_ends import GOAL, START, curve, straight
 
 ARM = Arm(robot=load_robot("panda"), collisions=False)
-ON_MOTORS, ON_BRAKES = (
-    Dwell(time=12.0),
-    Dwell(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0),
-)
+ON_MOTORS = Dwell(time=12.0)
+ON_BRAKES = Dwell(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0)
 
 
 def test_a_quadratic_power_has_exact_derivatives() -> None:

@@ -1,0 +1,45 @@
+"""Numbers of a report in digits: bounds round down, gaps and intervals outwards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+JOULES_PER_KWH = 3.6e6
+
+
+def digits(value: float, count: int = 3) -> str:
+    """A number with this many significant digits, or all digits before the point, and commas
+    between thousands.
+    """
+    return _written(value, count, round)
+
+
+def down(value: float, count: int = 3) -> str:
+    """The number rounded down."""
+    return _written(value, count, math.floor)
+
+
+def up(value: float, count: int = 3) -> str:
+    """The number rounded up."""
+    return _written(value, count, math.ceil)
+
+
+def percent(share: float, rounding: str = "nearest") -> str:
+    """A share with one digit after the point."""
+    scaled = 1000 * share
+    by_name: dict[str, Callable[[float], int]] = {
+        "nearest": round,
+        "up": math.ceil,
+        "down": math.floor,
+    }
+    whole = by_name[rounding](scaled)
+    return f"{whole / 10:.1f} %".replace("-", "−")
+
+
+def _written(value: float, count: int, rounding: Callable[[float], int]) -> str:
+    if value == 0 or not math.isfinite(value):
+        return "0" if value == 0 else "–"
+    places = max(count - 1 - math.floor(math.log10(abs(value))), 0)
+    found = rounding(value * 10**places) / 10**places
+    return f"{found:,.{places}f}".replace("-", "−")
