@@ -1,5 +1,5 @@
-"""Lower bounds on distances by numpy: spheres that cover one body, against the box or cylinder of the
-other.
+"""Lower bounds on distances by numpy: spheres that cover one body, against the box or cylinder of
+the other.
 """
 
 from __future__ import annotations

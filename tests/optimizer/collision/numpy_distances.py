@@ -33,8 +33,8 @@ class NumpyDistances:
         """Lower bounds (n, p) [m] on the distances of `pairs` (p,), and where (k,) they are at most
         `within`: rows and columns.
 
-        They are those of balls, improved by covering spheres if `within` is finite, or `known` (n, p) ones
-        where these are greater than `within`.
+        They are those of balls, improved by covering spheres if `within` is finite, or `known`
+        (n, p) bounds greater than `within`.
         """
         distance = self.ball_distances(frames, pairs) if known is None else known.copy()
         configuration, column = np.nonzero(distance <= within)

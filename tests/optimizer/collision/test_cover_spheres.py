@@ -1,5 +1,5 @@
-"""Lower bounds on distances, by covering spheres and by earlier distances, against exact distances of random
-scenes.
+"""Lower bounds on distances, by covering spheres and by earlier distances, against exact distances
+of random scenes.
 """
 
 from __future__ import annotations
