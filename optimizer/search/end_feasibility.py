@@ -49,8 +49,10 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
     ):
         if contact.distance < CLEARANCE_CONSTRAINT.reserve:
             first, second = contact.pair
-            missing = CLEARANCE_CONSTRAINT.reserve - contact.distance
-            message = f"{first} and {second}: clearance {missing:.5f} m too small"
+            message = (
+                f"{first} and {second}: clearance "
+                f"{CLEARANCE_CONSTRAINT.reserve - contact.distance:.5f} m too small"
+            )
             result[k] = InvalidReason(message, contact, contact.distance >= 0 and result[k] is None)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:

@@ -6,6 +6,11 @@ import math
 from collections.abc import Callable
 
 JOULES_PER_KWH = 3.6e6
+_ROUNDINGS: dict[str, Callable[[float], int]] = {
+    "nearest": round,
+    "up": math.ceil,
+    "down": math.floor,
+}
 
 
 def digits(value: float, count: int = 3) -> str:
@@ -27,13 +32,7 @@ def up(value: float, count: int = 3) -> str:
 
 def percent(share: float, rounding: str = "nearest") -> str:
     """A share with one digit after the point."""
-    scaled = 1000 * share
-    by_name: dict[str, Callable[[float], int]] = {
-        "nearest": round,
-        "up": math.ceil,
-        "down": math.floor,
-    }
-    whole = by_name[rounding](scaled)
+    whole = _ROUNDINGS[rounding](1000 * share)
     return f"{whole / 10:.1f} %".replace("-", "−")
 
 

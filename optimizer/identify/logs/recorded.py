@@ -27,6 +27,11 @@ class MeasuredEnergy:
     """Integral of the power that the motors take by their logged currents or torques, with the
     losses of the robot's drives and its idle power. Null if the log has none."""
 
+    @property
+    def best(self) -> float | None:
+        """The energy by the logged power, or else by the efforts [J]."""
+        return self.by_efforts if self.electrical is None else self.electrical
+
     def joined(self, other: MeasuredEnergy) -> MeasuredEnergy:
         """The energies of two parts together."""
         return MeasuredEnergy(
