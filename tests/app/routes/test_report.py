@@ -104,6 +104,7 @@ def test_a_cycle_shows_its_legs(client: TestClient) -> None:
     bundle, text = attached_to(page), page.decode()
     assert len(bundle.moves) == 3 and checked(page, False, "test").agrees
     assert "One cycle of 2 stops needs" in text
+    assert not re.search(r"\d (J|s)\b", text.partition("</p>")[0].rpartition("lead")[2])
     for leg in bundle.answer["legs"]:
         assert digits(leg["electrical"]) in text
     # no price is given
@@ -144,4 +145,4 @@ def test_a_file_without_documents_is_no_report(html: bytes) -> None:
 def test_numbers_are_rounded_to_the_safe_side() -> None:
     assert (digits(755.7), down(697.96), up(58.11), up(5.861)) == ("756", "697", "58.2", "5.87")
     assert (digits(1239.4), digits(0.0420), digits(-18.4)) == ("1,239", "0.0420", "−18.4")
-    assert (percent(0.0482), percent(0.0769, "up")) == ("4.8 %", "7.7 %")
+    assert (percent(0.0482), percent(0.0769, "up")) == ("4.8\u00a0%", "7.7\u00a0%")
