@@ -8,8 +8,10 @@ the poses and joint positions of a file to it and back.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
@@ -51,9 +53,9 @@ class Drawing:
         return np.clip(wrapped(self.file(q)), -np.pi, np.pi)
 
 
-def without_rounding(T: Array) -> Array:
+def without_rounding(T: NDArray[np.floating[Any]]) -> Array:
     """The pose T (4, 4), or the identity exactly if it differs by rounding alone."""
-    return np.eye(4) if np.abs(T - np.eye(4)).max() < ROUNDING else T
+    return np.eye(4) if np.abs(T - np.eye(4)).max() < ROUNDING else np.asarray(T, dtype=float)
 
 
 def angles_without_rounding(q: Array) -> Array:
