@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from joulepath.models.from_figures import NO_LINKS
 from joulepath.models.own_arm.collision_figures import collision_figures
-from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm, Problems
 from joulepath.models.own_arm.energy_figures import drives, electronics, friction
 from joulepath.models.own_arm.figure import assumed, either, per_joint, stated
 from joulepath.models.own_arm.holding_torques import HoldingTorques
@@ -26,7 +26,7 @@ from joulepath.models.own_arm.plausible_units import (
 from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
-from joulepath.models.own_arm.urdf_tree import CHAIN
+from joulepath.models.own_arm.urdf_tree import CHAIN, refuse
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
@@ -54,8 +54,12 @@ def own_figures(
             "Angles of joint origins written with few decimals, such as 1.571, are read as the "
             f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
         )
-    limits = _limits(description, chain, warnings)
-    inertials = _inertials(description, chain, upright, warnings)
+    problems = Problems()
+    with problems.noted():
+        inertials = _inertials(description, chain, upright, warnings)
+    with problems.noted():
+        limits = _limits(description, chain, warnings)
+    problems.raise_any()
     acceleration, tau_max = (np.array(limits[each]["value"]) for each in ("acceleration", "torque"))
     torques = HoldingTorques.of(chain, acceleration, description.payload)
     warnings += torques.warnings(chain.joints, tau_max)
@@ -166,33 +170,44 @@ _SIDE = "Whether the torque limit is for the motor, with friction and rotor, or 
 
 
 def _limits(description: Description, chain: Chain, warnings: list[str]) -> dict[str, Any]:
-    acceleration = per_joint("acceleration", description.acceleration, chain.joints)
-    assert acceleration is not None
-    jerk = per_joint("jerk", description.jerk, chain.joints)
-    found = {}
+    problems, found = Problems(), dict[str, Any]()
+    for field in ("acceleration", "jerk"):
+        with problems.noted():
+            found[field] = per_joint(field, getattr(description, field), chain.joints)
     for field, given, of_urdf, part in (
         ("velocity", description.velocity, chain.v_max, "velocity"),
         ("torque", description.torque, chain.tau_max, "effort"),
     ):
-        values = per_joint(field, given, chain.joints)
-        for joint, value in zip(chain.joints, of_urdf, strict=True):
-            if values is None and not value > 0:
-                raise InvalidArm(
+        missing = [
+            joint
+            for joint, value in zip(chain.joints, of_urdf, strict=True)
+            if given is None and not value > 0
+        ]
+        for joint in missing:
+            with problems.noted():
+                refuse(
                     field,
                     f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or "
                     f"give `{field}`.",
                 )
-        found[field] = per_joint(field, tuple(of_urdf), chain.joints) if values is None else values
-    if not 0 <= description.payload <= PLAUSIBLE.mass:
-        raise InvalidArm("payload", f"payload must be a mass from 0 to {PLAUSIBLE.mass:g} kg.")
+        with problems.noted():
+            values = tuple(of_urdf) if given is None else given
+            found[field] = None if missing else per_joint(field, values, chain.joints)
+    with problems.noted():
+        if not 0 <= description.payload <= PLAUSIBLE.mass:
+            refuse("payload", f"payload must be a mass from 0 to {PLAUSIBLE.mass:g} kg.")
     widest = np.abs([chain.q_min, chain.q_max]).max(axis=0)
     for joint, angle in zip(chain.joints, widest, strict=True):
-        if angle > PLAUSIBLE.angle:
-            raise InvalidArm(
-                "urdf",
-                f"Joint {joint!r} has a position limit of {angle:.4g} rad: limits must be within "
-                f"{PLAUSIBLE.angle:g} rad. If they are in degrees, divide them by 57.29578.",
-            )
+        with problems.noted():
+            if angle > PLAUSIBLE.angle:
+                refuse(
+                    "urdf",
+                    f"Joint {joint!r} has a position limit of {angle:.4g} rad: limits must be "
+                    f"within {PLAUSIBLE.angle:g} rad. If they are in degrees, divide them by "
+                    "57.29578.",
+                )
+    problems.raise_any()
+    acceleration = found["acceleration"]
     names = tuple(f"Joint {joint!r}" for joint in chain.joints)
     warnings += POSITION.warnings(names, widest)
     warnings += SPEED.warnings(names, np.array(found["velocity"]))
@@ -209,7 +224,7 @@ def _limits(description: Description, chain: Chain, warnings: list[str]) -> dict
         "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
         "jerk": either(
             description,
-            jerk,
+            found["jerk"],
             RULES.jerk * acceleration,
             "rad/s³",
             ("Symmetric.", NOTES["jerk"]),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm, Problems
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.robot import Array
 
@@ -66,10 +66,13 @@ def check_bodies(bodies: list[LinkBody]) -> list[str]:
     """Warnings of implausible bodies of an arm's links.
 
     Raises:
-        InvalidArm: a body is impossible; the error names the link.
+        InvalidArm: bodies are impossible; the error names the links.
     """
+    problems = Problems()
     for body in bodies:
-        _check_possible(body)
+        with problems.noted():
+            _check_possible(body)
+    problems.raise_any()
     names = tuple(f"Link {body.link!r}" for body in bodies)
     reach = max(sum(body.length for body in bodies), LEAST_SIZE)
     return [

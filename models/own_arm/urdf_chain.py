@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.own_arm.description import PLAUSIBLE, Description
+from joulepath.models.own_arm.description import PLAUSIBLE, Description, Problems
 from joulepath.models.own_arm.robot_xml import number, numbers
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
@@ -35,6 +35,7 @@ ORIGIN = "0 0 0"
 ROS_BASE = "base_link"
 TURNING = ("revolute", "continuous")
 FIXED = "fixed"
+OTHERS = "others"
 
 
 @dataclass(frozen=True)
@@ -75,32 +76,30 @@ class Chain:
 def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Chain:
     """The chain of a description. Raises InvalidArm with the name of the link or joint."""
     root = parsed_urdf(description.urdf, checkpoint)
-    tree = UrdfTree.of(root)
-    locked = dict(description.locked or {})
+    tree, problems = UrdfTree.of(root), Problems()
+    given = {} if description.locked == OTHERS else dict(description.locked or {})
     base = description.base or tree.root
     for field, link in (("base", base), ("tip", description.tip)):
-        if link not in tree.links:
-            refuse(
-                field,
-                f"There is no link {link!r} in the URDF: its links are {listed(tree.links)}.",
-            )
-    for name in locked:
-        if name not in tree.joints:
-            refuse(
-                "locked",
-                f"There is no joint {name!r} in the URDF: its joints are {listed(tree.joints)}.",
-            )
+        with problems.noted():
+            if link not in tree.links:
+                refuse(
+                    field,
+                    f"There is no link {link!r} in the URDF: its links are {listed(tree.links)}.",
+                )
+    for name in given:
+        with problems.noted():
+            if name not in tree.joints:
+                refuse(
+                    "locked",
+                    f"There is no joint {name!r} in the URDF: its joints are "
+                    f"{listed(tree.joints)}.",
+                )
+    problems.raise_any()
     path = tree.path(base, description.tip)
+    locked = _others(tree, path) if description.locked == OTHERS else given
     moving = [
         joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in locked
     ]
-    _check_chain(moving)
-    _check_rest(tree, moving, locked)
-    return _merged(root, tree, moving, locked, base, description.tip)
-
-
-def _check_chain(moving: list[Element]) -> None:
-    """Raises InvalidArm unless all moving joints are revolute and have limits."""
     if not 1 <= len(moving) <= CHAIN.joints:
         refuse(
             "tip",
@@ -108,40 +107,77 @@ def _check_chain(moving: list[Element]) -> None:
             "possible.",
         )
     for joint in moving:
-        name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
-        if kind not in TURNING:
-            refuse(
-                "urdf",
-                f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in "
-                "`locked`.",
-            )
-        if joint.find("mimic") is not None:
-            refuse("urdf", f"Joint {name!r} mimics another one: give its position in `locked`.")
+        with problems.noted():
+            _check_moving(joint)
+    with problems.noted():
+        _check_rest(tree, moving, locked)
+    names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
+    for link in root.findall("link"):
+        with problems.noted():
+            if tree.carrier(name_of(link), names):
+                _check_inertial(link)
+    problems.raise_any()
+    return _merged(root, tree, moving, locked, base, description.tip)
+
+
+def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:
+    """Positions [rad] or [m] of all joints outside the path: zero, or the limit nearest to it."""
+    between, held = {name_of(joint) for joint in path}, dict[str, float]()
+    for name, joint in tree.joints.items():
         limit = joint.find("limit")
-        if kind == "revolute" and (
-            limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
-        ):
-            refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
-        if kind == "revolute" and not joint_limit(joint, "lower") < joint_limit(joint, "upper"):
-            refuse(
-                "urdf",
-                f"Joint {name!r} cannot move, its lower limit being no less than the upper: make "
-                "it fixed.",
-            )
+        if name in between or joint.get("type") == FIXED:
+            continue
+        bounded = joint.get("type") != "continuous" and limit is not None
+        lower, upper = (joint_limit(joint, each) for each in ("lower", "upper"))
+        held[name] = min(max(0.0, lower), upper) if bounded and lower < upper else 0.0
+    return held
+
+
+def _check_moving(joint: Element) -> None:
+    """Raises InvalidArm unless a moving joint is revolute and has limits."""
+    name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
+    if kind not in TURNING:
+        refuse(
+            "urdf",
+            f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in "
+            "`locked`.",
+        )
+    if joint.find("mimic") is not None:
+        refuse("urdf", f"Joint {name!r} mimics another one: give its position in `locked`.")
+    limit = joint.find("limit")
+    if kind == "revolute" and (
+        limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
+    ):
+        refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
+    if kind == "revolute" and not joint_limit(joint, "lower") < joint_limit(joint, "upper"):
+        refuse(
+            "urdf",
+            f"Joint {name!r} cannot move, its lower limit being no less than the upper: make it "
+            "fixed.",
+        )
 
 
 def _check_rest(tree: UrdfTree, moving: list[Element], locked: Mapping[str, float]) -> None:
-    """Raises InvalidArm if a joint beside the chain moves."""
+    """Raises InvalidArm if joints beside the chain move."""
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
-    for name, joint in tree.joints.items():
-        if name in names or name in locked or joint.get("type") == FIXED:
-            continue
-        if tree.carrier(joint_end(joint, "parent"), names):
-            refuse(
-                "locked",
-                f"Joint {name!r} moves a link beside those to the tip: give its position in "
-                "`locked`.",
-            )
+    loose = [
+        name
+        for name, joint in tree.joints.items()
+        if not (name in names or name in locked or joint.get("type") == FIXED)
+        and tree.carrier(joint_end(joint, "parent"), names)
+    ]
+    if len(loose) == 1:
+        refuse(
+            "locked",
+            f"Joint {loose[0]!r} moves a link beside those to the tip: give its position in "
+            '`locked`, or "others" to hold it at zero.',
+        )
+    if loose:
+        refuse(
+            "locked",
+            f"Joints move links beside those to the tip: {listed(loose)}. Give their positions in "
+            '`locked`, or "others" to hold them all at zero.',
+        )
 
 
 def _merged(
@@ -184,7 +220,6 @@ def _merged(
     rigid: list[list[str]] = [[] for _ in range(len(moving) + 1)]
     for name in tree.links:
         rigid[tree.carrier(name, names)].append(name)
-    _check_inertials(root, [name for names in rigid[1:] for name in names])
     q_min, q_max, v_max, tau_max = (np.array(column) for column in zip(*ranges, strict=True))
     axes = np.array([joint_axis(joint) for joint in moving])
     return Chain(
@@ -212,6 +247,8 @@ def _for_pinocchio(root: Element) -> tuple[Element, float]:
     Pinocchio gives a continuous joint two coordinates, and skips incomplete limits.
     """
     bare, rounded = copy.deepcopy(root), 0.0
+    # urdfdom, Pinocchio's reader, wants a name.
+    bare.attrib = {"name": "robot"}
     for joint in bare.findall("joint"):
         rounded = max(rounded, restore_rounded(joint))
         limit = joint.find("limit")
@@ -229,13 +266,12 @@ def _for_pinocchio(root: Element) -> tuple[Element, float]:
     return bare, rounded
 
 
-def _check_inertials(root: Element, names: list[str]) -> None:
+def _check_inertial(link: Element) -> None:
     """Raises InvalidArm for an incomplete <inertial>, of which Pinocchio would read a part."""
-    for link in (each for each in root.findall("link") if name_of(each) in names):
-        for inertial in link.findall("inertial"):
-            what = f"The <inertial> of link {name_of(link)!r} has"
-            for part, attributes in (("mass", ("value",)), ("inertia", TENSOR)):
-                for attribute in attributes:
-                    number(inertial.find(part), attribute, f"{what} a <{part}>")
-            for part in ("xyz", "rpy"):
-                numbers(inertial.find("origin"), part, f"{what} an <origin>", ORIGIN)
+    for inertial in link.findall("inertial"):
+        what = f"The <inertial> of link {name_of(link)!r} has"
+        for part, attributes in (("mass", ("value",)), ("inertia", TENSOR)):
+            for attribute in attributes:
+                number(inertial.find(part), attribute, f"{what} a <{part}>")
+        for part in ("xyz", "rpy"):
+            numbers(inertial.find("origin"), part, f"{what} an <origin>", ORIGIN)

@@ -16,6 +16,9 @@ from joulepath.models.own_arm.robot_xml import number, numbers, robot_element
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint
 
+DEFINITIONS = ("xacro:property", "xacro:arg", "xacro:macro")
+"""Elements of xacro that add nothing to an arm that does not use them."""
+
 CONTINUOUS = 2 * math.pi
 """Range of a continuous joint to either side [rad]: one turn."""
 
@@ -119,6 +122,8 @@ class UrdfTree:
 def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
     """The root element of a URDF."""
     root = robot_element(text, "urdf", checkpoint)
+    for unused in [each for each in root if each.tag in DEFINITIONS]:
+        root.remove(unused)
     # Comments are not in the tree: generated files quote their macros there.
     if any(_is_xacro(each) for each in root.iter()):
         refuse(
@@ -132,7 +137,7 @@ def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
 def _is_xacro(element: Element) -> bool:
     """Whether an element still has a macro or an expression."""
     texts = (*element.attrib.values(), element.text or "", element.tail or "")
-    return element.tag.startswith("xacro:") or any("${" in text for text in texts)
+    return element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in texts)
 
 
 def restore_rounded(joint: Element) -> float:
