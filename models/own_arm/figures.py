@@ -170,6 +170,45 @@ _SIDE = "Whether the torque limit is for the motor, with friction and rotor, or 
 
 
 def _limits(description: Description, chain: Chain, warnings: list[str]) -> dict[str, Any]:
+    found = _checked_limits(description, chain)
+    names = tuple(f"Joint {joint!r}" for joint in chain.joints)
+    warnings += POSITION.warnings(names, np.abs([chain.q_min, chain.q_max]).max(axis=0))
+    warnings += SPEED.warnings(names, found["velocity"])
+    warnings += ACCELERATION.warnings(names, found["acceleration"])
+    warnings += MASS.warnings(("payload",), np.array([description.payload]))
+    acceleration = found["acceleration"]
+    return {
+        "position_min": stated(
+            description, chain.q_min, "rad", "A joint without end has one turn to either side."
+        ),
+        "position_max": stated(
+            description, chain.q_max, "rad", "A joint without end has one turn to either side."
+        ),
+        "velocity": stated(description, found["velocity"], "rad/s", "Symmetric."),
+        "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
+        "jerk": either(
+            description,
+            found["jerk"],
+            RULES.jerk * acceleration,
+            "rad/s³",
+            ("Symmetric.", NOTES["jerk"]),
+        ),
+        "torque": stated(
+            description, found["torque"], "N·m", "At the joint, behind the gear: see torque_side."
+        ),
+        "torque_side": either(
+            description, description.torque_side, "motor", "1", (_SIDE, NOTES["torque_side"])
+        ),
+        "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
+    }
+
+
+def _checked_limits(description: Description, chain: Chain) -> dict[str, Any]:
+    """Limits on acceleration, jerk, velocity and torque (nq,); that on the jerk may be None.
+
+    Raises:
+        InvalidArm: limits are missing or impossible, or the payload is.
+    """
     problems, found = Problems(), dict[str, Any]()
     for field in ("acceleration", "jerk"):
         with problems.noted():
@@ -207,36 +246,7 @@ def _limits(description: Description, chain: Chain, warnings: list[str]) -> dict
                     "57.29578.",
                 )
     problems.raise_any()
-    acceleration = found["acceleration"]
-    names = tuple(f"Joint {joint!r}" for joint in chain.joints)
-    warnings += POSITION.warnings(names, widest)
-    warnings += SPEED.warnings(names, np.array(found["velocity"]))
-    warnings += ACCELERATION.warnings(names, acceleration)
-    warnings += MASS.warnings(("payload",), np.array([description.payload]))
-    return {
-        "position_min": stated(
-            description, chain.q_min, "rad", "A joint without end has one turn to either side."
-        ),
-        "position_max": stated(
-            description, chain.q_max, "rad", "A joint without end has one turn to either side."
-        ),
-        "velocity": stated(description, found["velocity"], "rad/s", "Symmetric."),
-        "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
-        "jerk": either(
-            description,
-            found["jerk"],
-            RULES.jerk * acceleration,
-            "rad/s³",
-            ("Symmetric.", NOTES["jerk"]),
-        ),
-        "torque": stated(
-            description, found["torque"], "N·m", "At the joint, behind the gear: see torque_side."
-        ),
-        "torque_side": either(
-            description, description.torque_side, "motor", "1", (_SIDE, NOTES["torque_side"])
-        ),
-        "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
-    }
+    return found
 
 
 def _assumed(figures: dict[str, Any]) -> Iterator[str]:

@@ -86,13 +86,13 @@ class HoldingTorques:
         """Warnings of torque limits (nq,) [N·m] that the arm's own torques contradict."""
         weak = [
             f"Joint {joint!r} cannot hold the arm's own links everywhere: gravity takes up to "
-            f"{torque:.3g} N·m, and its torque limit is {limit:.3g} N·m. If the URDF's `effort` is "
+            f"{torque:.3g} N·m, and its torque limit is {limit:.4g} N·m. If the URDF's `effort` is "
             "a placeholder, give `torque`."
             for joint, torque, limit in zip(joints, self.holding, tau_max, strict=True)
             if limit < torque
         ]
         strong = [
-            f"Joint {joint!r} has a torque limit of {limit:.3g} N·m, and the arm with its payload "
+            f"Joint {joint!r} has a torque limit of {limit:.4g} N·m, and the arm with its payload "
             f"needs {torque:.3g} N·m for gravity and acceleration. It is likely a placeholder: "
             f"friction, rotor and copper loss are ruled from {SETTINGS.usual:g} times the needed "
             "torque. Give `torque` or `drives`."

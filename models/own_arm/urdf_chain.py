@@ -35,7 +35,6 @@ ORIGIN = "0 0 0"
 ROS_BASE = "base_link"
 TURNING = ("revolute", "continuous")
 FIXED = "fixed"
-OTHERS = "others"
 
 
 @dataclass(frozen=True)
@@ -76,8 +75,8 @@ class Chain:
 def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Chain:
     """The chain of a description. Raises InvalidArm with the name of the link or joint."""
     root = parsed_urdf(description.urdf, checkpoint)
-    tree, problems = UrdfTree.of(root), Problems()
-    given = {} if description.locked == OTHERS else dict(description.locked or {})
+    tree, problems, locked = UrdfTree.of(root), Problems(), description.locked
+    given = {} if isinstance(locked, str) else dict(locked or {})
     base = description.base or tree.root
     for field, link in (("base", base), ("tip", description.tip)):
         with problems.noted():
@@ -96,9 +95,9 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
                 )
     problems.raise_any()
     path = tree.path(base, description.tip)
-    locked = _others(tree, path) if description.locked == OTHERS else given
+    held = _others(tree, path) if isinstance(locked, str) else given
     moving = [
-        joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in locked
+        joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in held
     ]
     if not 1 <= len(moving) <= CHAIN.joints:
         refuse(
@@ -110,14 +109,14 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
         with problems.noted():
             _check_moving(joint)
     with problems.noted():
-        _check_rest(tree, moving, locked)
+        _check_rest(tree, moving, held)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
-    for link in root.findall("link"):
+    for element in root.findall("link"):
         with problems.noted():
-            if tree.carrier(name_of(link), names):
-                _check_inertial(link)
+            if tree.carrier(name_of(element), names):
+                _check_inertial(element)
     problems.raise_any()
-    return _merged(root, tree, moving, locked, base, description.tip)
+    return _merged(root, tree, moving, held, base, description.tip)
 
 
 def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:

@@ -248,6 +248,6 @@ def test_doubts_about_a_urdf_are_kept_with_the_robot(client: TestClient) -> None
     assert made.status_code == 201
     kept = client.get("/robots/doubtful").json()["warnings"]
     assert kept == made.json()["warnings"]
-    for words in ("'elbow' cannot hold", "'shoulder' has a torque limit of 2e+03"):
+    for words in ("'elbow' cannot hold", "'shoulder' has a torque limit of 2000"):
         assert any(words in each for each in kept)
     client.delete("/robots/doubtful")
