@@ -129,8 +129,9 @@ def bound_between_curves(
     pairs = search.run(SearchLimits(CELLS.rounds, deadline))
     if not len(pairs.value):
         return np.inf
-    tolerance = 0.0 if prepared.problem.bound == "tight" else SUBDIVISION.tolerance
-    return _with_holding(search, pairs, deadline, enough - tolerance * abs(enough))
+    if np.isfinite(enough) and prepared.problem.bound != "tight":
+        enough -= SUBDIVISION.tolerance * abs(enough)
+    return _with_holding(search, pairs, deadline, enough)
 
 
 @dataclass(frozen=True)

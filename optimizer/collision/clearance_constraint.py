@@ -79,14 +79,9 @@ class ClearanceConstraint:
         """Ratios (n, k) at consecutive samples of a motion, exact above `exact_ratio`; all others
         are bounded by it.
         """
-        return _ratio(
-            self.model.distances_along(
-                q,
-                CLEARANCE_CONSTRAINT.reserve
-                + (1 - CLEARANCE_CONSTRAINT.exact_ratio) * CLEARANCE_CONSTRAINT.ratio_range,
-                self.pairs,
-            )
-        )
+        settings = CLEARANCE_CONSTRAINT
+        within = settings.reserve + (1 - settings.exact_ratio) * settings.ratio_range
+        return _ratio(self.model.distances_along(q, within, self.pairs))
 
     def linearised(
         self, frames: Array, q: Array, v: Array, wanted: Mask | None = None
@@ -103,9 +98,8 @@ class ClearanceConstraint:
         gradients = self.model.gradients(
             frames, distances.configuration, self.pairs[distances.column], distances.nearest
         )
-        by_q[distances.configuration, distances.column] = (
-            gradients / -CLEARANCE_CONSTRAINT.ratio_range
-        )
+        exact = distances.configuration, distances.column
+        by_q[exact] = gradients / -CLEARANCE_CONSTRAINT.ratio_range
         return ConstraintRatios(_ratio(distances.distance), by_q, np.broadcast_to(0.0, by_q.shape))
 
     def _pair_distances(self, frames: Array, q: Array) -> PairDistances:

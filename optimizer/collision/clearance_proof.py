@@ -280,11 +280,8 @@ class _Proof:
             clouds, convex = checks[np.flatnonzero(of_cloud)], checks[np.flatnonzero(~of_cloud)]
             result = np.empty(len(of_cloud))
             result[~of_cloud] = self.convex_bounds(instants, convex)
-            result[of_cloud] = (
-                clouds.at_begin.distance
-                + clouds.at_end.distance
-                - self.motion.travels(instants, clouds)
-            ) / 2
+            travels = self.motion.travels(instants, clouds)
+            result[of_cloud] = (clouds.at_begin.distance + clouds.at_end.distance - travels) / 2
             return result
         return self.convex_bounds(instants, checks)
 

@@ -40,11 +40,9 @@ def close_pass(arm: Arm, spline: Spline, clearance: Clearance | None) -> Clearan
     if clearance is None or clearance.min_clearance >= CLOSE_PASS.distance:
         return None
     without_margins = proven_clearance(model_without_margins(arm), spline)
-    return (
-        without_margins
-        if without_margins is not None and without_margins.min_clearance < CLOSE_PASS.distance
-        else None
-    )
+    if without_margins is None or without_margins.min_clearance >= CLOSE_PASS.distance:
+        return None
+    return without_margins
 
 
 def model_without_margins(arm: Arm) -> CollisionModel:

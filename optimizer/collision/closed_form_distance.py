@@ -87,9 +87,8 @@ def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
     opposite = heights[:, 0] * heights[:, 1] < 0
     fraction = np.clip(heights[:, 0] / np.where(drop == 0, 1.0, drop), 0.0, 1.0)
     crossing = b[:, 0] + fraction[:, None] * along
-    crossed = opposite & (np.einsum("kci,kci->kc", crossing[:, None] - corner, inward) >= 0).all(
-        axis=1
-    )
+    inside = np.einsum("kci,kci->kc", crossing[:, None] - corner, inward) >= 0
+    crossed = opposite & inside.all(axis=1)
     if crossed.any():
         on_edges = points[:3, crossed]
         distance[crossed], normal[crossed], point[crossed] = _crossing(

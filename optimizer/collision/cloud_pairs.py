@@ -88,11 +88,8 @@ class CloudPairs:
                         else batch.convex.nearest(batch.T, batch.root, within[k])
                     )
                 R, origin = batch.T_base_cloud[:3, :3], batch.T_base_cloud[:3, 3]
-                distance[k], normal[k], point[k] = (
-                    witness[0],
-                    witness[1] @ R.T,
-                    witness[2] @ R.T + origin,
-                )
+                distance[k], normal[k] = witness[0], witness[1] @ R.T
+                point[k] = witness[2] @ R.T + origin
         return distance, normal, point
 
     def near(

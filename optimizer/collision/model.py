@@ -140,10 +140,8 @@ class CollisionModel:
         chosen = np.append(rows[:-1:stride], count - 1)
         # Half of the change between two chosen samples: the median, which ignores the jump from one
         # motion to the next.
-        reach = (
-            float(np.median(self.greatest_changes(np.diff(q[chosen], axis=0), pairs).max(axis=1)))
-            / 2
-        )
+        changes = self.greatest_changes(np.diff(q[chosen], axis=0), pairs).max(axis=1)
+        reach = float(np.median(changes)) / 2
         result = np.empty((count, len(pairs)))
         result[chosen] = self.pair_distances(frames[chosen], pairs, within + reach).distance
         rest = np.delete(rows, chosen)

@@ -12,8 +12,11 @@ all in W.
 
 **Charging strategy.** Net surplus charges the storage and net demand discharges it, always as early
 as possible. Both are limited by `power` (at the bus) and by the capacity. The loss of a round trip
-is taken while charging, so that the charge E is the energy that can still be given back: dE/dt =
-efficiency · charging - discharging. Surplus beyond these limits is treated as on the shared bus.
+is taken while charging, so that the charge E is the energy that can still be given back:
+
+    dE/dt = efficiency · charging - discharging.
+
+Surplus beyond these limits is treated as on the shared bus.
 
 **Energy.** total = ∫ drawn dt + E(0) - E(T): a decrease of the charge counts as drawn. An increase
 counts as given back, because the electronics use it first while they idle. With this charging
@@ -28,10 +31,16 @@ for it.
 **Proof.** Let C and D be the energies charged and discharged so far by any strategy, and C* and D*
 those of the strategy above. Initially C* ≥ C and D* ≥ D.
 
-- C can overtake C* only at C = C* with the storage of the strategy above full. Then D* = E(0) +
-  efficiency · C - capacity ≤ D, so D = D*, and the other storage is full as well.
-- D can overtake D* only at D = D* with the storage of the strategy above empty. Then D ≤ E(0) +
-  efficiency · C ≤ E(0) + efficiency · C* = D*, so the other storage is empty as well.
+- C can overtake C* only at C = C* with the storage of the strategy above full. Then
+
+      D* = E(0) + efficiency · C - capacity ≤ D,
+
+  so D = D*, and the other storage is full as well.
+- D can overtake D* only at D = D* with the storage of the strategy above empty. Then
+
+      D ≤ E(0) + efficiency · C ≤ E(0) + efficiency · C* = D*,
+
+  so the other storage is empty as well.
 
 Neither happens, so C* ≥ C throughout.
 """

@@ -79,10 +79,8 @@ def _ending(
     for joint, weight in enumerate((np.abs(spans) + weight_without_jerk * greatest).T):
         joint_rows = rows * weight
         scale = np.maximum(np.linalg.norm(joint_rows, axis=1), 1e-300)
-        changed[:, joint] += (
-            weight
-            * np.linalg.lstsq(joint_rows / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
-        )
+        scaled = joint_rows / scale[:, None], missing[:, joint] / scale
+        changed[:, joint] += weight * np.linalg.lstsq(*scaled, rcond=None)[0]
     return changed
 
 

@@ -117,9 +117,8 @@ def straight_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
     displacement = q_goal - q_start
     longest = np.abs(displacement).max(keepdims=True)
     law = time_optimal_spline(_along(limits, displacement), np.zeros(1), longest)
-    return replace(
-        law, control_points=q_start + law.control_points * (displacement / (longest or 1.0))
-    )
+    share = displacement / (longest or 1.0)
+    return replace(law, control_points=q_start + law.control_points * share)
 
 
 def _along(limits: Limits, displacement: Array) -> Limits:

@@ -118,11 +118,11 @@ def compared(
         broken: limits along the path that the motion breaks, and collisions, in words.
     """
     arm = problem.arm
-    lost = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
-    energy = motion_energy(problem, motion, tau, potential, lost)
+    tau_friction = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
+    energy = motion_energy(problem, motion, tau, potential, tau_friction)
     spread = arm_spread(arm)
     sensitivity = energy_sensitivity(
-        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, lost
+        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, tau_friction
     )
     if problem.dwell is not None:
         energy = energy.with_dwell(dwell_energy(problem.dwell, arm, held.power, motion.duration))
@@ -134,7 +134,7 @@ def compared(
         electrical=energy.electrical.total,
         mechanical=energy.mechanical.total,
         saving=saving(ours, energy.of(problem.objective)),
-        reason="; ".join([*broken_limits(problem, motion, tau, lost), *broken]) or None,
+        reason="; ".join([*broken_limits(problem, motion, tau, tau_friction), *broken]) or None,
         sensitivity=sensitivity,
         at_goal=held,
     )
@@ -234,7 +234,7 @@ def motion_energy(
     motion: SampledMotion,
     tau: Array,
     potential: Callable[[Array], float],
-    lost: Array | None = None,
+    tau_friction: Array | None = None,
 ) -> Energy:
     """Energy of a motion from rest to rest, without waiting.
 
@@ -243,14 +243,16 @@ def motion_energy(
         motion: the motion.
         tau: its torques, shape (k, nq) [N·m].
         potential: potential energy [J] of joint positions (nq,).
-        lost: friction torques, shape (k, nq) [N·m], if they are known.
+        tau_friction: friction torques, shape (k, nq) [N·m], if they are known.
     """
     gain = potential(motion.q[-1]) - potential(motion.q[0])
-    return breakdown(motion.weights, motion.v, motion.a, tau, gain, problem.arm, tau_friction=lost)
+    return breakdown(
+        motion.weights, motion.v, motion.a, tau, gain, problem.arm, tau_friction=tau_friction
+    )
 
 
 def broken_limits(
-    problem: Problem, motion: SampledMotion, tau: Array, lost: Array | None = None
+    problem: Problem, motion: SampledMotion, tau: Array, tau_friction: Array | None = None
 ) -> list[str]:
     """The limits that a motion breaks, in words; a motion longer than the dwell breaks it too.
 
@@ -261,7 +263,7 @@ def broken_limits(
         1 + RATIO_TOLERANCE
     )
     limits = problem.arm.active_limits
-    tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a, lost)
+    tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a, tau_friction)
     # without a limit, unbounded jerk is allowed
     jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)
     ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_limited)

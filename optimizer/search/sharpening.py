@@ -1,11 +1,12 @@
 """Refinement of motions whose cost has a corner in every joint's power.
 
 The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j,
-0). The NLP smooths these corners over `WIDTH`. Because every joint has one, the optimum of the
-smoothed cost lies some percent above the least energy. Sharp corners from the start would leave the
-SQP in poor local optima. So the optimum is followed from one width to the next, in a space fine
-enough for the short pushes of such motions. On an isolated bus, it is followed back to the first
-width in between: sharp corners hold a motion in an optimum that smooth corners lead out of.
+0). The NLP smooths these corners over `SMOOTHING.power_width`. Because every joint has one, the
+optimum of the smoothed cost lies some percent above the least energy. Sharp corners from the start
+would leave the SQP in poor local optima. So the optimum is followed from one width to the next, in
+a space fine enough for the short pushes of such motions. On an isolated bus, it is followed back to
+the first width in between: sharp corners hold a motion in an optimum that smooth corners lead out
+of.
 
 The mechanical work of a motion has many local optima. As rest costs nothing, the best of them
 swing, push and rest, which few control points hardly represent. Coarse solves from random motions

@@ -91,7 +91,5 @@ def path_lengths(path: Array, v_max: Array) -> Array:
 def is_same_path(path: Array, other: Array) -> bool:
     """Whether two paths differ by less than `same_path` at the same fractions of their lengths."""
     ones = np.ones(path.shape[1])
-    return bool(
-        np.abs(path_samples(path, 1.0, ones)[0] - path_samples(other, 1.0, ones)[0]).max()
-        < JOINT_PATH.same_path
-    )
+    (q, _), (q_other, _) = (path_samples(each, 1.0, ones) for each in (path, other))
+    return bool(np.abs(q - q_other).max() < JOINT_PATH.same_path)

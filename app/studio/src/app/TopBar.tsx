@@ -1,7 +1,7 @@
 import { Button } from "../ui/Button";
 import { alone } from "../store/alone";
 import { link, presentCell } from "../store/share";
-import { answered, canRedo, canUndo, page, redo, saved, stale, toast, undo, type Page } from "../store/state";
+import { answered, canRedo, canUndo, page, redo, saved, stale, toast, trouble, undo, type Page } from "../store/state";
 import { trying } from "../store/trouble";
 import { dialog } from "./dialog";
 import { ProjectMenu } from "./ProjectMenu";
@@ -26,6 +26,12 @@ async function share(): Promise<void> {
   }
 }
 
+/** What went wrong elsewhere is not of the next page. */
+function open(next: Page): void {
+  trouble.value = null;
+  page.value = next;
+}
+
 /** Where one is, what one works on, and what leaves the page. */
 export function TopBar() {
   const ready = Boolean(answered.value) && !stale.value;
@@ -42,7 +48,7 @@ export function TopBar() {
         <>
           <nav class="pages" aria-label="Pages">
             {PAGES.map(({ value, text }) => (
-              <button type="button" key={value} aria-current={page.value === value ? "page" : undefined} onClick={() => (page.value = value)}>
+              <button type="button" key={value} aria-current={page.value === value ? "page" : undefined} onClick={() => open(value)}>
                 {text}
               </button>
             ))}

@@ -4,7 +4,7 @@ import { Note } from "../ui/Note";
 import { offline } from "../store/client";
 import { cancel, optimise } from "../store/run";
 import { lackOf } from "../store/request";
-import { answered, changes, jsonBroken, request, run, trouble } from "../store/state";
+import { answered, changes, jsonBroken, page, request, run, trouble } from "../store/state";
 import { tell } from "../store/trouble";
 import { atMost, figure } from "../store/units";
 
@@ -50,7 +50,7 @@ function stateText(): string {
 /** What went wrong; it also stands at its fields. */
 function Wrong() {
   const now = trouble.value;
-  if (!now) return null;
+  if (!now || page.value !== "cell") return null;
   const elsewhere = now.fields.filter(({ text }) => text !== now.text);
   return (
     <div id="problem">

@@ -29,9 +29,15 @@ export function Menu({ label, children, name, icon, id, align = "right", quiet }
       box.current.querySelector("summary")?.focus();
       event.stopPropagation();
     };
+    const filed = (event: Event) => {
+      const { current } = box;
+      if (current?.contains(event.target as Node) && (event.target as HTMLInputElement).type === "file") current.open = false;
+    };
     document.addEventListener("click", away);
+    document.addEventListener("change", filed);
     document.addEventListener("keydown", escape, true);
     return () => {
+      document.removeEventListener("change", filed);
       document.removeEventListener("click", away);
       document.removeEventListener("keydown", escape, true);
     };

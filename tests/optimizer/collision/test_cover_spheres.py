@@ -1,5 +1,5 @@
-"""Lower bounds on distances, by beads and by earlier distances, against exact distances of random
-scenes.
+"""Lower bounds on distances, by covering spheres and by earlier distances, against exact distances
+of random scenes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ITERATED = 1e-5  # m
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_beads_bound_the_distances_from_below(seed: int) -> None:
+def test_covering_spheres_bound_the_distances_from_below(seed: int) -> None:
     """Boxes, spheres, cylinders, capsules, meshes and half-spaces. Most bounds are better than
     those of balls.
     """

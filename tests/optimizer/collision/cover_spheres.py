@@ -1,5 +1,5 @@
-"""Lower bounds on distances by numpy: beads that cover one body, against the box or cylinder of the
-other.
+"""Lower bounds on distances by numpy: spheres that cover one body, against the box or cylinder of
+the other.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from joulepath.optimizer.collision.pair_arrays import PairArrays
 from tests.optimizer.collision.many_points import into, picked, placed, pose_columns
 
 
-class Beads:
-    """Distances of the beads of one body to the box or cylinder of the other."""
+class CoverSpheres:
+    """Distances of the spheres that cover one body to the box or cylinder of the other."""
 
     def __init__(self, arrays: PairArrays) -> None:
         self._arrays = arrays
