@@ -40,6 +40,7 @@ def main() -> None:
         page.locator("#view").press("End")
         for _ in range(45):
             page.locator("#view").press("ArrowLeft")
+        page.locator("#view").evaluate("it => it.blur()")
         picture("studio")
         type_into(page, "/payload/mass", "1.6")
         type_into(page, "/goal/pose/position/2", "500")
