@@ -1,7 +1,6 @@
 """`python -m joulepath.app`: the service under uvicorn."""
 
-# Worker processes import this module too, so that everything that they do not need is imported
-# inside `main`.
+# Worker processes also import this module: further imports are inside `main`.
 from __future__ import annotations
 
 import signal

@@ -29,10 +29,12 @@ from joulepath.app.api.logs import route as logs
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
 from joulepath.app.api.replay import route as replay
+from joulepath.app.api.report import route as report
 from joulepath.app.api.robots import route as robots
 from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
 from joulepath.app.api.studies.suggest import route as suggest
+from joulepath.app.api.tools import route as tools
 from joulepath.app.api.whatif import route as whatif
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.engine.pool import Engine
@@ -69,7 +71,9 @@ ROUTES = (
     identifications,
     answers,
     export,
+    report,
     robots,
+    tools,
     figures,
     health,
     metrics,
@@ -130,7 +134,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.jobs = Jobs(store, dispatcher, settings)
     engine.start()
     dispatcher.start()
-    # in the background: requests that need no database do not wait for it
+    # in the background: requests without a database do not wait for it
     opening = asyncio.create_task(store.open())
     yield
     await dispatcher.stop()
@@ -145,7 +149,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
     """Adds the middleware, the innermost first."""
     app.add_middleware(Transfers, bodies=app.state.bodies, keys=keys)
     if settings.cors_origins:
-        # no cookies are used, so that a page may send any header, which is its own
+        # There are no cookies: a page may send any of its own headers.
         app.add_middleware(
             CORSMiddleware,
             allow_origins=settings.cors_origins,

@@ -8,6 +8,7 @@ import errno
 import logging
 import math
 import socket
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
 
@@ -22,20 +23,25 @@ from joulepath.app.settings import Settings, WrongSettings
 
 logger = logging.getLogger(__name__)
 
-_REFUSING_TIME = 0.25
-"""Time [s] in which new requests still get a response (`shutting-down`), until load balancers know
-of the shutdown.
-"""
-_SETTLING_TIME = 0.05
-"""Time [s] to read requests that have arrived on open connections, before idle connections are
-closed.
-"""
+
+@dataclass(frozen=True)
+class ServerSettings:
+    """Settings of the server process."""
+
+    refusing_time: float = 0.25
+    """Time [s] of `shutting-down` responses, until load balancers know of the shutdown."""
+    settling_time: float = 0.05
+    """Time [s] to read arrived requests before idle connections are closed."""
+    large_block: int = 1 << 20
+    """Least size of separately mapped blocks [byte], above the pieces of bodies."""
+    backlog: int = 2048
+    """Connections waiting to be accepted, the default of uvicorn."""
+
+
+SERVER = ServerSettings()
+
 _M_MMAP_THRESHOLD = -3
-"""Parameter of glibc's `mallopt`: the size [byte] from which a block is mapped by itself."""
-_LARGE_BLOCK = 1 << 20
-"""Such a size [byte]: smaller ones would make the pages of every piece of a body be mapped anew."""
-_BACKLOG = 2048
-"""Connections that wait to be accepted: as uvicorn has it."""
+"""Parameter of glibc's `mallopt`: the least size of separately mapped blocks [byte]."""
 _REMEDIES = {
     errno.EADDRINUSE: "another program has this address, perhaps another service. End it, or "
     "choose another port by "
@@ -57,31 +63,29 @@ class _Server(uvicorn.Server):
         self._state, self._connections = app.state, connections
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Lets the requests in flight finish; those that take too long are `shutting-down`."""
+        """Lets running requests finish; too long ones are answered by `shutting-down`."""
         self._state.engine.drain()
         self._state.jobs.dispatcher.drain()
         self._state.bodies.drain()
-        # the engine has ended its tasks by then, and connections that are still open do not read
-        end = self._state.settings.shutdown_grace + _SETTLING_TIME
+        # The engine has ended its tasks by then; remaining connections do not read.
+        end = self._state.settings.shutdown_grace + SERVER.settling_time
         asyncio.get_running_loop().call_later(end, self._connections.reset)
-        await asyncio.sleep(_REFUSING_TIME)
+        await asyncio.sleep(SERVER.refusing_time)
         for server in self.servers:
             server.close()
-        await asyncio.sleep(_SETTLING_TIME)
+        await asyncio.sleep(SERVER.settling_time)
         await super().shutdown(sockets)
 
 
 def listen(host: str, port: int) -> list[socket.socket]:
-    """Sockets that listen on every address of a host. Raises WrongSettings if nobody can listen
-    there.
-    """
+    """Sockets listening on every address of a host. Raises WrongSettings if impossible."""
     sockets = list[socket.socket]()
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
         for family, _, _, _, address in dict.fromkeys(found):
-            # two processes may bind the same address, and only one of them may listen
+            # Two processes may bind an address, but only one can listen.
             sockets.append(
-                socket.create_server(cast(Any, address), family=family, backlog=_BACKLOG)
+                socket.create_server(cast(Any, address), family=family, backlog=SERVER.backlog)
             )
     except OSError as error:
         for each in sockets:
@@ -97,9 +101,7 @@ def listen(host: str, port: int) -> list[socket.socket]:
 
 
 def serve(settings: Settings) -> None:
-    """Serves in this process until a signal arrives. Raises WrongSettings if nobody can listen on
-    its address.
-    """
+    """Serves until a signal arrives. Raises WrongSettings for an unusable address."""
     sockets = listen(settings.host, settings.port)
     _give_memory_back()
     app = create_app(settings)
@@ -121,19 +123,18 @@ def serve(settings: Settings) -> None:
         # the server ends the connections before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
     )
-    # what there is now stays: a garbage collection that looks through it would hold up every
-    # request for 0.1 s
+    # Present objects stay: collecting garbage among them would delay requests by 0.1 s.
     keep()
     logger.info("listening", extra={"addresses": [each.getsockname()[:2] for each in sockets]})
     _Server(config, app, connections).run(sockets)
 
 
 def _give_memory_back() -> None:
-    """Has the C library return every large block to the system when it is freed.
+    """Makes the C library return freed large blocks to the system.
 
-    Otherwise it keeps the more, the larger the blocks were that it saw: 300 bodies of 4 MiB would
-    never be given back.
+    By default, it keeps more memory after larger blocks: 300 bodies of 4 MiB would never be
+    returned.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:  # glibc has it
-        mallopt(_M_MMAP_THRESHOLD, _LARGE_BLOCK)
+        mallopt(_M_MMAP_THRESHOLD, SERVER.large_block)

@@ -23,10 +23,10 @@ _NAMES = {
         "no origin: give scheme, name and port only, as `https://cell4.example`",
     ),
 }
-"""Settings that list names: the form of each name, and the end of the message about another one."""
+"""Settings with lists of names: the form of a name, and the end of the error message."""
 _SCHEDULER = re.compile(r"(tcp|tls)://[A-Za-z0-9._:\[\]-]+:[0-9]{1,5}")
 LONGEST_DEADLINE = 3600.0
-"""Longest deadline [s] that any setting allows."""
+"""Longest deadline [s] of all settings."""
 
 
 def _default_database() -> str:
@@ -240,7 +240,7 @@ class Settings(BaseSettings):
 
     @property
     def workers_for_jobs(self) -> int:
-        """Workers that jobs may use at the same time."""
+        """Workers available to jobs at the same time."""
         return min(self.job_workers or max(1, self.workers - 1), self.workers)
 
     @field_validator("robots", "trusted_proxies", "allowed_hosts", "cors_origins", mode="before")
@@ -289,11 +289,11 @@ class Settings(BaseSettings):
 
 
 class WrongSettings(Exception):
-    """Environment variables that are no settings; the message has a line for each."""
+    """Invalid environment variables; the message has one line per variable."""
 
 
 def read_settings(given: Mapping[str, Any] | None = None) -> Settings:
-    """The settings of this environment, and those that are `given`. Raises WrongSettings."""
+    """The settings of this environment, updated by `given`. Raises WrongSettings."""
     try:
         return Settings(**(given or {}))
     except ValidationError as error:

@@ -82,9 +82,8 @@ def main() -> int:
             rows.append(one)
             print(
                 f"{name:11s} {one['answered']:3d} of {one['count']} answered, {len(one['errors'])} "
-                "errors, gap median "
-                f"{one['gap'].p50:5.1%}, time median {one['wall'].p50:.2f} s, 95th percentile "
-                f"{one['wall'].p95:.2f} s",
+                f"errors, gap median {one['gap'].p50:5.1%}, time median {one['wall'].p50:.2f} s, "
+                f"95th percentile {one['wall'].p95:.2f} s",
                 flush=True,
             )
     errors = [error for one in rows for error in one["errors"]]

@@ -263,8 +263,7 @@ def line(outcome: Outcome) -> str:
     return (
         f"| {outcome.attack} | {outcome.before:.0f} | {outcome.peak:.0f} | {outcome.after:.0f} | "
         f"{outcome.healthz_p99:.0f} | {outcome.healthz_most:.0f} | {outcome.answered} | "
-        f"{outcome.refused} | "
-        f"{outcome.honest_most:.1f} | {outcome.seen} |"
+        f"{outcome.refused} | {outcome.honest_most:.1f} | {outcome.seen} |"
     )
 
 

@@ -45,7 +45,8 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import label_of
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.guess import Guess
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 POINTS = 40
 # members of each self-motion, and orientations of each free goal, among which the attack draws
@@ -190,10 +191,10 @@ def attack(problem: Problem, starts: int, rng: np.random.Generator) -> tuple[flo
             space, np.clip(points, limits.q_min, limits.q_max), problem.duration_min or 0.0
         )
         direct = replace(problem, start=q_start, goal=q_goal)
-        solver = FreeSpline(
+        context = SolveContext.of(
             replace(prepared, problem=direct), q_start, q_goal, Deadline.after(PATIENCE)
         )
-        spline = solver.improve(guess).spline
+        spline = FreeSpline(context).improve(guess).spline
         if spline is None:
             continue
         energy = prepared.objective_of(prepared.energy(spline))

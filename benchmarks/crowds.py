@@ -214,8 +214,7 @@ def line(name: str, phase: Phase) -> str:
     )
     return (
         f"| {name} | {phase.name} | {phase.time:.0f} | {share:.2f} | {others} | {crowd} | "
-        f"{phase.workers} | "
-        f"{phase.ready} | {phase.healthz_p99:.0f} | {phase.healthz_most:.0f} |"
+        f"{phase.workers} | {phase.ready} | {phase.healthz_p99:.0f} | {phase.healthz_most:.0f} |"
     )
 
 

@@ -30,7 +30,7 @@ from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
@@ -100,7 +100,7 @@ def refused(problem: Problem) -> DurationTooShort | None:
         )
     )
     try:
-        optimize(replace(problem, duration_max=max(least / 10, LEAST_DURATION)))
+        optimize(replace(problem, duration_max=max(least / 10, DURATIONS.least)))
     except DurationTooShort as error:
         return error
     except JoulepathError:
@@ -114,17 +114,17 @@ def from_random_starts(problem: Problem, starts: int, rng: np.random.Generator) 
     """
     run, best = Run(problem), np.inf
     run.prepare()
-    incumbent, candidate = run.incumbent, run.incumbent.candidates[0]
-    least, interval = candidate.shortest, fastest(run.incumbent.prepared)
+    state, candidate = run.state, run.state.candidates[0]
+    least, interval = candidate.shortest, fastest(run.state.prepared)
     for number in range(starts):
         q, t = _random(
             candidate.q_start, candidate.q_goal, least * float(rng.uniform(*SLOWER)), rng
         )
-        solver, fine = solver_of(incumbent, candidate, interval), number % 2 == 0
-        found = in_time(incumbent, partial(solver.solve_from, q, t, fine)).spline
+        solver, fine = solver_of(state, candidate, interval), number % 2 == 0
+        found = in_time(state, partial(solver.solve_from, q, t, fine)).spline
         if found is None or found.duration >= best:
             continue
-        if incumbent.certified(candidate, found, incumbent.prepared.energy(found)).valid:
+        if state.certified(candidate, found, state.prepared.energy(found)).valid:
             best = found.duration
     return best
 

@@ -174,8 +174,8 @@ def print_summary(results: dict[str, Any]) -> None:
     """Prints the table."""
     print(
         f"{'goal':6}{'family':20}{'answered':>12}  {'wall p50':>9}{'p95':>7}{'max':>7} s  "
-        f"{'cpu p50':>8}{'p95':>7} s  "
-        f"{'energy p25':>10}{'p50':>7}{'p75':>7} J  {'collide':>7}  problems"
+        f"{'cpu p50':>8}{'p95':>7} s  {'energy p25':>10}{'p50':>7}{'p75':>7} J  {'collide':>7}  "
+        "problems"
     )
     for row in results["rows"]:
         wall, cpu, energy = row["wall"], row["cpu"], row["energy"]

@@ -16,7 +16,8 @@ from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.identify.options import Coupling
 
 PLACE = "JOULEPATH_TEST_DATA"

@@ -15,7 +15,8 @@ from scipy.signal import lfilter
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import (
     Noise,

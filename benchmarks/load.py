@@ -105,16 +105,15 @@ def main() -> None:
     wall = results["wall"]
     print(
         f"{results['clients']} clients for {results['seconds']:.0f} s: {results['answers']} "
-        "answers, "
-        f"{results['per_second']:.1f} per second, {results['statuses']}, lost "
+        f"answers, {results['per_second']:.1f} per second, {results['statuses']}, lost "
         f"{results['lost'] or 'none'}"
     )
     print(f"wall {wall.times(1e3).formatted(' ms', 0)}")
     print(f"99th percentile {wall.p99 * 1e3:.0f} ms = {wall.p99 / wall.p50:.1f} × median")
     print(
         f"memory of {results['processes']} processes, MiB: second quarter "
-        f"{results['memory_first']:.0f}, "
-        f"last {results['memory_last']:.0f}; same processes throughout: {results['same_workers']}"
+        f"{results['memory_first']:.0f}, last {results['memory_last']:.0f}; same processes "
+        f"throughout: {results['same_workers']}"
     )
     write_json(given.json, results)
 

@@ -256,9 +256,8 @@ def table_3() -> list[str]:
         lines += [
             "",
             f"{words}: Spearman's rank correlation {agreement.rank_correlation:.4f}; "
-            f"{agreement.rows} rows within 10 % "
-            f"of the factor {agreement.factor:.1f}; twelve rows within "
-            f"{100 * agreement.needed:.1f} % of one factor.",
+            f"{agreement.rows} rows within 10 % of the factor {agreement.factor:.1f}; twelve rows "
+            f"within {100 * agreement.needed:.1f} % of one factor.",
         ]
     return lines
 

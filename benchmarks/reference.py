@@ -40,7 +40,8 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.guess import Guess
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 FILE = Path(__file__).with_name("reference_energies.json")
 SEED, TASKS = 1, 100
@@ -90,8 +91,10 @@ class Search:
         """
         interval = duration_intervals(self.prepared, self.move.q_goal)[0]
         deadline = Deadline.after(PATIENCE)
-        solver = FreeSpline(self.prepared, self.move.q_start, self.move.q_goal, deadline, interval)
-        spline = solver.improve(guess).spline
+        context = SolveContext(
+            self.prepared, self.move.q_start, self.move.q_goal, deadline, interval
+        )
+        spline = FreeSpline(context).improve(guess).spline
         if spline is None:
             return float("inf")
         energy = self.prepared.objective_of(self.prepared.energy(spline))

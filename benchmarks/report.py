@@ -176,8 +176,8 @@ def _arms(found: Results | None) -> str:
         for row in found["rows"]
     )
     text = (
-        "Random requests from joint positions to a pose, one client, one worker. A refusal "
-        "without a true reason is an "
+        "Random requests from joint positions to a pose, one client, one worker. A refusal without "
+        "a true reason is an "
     )
     return f"## Robots\n\n{text}error.\n\n{table(header, rows)}"
 

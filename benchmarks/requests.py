@@ -160,8 +160,7 @@ def failed_requirements(results: dict[str, Any]) -> list[str]:
     if results["relative_excess"] > MOST_EXCESS:
         found.append(
             f"{results['worst']}: {results['relative_excess']:.2%} more energy than the "
-            "time-scaled motion, required "
-            f"{MOST_EXCESS:.0%} or less"
+            f"time-scaled motion, required {MOST_EXCESS:.0%} or less"
         )
     return found
 
@@ -194,8 +193,8 @@ def print_summary(results: dict[str, Any]) -> None:
     print(f"NLPs solved                   {results['solves'].formatted('', 0)}")
     print(
         f"excess over time scaling      maximum {results['relative_excess']:+.2%} of "
-        f"{results['compared']} tasks with "
-        f"the same duration {results['worst'] and '(' + results['worst'] + ')'}"
+        f"{results['compared']} tasks with the same duration "
+        f"{results['worst'] and '(' + results['worst'] + ')'}"
     )
 
 

@@ -33,11 +33,12 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.solve.methods import METHODS
-from joulepath.optimizer.solve.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH
+from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 
 REPLAY = 1e-4  # s
 SOLVED = 0.99  # least fraction of solved tasks, of either kind
 KINDS = ("one candidate", "whole request")
+PLANNED = (MotionOrigin.FROM_PLANNED_PATH.value, MotionOrigin.ALONG_PLANNED_PATH.value)
 
 
 @dataclass
@@ -85,7 +86,7 @@ def run(task: CellTask, kind: str, method: MethodName = "bspline") -> Outcome:
     outcome.wall = time.perf_counter() - began
     outcome.solves = solution.solver.nlp_solves
     outcome.from_planned_path = any(
-        candidate.reason.endswith((FROM_PLANNED_PATH, ALONG_PLANNED_PATH))
+        candidate.reason.endswith(PLANNED)
         for candidate in solution.candidates
         if candidate.status == "solved"
     )
@@ -149,8 +150,7 @@ def print_summary(results: dict[str, Any]) -> None:
     """Prints the statistics of a run."""
     print(
         f"tasks                       {results['count']} of {results['draws']} draws; straight "
-        "line in collision in "
-        f"{results['blocked']}"
+        f"line in collision in {results['blocked']}"
     )
     print(f"obstacles                   {results['obstacles'].formatted('', 0)}")
     for kind in KINDS:

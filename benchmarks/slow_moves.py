@@ -37,8 +37,9 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult
-from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.guess import Guess
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 SlowKind = Literal["all joints", "one joint", "tenth"]
 SLOW_KINDS: tuple[SlowKind, ...] = ("all joints", "one joint", "tenth")
@@ -88,10 +89,13 @@ def more_points(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]
     """Energies [J] of the same move, each with its name, from the answer's motion in larger
     spaces."""
     prepared = PreparedProblem.of(problem)
-    solver = FreeSpline(prepared, spline.control_points[0], spline.control_points[-1], NEVER)
+    q_start, q_goal = spline.control_points[[0, -1]]
+    solver = FreeSpline(SolveContext.of(prepared, q_start, q_goal, NEVER))
     q, t = sampled(spline)
-    points = bspline.smoothed(q, t / spline.duration, bspline.uniform(MORE * FEW).knots)
-    yield "evenly", prepared.cost_of(solver.solve_points(points, spline.duration, PROGRESS).spline)
+    space = bspline.uniform(MORE * FEW)
+    points = bspline.smoothed(q, t / spline.duration, space.knots)
+    evenly = solver.solve_control_points(space, points, spline.duration, PROGRESS)
+    yield "evenly", prepared.cost_of(evenly.spline)
     yield "finer", prepared.cost_of(_finer(solver, spline).spline)
 
 
@@ -135,8 +139,7 @@ def compare(seed: int, count: int, json: Path | None) -> int:
         rows.append(row)
         print(
             f"{index:4d} {kind:10s} {energy:9.2f} J, {answer.duration:7.3f} s, excess "
-            f"{row['excess']:7.3%} ({best}), "
-            f"{spent:.2f} s",
+            f"{row['excess']:7.3%} ({best}), {spent:.2f} s",
             flush=True,
         )
     for kind in SLOW_KINDS:

@@ -18,7 +18,7 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
@@ -27,7 +27,8 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.solve.methods import solver_for
-from joulepath.optimizer.solve.methods.method import SolveResult
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 PATIENCE = 60.0  # longest time of one solve [s]
 METHODS: tuple[MethodName, ...] = ("bspline", "time_scaling")
@@ -44,7 +45,9 @@ def solve(move: Move, method: MethodName, collisions: bool = False) -> tuple[flo
         )
     )
     began = time.perf_counter()
-    outcome = solver_for(task, move.q_start, move.q_goal, Deadline.after(PATIENCE)).solve()
+    outcome = solver_for(
+        SolveContext.of(task, move.q_start, move.q_goal, Deadline.after(PATIENCE))
+    ).solve()
     return time.perf_counter() - began, outcome
 
 
@@ -69,7 +72,12 @@ def with_self_collision(seed: int, count: int) -> dict[str, Any]:
     model = CollisionModel(Arm(robot=load_robot("ur5e")))
     ratios, walls = [], []
     for move in moves(seed, count):
-        if model.least_distance(np.stack([move.q_start, move.q_goal]), RESERVE) <= RESERVE:
+        if (
+            model.least_distance(
+                np.stack([move.q_start, move.q_goal]), CLEARANCE_CONSTRAINT.reserve
+            )
+            <= CLEARANCE_CONSTRAINT.reserve
+        ):
             continue
         without, with_links = (
             solve(move, "bspline", collisions)[0] for collisions in (False, True)

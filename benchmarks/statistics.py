@@ -41,7 +41,7 @@ class Spread:
         """Median, 95th percentile, quartiles, maximum and size in one line."""
         numbers = {name: f"{value:.{digits}f}" for name, value in asdict(self).items()}
         return (
-            f"median {numbers['p50']}{unit}, 95th percentile {numbers['p95']}{unit} "
-            f"(quartiles {numbers['p25']} and {numbers['p75']}, maximum {numbers['maximum']}, n = "
+            f"median {numbers['p50']}{unit}, 95th percentile {numbers['p95']}{unit} (quartiles "
+            f"{numbers['p25']} and {numbers['p75']}, maximum {numbers['maximum']}, n = "
             f"{self.count})"
         )

@@ -44,9 +44,10 @@ def main() -> None:
     total, bound = answer["energy"]["electrical"]["total"], answer["energy"]["lower_bound"]
     print(f"this motion            {total:5.0f} J in {answer['duration']:.2f} s")
     for each in answer["baselines"]:
-        if each["name"] in ("controller_default", "ruckig"):
+        if each["saving"] is not None or each["name"] == "controller_default":
             needs = f"{each['electrical']:5.0f} J in {each['duration']:.2f} s"
-            print(f"{each['name']:22s} {needs}  ({100 * each['saving']:.0f} % saved)")
+            saved = each["reason"] or f"{100 * each['saving']:.0f} % saved in the same time"
+            print(f"{each['name']:22s} {needs}  ({saved})")
     print(f"no motion needs less   {bound:5.0f} J")
     print(
         "turn to, in degrees:  ",

@@ -152,8 +152,7 @@ def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
     branch = answer["branch"]
     figure.suptitle(
         f"{answer['robot']}, {answer['method']}, least {answer['objective']} energy: "
-        f"{answer['duration']:.3f} s, "
-        f"{branch['start']['label']} to {branch['goal']['label']}",
+        f"{answer['duration']:.3f} s, {branch['start']['label']} to {branch['goal']['label']}",
         fontsize=10,
     )
     figure.align_ylabels()

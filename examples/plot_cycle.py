@@ -44,7 +44,9 @@ def draw(answer: dict[str, Any], powers: list[tuple[list[float], list[float]]]) 
             )
     energy = answer["energy"]["electrical"]["total"]
     saved = ", ".join(
-        f"{each['saving']:.0%} less than {each['name']}" for each in answer["baselines"]
+        f"{each['saving']:.0%} less than {each['name']}"
+        for each in answer["baselines"]
+        if each["saving"] is not None
     )
     axes.set_title(f"{answer['robot']}: {energy:.0f} J a cycle, {saved}", fontsize=10)
     axes.set(xlabel="time [s]", ylabel="power from the supply [W]", xlim=(0, answer["duration"]))

@@ -48,8 +48,8 @@ def draw(front: dict[str, Any]) -> Figure:
         label="proven lower bound at that duration",
     )
     title = (
-        f"{front['robot']}: the motions that none beats in both {front['objective']} energy "
-        "and duration"
+        f"{front['robot']}: the motions that none beats in both {front['objective']} energy and "
+        "duration"
     )
     axes.set_title(title, fontsize=10)
     axes.set(xlabel="duration [s]", ylabel=f"{front['objective']} energy [J]")

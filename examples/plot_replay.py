@@ -55,7 +55,7 @@ def main() -> None:
         f"Friction times {FRICTION:g}, which the controller does not know",
     )
     for axes, title, factor in zip(rows, titles, (1.0, FRICTION), strict=True):
-        simulated.carry(with_changes(arm, friction=factor))
+        simulated.use_figures(with_changes(arm, friction=factor))
         played = play(simulated, motion, asked)
         for joint, colour in enumerate(COLOURS):
             axes.plot(t, planned[:, joint], color=colour, linewidth=1.2)

@@ -8,6 +8,6 @@ that `import joulepath` takes no time in processes that need only a part of the 
 
 import lazy_loader
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,6 +3,7 @@ __version__: str
 from .models.own_arm.description import InvalidArm
 from .models.registry import load_robot, robot_names
 from .models.robot import Limits, Robot
+from .models.tools.registry import tool_names
 from .models.uncertainty.document import InvalidFigures
 from .optimizer.collision.model import ClosestPair
 from .optimizer.compare import Compared, Comparison, compare
@@ -24,6 +25,7 @@ from .optimizer.exceptions import (
     OutsideLimits,
     SingularPose,
     UnknownRobot,
+    UnknownTool,
     UnreachablePose,
     UnreachableTargets,
 )
@@ -47,8 +49,9 @@ from .optimizer.identify.errors import (
 from .optimizer.identify.identify import Identification, identify
 from .optimizer.identify.logs.log import Log, LogMove
 from .optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
+from .optimizer.identify.logs.log_options import LogOptions
 from .optimizer.identify.logs.log_report import LogReport
-from .optimizer.identify.logs.reading import LogOptions, LogReading, read_log
+from .optimizer.identify.logs.reading import LogReading, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
 from .optimizer.identify.results import Advice, Parameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
@@ -82,7 +85,8 @@ from .optimizer.problem.scene import (
 )
 from .optimizer.problem.stop_path import StopPath
 from .optimizer.problem.stops import Stop
-from .optimizer.problem.targets import AnyOf, PosesAround
+from .optimizer.problem.targets import AnyOf, SampledPoses
+from .optimizer.problem.tool import Tool, load_tool
 from .optimizer.problem.tool_cone import ToolCone
 from .optimizer.problem.tool_path import ToolPath
 from .optimizer.progress import CandidatesFound, CandidateTried, Improved
@@ -231,7 +235,6 @@ __all__ = [
     "PlannedTorques",
     "Points",
     "Pose",
-    "PosesAround",
     "Problem",
     "Program",
     "RapidOptions",
@@ -243,6 +246,7 @@ __all__ = [
     "Rest",
     "Robot",
     "Ros2Options",
+    "SampledPoses",
     "Samples",
     "SavingInterval",
     "SavingRange",
@@ -259,12 +263,14 @@ __all__ = [
     "StopPath",
     "StorageUse",
     "TableOptions",
+    "Tool",
     "ToolCone",
     "ToolPath",
     "TorqueInfeasible",
     "Trajectory",
     "TriangleMesh",
     "UnknownRobot",
+    "UnknownTool",
     "UnreachablePose",
     "UnreachableTarget",
     "UnreachableTargets",
@@ -280,6 +286,7 @@ __all__ = [
     "identify",
     "inverse_kinematics",
     "load_robot",
+    "load_tool",
     "optimize",
     "optimize_many",
     "pareto",
@@ -287,5 +294,6 @@ __all__ = [
     "read_log",
     "replay",
     "robot_names",
+    "tool_names",
     "what_if",
 ]

@@ -1,6 +1,4 @@
-"""The check of arrays from a file or a caller: numbers, of the right shape, finite. They are
-read-only from then on.
-"""
+"""Validation of arrays from files and callers: numeric, finite, of the right shape, read-only."""
 
 from __future__ import annotations
 
@@ -10,10 +8,15 @@ from joulepath.models.robot import Array
 
 
 def read_only(values: object, shape: tuple[int, ...], name: str) -> Array:
-    """A read-only copy of `values` as an array of that shape, in which -1 stands for any length.
+    """A read-only array with a copy of `values`.
 
-    Raises ValueError if the values are not numbers, not of that shape or not finite; the message
-    begins with `name`.
+    Args:
+        values: the numbers.
+        shape: the shape required; -1 stands for any length.
+        name: subject of the error message.
+
+    Raises:
+        ValueError: the values are not numbers, not finite, or of another shape.
     """
     try:
         array = np.array(values, dtype=float)

@@ -1,9 +1,9 @@
-"""Whether capsules hold surfaces: every point of every triangle, not only its corners.
+"""Proof that capsules cover surfaces: every point of every triangle, not only the corners.
 
-A capsule is convex: it holds a triangle if, and only if, it holds the three corners. A triangle
-that no single capsule holds is cut in two at the middle of its longest edge, until every piece lies
-in one capsule. This is a proof for every point of the surface; no point is sampled. A corner of a
-piece that is in no capsule is a point of the surface outside.
+A capsule is convex, so it contains a triangle if and only if it contains the three corners. A
+triangle without a containing capsule is bisected at its longest edge until every piece lies in one
+capsule. This proves the cover for every point of the surface, without sampling. A corner of a piece
+outside all capsules is an uncovered point.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy as np
 
 from joulepath.models.robot import Array, LinkCapsule
 
-# pieces with a longest edge below this [m] are not cut any further: they lie outside, or where
-# capsules only touch
 SMALLEST = 2e-5
+"""Longest edge [m] below which a piece is not bisected further: it lies outside, or where two
+capsules touch."""
 
 
 def outside(points: Array, capsules: Sequence[LinkCapsule]) -> Array:
-    """Signed distances (m, k) [m] of points (k, 3) [m] from each of m capsules: negative inside."""
+    """Signed distances (m, k) [m] of points (k, 3) [m] from m capsules; negative inside."""
     distances = []
     for capsule in capsules:
         begin, along = capsule.axis[0], capsule.axis[1] - capsule.axis[0]
@@ -33,11 +33,10 @@ def outside(points: Array, capsules: Sequence[LinkCapsule]) -> Array:
 
 
 def not_held(triangles: Array, capsules: Sequence[LinkCapsule]) -> Array:
-    """Pieces (k, 3, 3) [m] of triangles (t, 3, 3) [m] that no capsule is shown to hold; none if all
-    are held.
+    """Uncovered pieces (k, 3, 3) [m] of triangles (t, 3, 3) [m] in the frame of the capsules.
 
-    A piece has a corner outside of all capsules, or its longest edge is below SMALLEST. Triangles
-    and capsules are in the same frame.
+    The result is empty if the cover is proven. Otherwise every piece has a corner outside all
+    capsules, or a longest edge below SMALLEST.
     """
     found, pieces = [np.empty((0, 3, 3))], triangles
     while len(pieces):

@@ -1,15 +1,14 @@
 """Fit capsules to the links: `python -m joulepath.models.fit_capsules ROBOT MESHES [link …]` prints
 rows for figures.yaml.
 
-MESHES is a folder as in `joulepath.models.meshes`. The fit starts from the capsules in figures.yaml
-and is local: how many capsules a link has, and where each of them begins, is the choice of who
-writes the rows.
+MESHES is a folder as in `joulepath.models.meshes`. The fit is local and starts from the capsules in
+figures.yaml: the author of the rows chooses their number and first positions.
 
-It minimises ∫ (OFFSET + d) dV over what is inside of a capsule and outside of the link: d [m] is
-the distance from the link, so that far overhang costs most. What lies inside of an adjacent link at
-every angle of the joint costs nothing, as nothing else can be there. Samples of the surfaces
-outside of all capsules are penalised. Both are smoothed, more and more sharply. Radii then grow
-until every triangle is held: see `capsule_cover`.
+The objective is ∫ (offset + d) dV over the volume inside a capsule and outside the link, where d
+[m] is the distance from the link. Volume inside an adjacent link at every joint angle is free of
+charge, since no obstacle can be there. Surface samples outside all capsules are penalised. Both
+terms are smoothed with decreasing width. Finally radii grow until every triangle is covered: see
+`capsule_cover`.
 """
 
 from __future__ import annotations
@@ -29,33 +28,61 @@ from joulepath.models.meshes import link_surfaces, sampled
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, Mask, Robot
 
-# edge of a grid cell, and how far [m] from the link overhang is weighed
-CELL, REACH = 0.003, 0.08
-OFFSET = 0.002
-# smoothing [m] and weight of the penalty of each stage, and its most iterations
-STAGES = (
-    (0.004, 1e-2, 40),
-    (0.002, 5e-2, 40),
-    (0.001, 3e-1, 60),
-    (0.001, 3e-1, 60),
-    (0.001, 3e-1, 60),
-)
-# surface samples stay this far inside [m]; what the last stage leaves outside is mended by larger
-# radii
-INSIDE = 3e-4
-# unit of the variables [m]: the first step of the solver is of length 1
-UNIT = 0.004
-LEAST_RADIUS, GREATEST_RADIUS = 0.015, 0.15
-SURFACE_SAMPLES, CHECKED_SAMPLES, CELLS, TURNS = 1500, 100_000, 6000, 36
-# the last digit of the figures [m]
-DIGIT = 1e-4
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the fit."""
+
+    width: float
+    """Smoothing length [m]."""
+    penalty: float
+    """Weight of uncovered samples."""
+    iterations: int
+    """Most iterations."""
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Settings of the fit."""
+
+    cell: float = 0.003
+    """Edge of a grid cell [m]."""
+    reach: float = 0.08
+    """Distance from the link [m] up to which overhang is weighted."""
+    offset: float = 0.002
+    """Weight of overhang at distance zero [m]."""
+    stages: tuple[Stage, ...] = (
+        Stage(0.004, 1e-2, 40),
+        Stage(0.002, 5e-2, 40),
+        *[Stage(0.001, 3e-1, 60)] * 3,
+    )
+    inside: float = 3e-4
+    """Depth of the surface samples below the capsules' surfaces [m]; larger radii mend the rest."""
+    unit: float = 0.004
+    """Unit of the variables [m], the length of the solver's first step."""
+    least_radius: float = 0.015
+    """Least radius [m]."""
+    greatest_radius: float = 0.15
+    """Greatest radius [m]."""
+    surface_samples: int = 1500
+    """Surface samples of the first stage."""
+    checked_samples: int = 100_000
+    """Surface samples from which uncovered ones are added after each stage."""
+    cells: int = 6000
+    """Random grid cells."""
+    turns: int = 36
+    """Angles of a joint at which an adjacent link is placed."""
+    digit: float = 1e-4
+    """Last digit of the figures [m]."""
+
+
+FIT = FitSettings()
 
 
 @dataclass(frozen=True)
 class _Solid:
-    """A link on a grid: lowest corner [m], cells inside of its surfaces, distance [m] of every cell
-    from the link.
-    """
+    """A link on a grid: lowest corner [m], cells inside its surfaces, distances [m] of all
+    cells."""
 
     corner: Array
     is_inside: Mask
@@ -63,7 +90,7 @@ class _Solid:
 
     def contains(self, points: Array) -> Mask:
         """Whether points (k, 3) [m] are in a cell inside."""
-        index = np.floor((points - self.corner) / CELL).astype(int)
+        index = np.floor((points - self.corner) / FIT.cell).astype(int)
         in_grid = ((index >= 0) & (index < self.is_inside.shape)).all(axis=1)
         found = np.zeros(len(points), dtype=bool)
         found[in_grid] = self.is_inside[tuple(index[in_grid].T)]
@@ -72,9 +99,7 @@ class _Solid:
 
 @dataclass(frozen=True)
 class _Task:
-    """What the fit sees of a link: cells (c, 3) [m] outside, their weights (c,), and points of
-    surfaces (p, 3) [m].
-    """
+    """Data of the fit: cells (c, 3) [m] outside, their weights (c,), surface points (p, 3) [m]."""
 
     cells: Array
     weights: Array
@@ -82,89 +107,89 @@ class _Task:
 
 
 def fit(robot: Robot, folder: Path, link: int) -> list[LinkCapsule]:
-    """Capsules that hold the link, from those that the robot has."""
+    """Capsules covering a link, by a fit from the capsules of the robot."""
     rng = np.random.default_rng(0)
     surfaces = list(link_surfaces(folder, robot.name, link).values())
     checked = _outermost(
-        np.vstack([sampled(each, CHECKED_SAMPLES, rng) for each in surfaces]), surfaces
+        np.vstack([sampled(each, FIT.checked_samples, rng) for each in surfaces]), surfaces
     )
     task = replace(
         _weighed(robot, folder, link, rng),
-        points=checked[rng.choice(len(checked), SURFACE_SAMPLES)],
+        points=checked[rng.choice(len(checked), FIT.surface_samples)],
     )
     z = np.array([[*c.axis.ravel(), c.radius] for c in robot.capsules if c.link == link]).ravel()
-    lower, upper = (np.tile([*[far] * 6, radius], len(z) // 7) / UNIT for far, radius in _RANGES)
+    lower, upper = (
+        np.tile([*[far] * 6, radius], len(z) // 7) / FIT.unit for far, radius in _RANGES
+    )
     bounds = Bounds(lower, upper)
-    for width, penalty, most in STAGES:
+    for stage in FIT.stages:
         found = minimize(
             _cost,
-            z / UNIT,
-            (task, width, penalty),
+            z / FIT.unit,
+            (task, stage.width, stage.penalty),
             "L-BFGS-B",
             jac=True,
             bounds=bounds,
-            options={"maxiter": most},
+            options={"maxiter": stage.iterations},
         )
-        z = found.x * UNIT
-        missed = checked[outside(checked, _capsules(z, link)).min(axis=0) > -INSIDE]
+        z = found.x * FIT.unit
+        missed = checked[outside(checked, _capsules(z, link)).min(axis=0) > -FIT.inside]
         task = replace(
             task, points=np.vstack([task.points, missed[rng.permutation(len(missed))[:1000]]])
         )
     capsules = _capsules(z, link)
     for _ in range(2):
-        # where one had to grow, another may be larger than it has to be
+        # After one capsule has grown, another may be larger than necessary.
         capsules = _grown(_rounded(capsules, checked), np.concatenate(surfaces))
     return capsules
 
 
-_RANGES = ((-1.0, LEAST_RADIUS), (1.0, GREATEST_RADIUS))
+_RANGES = ((-1.0, FIT.least_radius), (1.0, FIT.greatest_radius))
 
 
 def _weighed(robot: Robot, folder: Path, link: int, rng: np.random.Generator) -> _Task:
-    """The cells around a link that may be in collision, each with OFFSET + distance, times its
-    volume.
-    """
+    """Cells around a link in which an obstacle may be, weighted by (offset + distance) · volume."""
     solid = _solid(folder, robot, link)
-    index = np.argwhere((solid.distance > 0) & (solid.distance < REACH))
-    cells, distance = solid.corner + (index + 0.5) * CELL, solid.distance[tuple(index.T)]
+    index = np.argwhere((solid.distance > 0) & (solid.distance < FIT.reach))
+    cells, distance = solid.corner + (index + 0.5) * FIT.cell, solid.distance[tuple(index.T)]
     placements = [placement.homogeneous for placement in robot.model.jointPlacements]
     is_free = np.ones(len(cells), dtype=bool)
-    # not the last link: a tool may reach into its capsule, and is compared with the link before it
+    # The last link does not count: a tool, which may reach into it, is checked against the link
+    # before.
     for other in {link - 1, link + 1} & set(range(robot.nq)):
         neighbour, always = _solid(folder, robot, other), np.ones(len(cells), dtype=bool)
-        for angle in np.linspace(0, 2 * np.pi, TURNS, endpoint=False):
+        for angle in np.linspace(0, 2 * np.pi, FIT.turns, endpoint=False):
             turned = placements[max(link, other)] @ _about_z(angle)
             T = turned if other < link else np.linalg.inv(turned)
             always &= neighbour.contains(cells @ T[:3, :3].T + T[:3, 3])
         is_free &= ~always
-    chosen = rng.permutation(np.flatnonzero(is_free))[:CELLS]
-    volume = CELL**3 * is_free.sum() / len(chosen)
-    return _Task(cells[chosen], (OFFSET + distance[chosen]) * volume, np.empty((0, 3)))
+    chosen = rng.permutation(np.flatnonzero(is_free))[: FIT.cells]
+    volume = FIT.cell**3 * is_free.sum() / len(chosen)
+    return _Task(cells[chosen], (FIT.offset + distance[chosen]) * volume, np.empty((0, 3)))
 
 
 def _solid(folder: Path, robot: Robot, link: int) -> _Solid:
-    """The grid of a link: inside is what the outside does not reach through its surfaces."""
+    """The grid of a link: cells not connected to the outside are inside."""
     rng = np.random.default_rng(0)
     surfaces = link_surfaces(folder, robot.name, link).values()
     points = np.vstack(
         [np.vstack([sampled(each, 1_000_000, rng), each.reshape(-1, 3)]) for each in surfaces]
     )
-    corner = points.min(axis=0) - REACH - 2 * CELL
+    corner = points.min(axis=0) - FIT.reach - 2 * FIT.cell
     is_wall = np.zeros(
-        np.ceil((points.max(axis=0) + REACH + 2 * CELL - corner) / CELL).astype(int), dtype=bool
+        np.ceil((points.max(axis=0) + FIT.reach + 2 * FIT.cell - corner) / FIT.cell).astype(int),
+        dtype=bool,
     )
-    is_wall[tuple(((points - corner) / CELL).astype(int).T)] = True
+    is_wall[tuple(((points - corner) / FIT.cell).astype(int).T)] = True
     parts = label(~is_wall)[0]
     is_outside = parts == parts[0, 0, 0]
-    return _Solid(corner, ~is_outside, distance_transform_edt(is_outside) * CELL)
+    return _Solid(corner, ~is_outside, distance_transform_edt(is_outside) * FIT.cell)
 
 
 def _outermost(points: Array, surfaces: list[Array]) -> Array:
-    """The points (k, 3) without those that a coarse grid shows to be deep inside: most of a
-    detailed mesh is.
-    """
-    corner = np.concatenate(surfaces).reshape(-1, 3).min(axis=0) - 4 * CELL
-    index = ((points - corner) / CELL).astype(int)
+    """Points (k, 3) near the outside by a coarse grid: most of a detailed mesh is deep inside."""
+    corner = np.concatenate(surfaces).reshape(-1, 3).min(axis=0) - 4 * FIT.cell
+    index = ((points - corner) / FIT.cell).astype(int)
     is_wall = np.zeros(index.max(axis=0) + 5, dtype=bool)
     is_wall[tuple(index.T)] = True
     parts = label(~is_wall)[0]
@@ -172,25 +197,24 @@ def _outermost(points: Array, surfaces: list[Array]) -> Array:
 
 
 def _cost(scaled: Array, task: _Task, width: float, penalty: float) -> tuple[float, Array]:
-    """Weighed overhang [cm³ · m] and penalty, and the gradient in the scaled variables: two ends
-    and a radius each.
+    """Weighted overhang [cm³ · m] plus penalty, and its gradient in the scaled variables.
+
+    The variables of a capsule are both ends of its axis and the radius.
     """
-    rows = (scaled * UNIT).reshape(-1, 7)
+    rows = (scaled * FIT.unit).reshape(-1, 7)
     gradient = np.zeros_like(rows)
     depth, pull = _nearest(rows, task.cells)
     share = 1 / (1 + np.exp(np.clip(depth / width, -40, 40)))
     pull(gradient, -task.weights * share * (1 - share) / width)
     out, pull = _nearest(rows, task.points)
-    excess = np.maximum(out + INSIDE, 0)
+    excess = np.maximum(out + FIT.inside, 0)
     pull(gradient, 2 * penalty * excess)
     value = float(task.weights @ share + penalty * (excess @ excess))
-    return 1e6 * value, 1e6 * UNIT * gradient.ravel()
+    return 1e6 * value, 1e6 * FIT.unit * gradient.ravel()
 
 
 def _nearest(rows: Array, points: Array) -> tuple[Array, _Pull]:
-    """Signed distance (k,) [m] of points (k, 3) from the nearest capsule, and what adds its
-    gradients.
-    """
+    """Signed distance (k,) [m] of points (k, 3) from the nearest capsule, and its derivative."""
     distance, toward, share = np.empty((len(rows), len(points))), [], []
     for k, row in enumerate(rows):
         begin, along = row[:3], row[3:6] - row[:3]
@@ -206,7 +230,8 @@ def _nearest(rows: Array, points: Array) -> tuple[Array, _Pull]:
 
 @dataclass(frozen=True)
 class _Pull:
-    """Directions from the nearest capsules to points, and where along their axes."""
+    """Derivative of the distances: directions from the nearest capsules, shares along their
+    axes."""
 
     nearest: npt.NDArray[np.intp]
     toward: list[Array]
@@ -227,37 +252,37 @@ def _capsules(z: Array, link: int) -> list[LinkCapsule]:
 
 
 def _rounded(capsules: list[LinkCapsule], samples: Array) -> list[LinkCapsule]:
-    """Axes to DIGIT, and each radius in turn as small as the samples (k, 3) [m] that no other
-    capsule holds allow.
+    """Capsules with rounded axes and least radii.
 
-    A sample that no capsule holds belongs to the nearest.
+    Radii shrink in turn as far as samples (k, 3) [m] outside all other capsules allow. An uncovered
+    sample belongs to the nearest capsule.
     """
-    result = [replace(c, axis=np.round(c.axis / DIGIT) * DIGIT + 0.0) for c in capsules]
+    result = [replace(c, axis=np.round(c.axis / FIT.digit) * FIT.digit + 0.0) for c in capsules]
     for k, capsule in enumerate(result):
         distances = outside(samples, result)
         is_own = (np.delete(distances, k, axis=0) > 0).all(axis=0) & (distances.argmin(axis=0) == k)
         reach = capsule.radius + float(distances[k, is_own].max(initial=-capsule.radius))
-        result[k] = replace(capsule, radius=_up(max(reach, LEAST_RADIUS)))
+        result[k] = replace(capsule, radius=_up(max(reach, FIT.least_radius)))
     return result
 
 
 def _grown(capsules: list[LinkCapsule], triangles: Array) -> list[LinkCapsule]:
-    """The capsules, with radii grown until they hold every triangle (t, 3, 3) [m]."""
+    """The capsules with radii grown until they cover all triangles (t, 3, 3) [m]."""
     result, missed = list(capsules), not_held(triangles, capsules)
     while len(missed):
         distances = outside(missed.reshape(-1, 3), result)
         least, nearest = distances.min(axis=0), distances.argmin(axis=0)
         for k in set(nearest.tolist()):
-            # a piece whose corners all are inside lies where capsules only touch
-            growth = max(float(least[nearest == k].max()), DIGIT)
+            # A piece with all corners inside lies where two capsules touch.
+            growth = max(float(least[nearest == k].max()), FIT.digit)
             result[k] = replace(result[k], radius=_up(result[k].radius + growth))
-        # what was held is held by larger capsules, too
+        # Larger capsules still cover all pieces covered before.
         missed = not_held(missed, result)
     return result
 
 
 def _up(radius: float) -> float:
-    return float(np.ceil(radius / DIGIT - 1e-6) * DIGIT)
+    return float(np.ceil(radius / FIT.digit - 1e-6) * FIT.digit)
 
 
 def _about_z(angle: float) -> Array:
@@ -265,15 +290,13 @@ def _about_z(angle: float) -> Array:
 
 
 def main() -> None:
-    """Prints the rows of the links named, or of all."""
+    """Print the rows of the given links, or of all links."""
     robot, folder = load_robot(sys.argv[1]), Path(sys.argv[2])
     for name in sys.argv[3:] or robot.link_names:
         print(f"  {name}:\n    value:")
         for capsule in fit(robot, folder, robot.link_names.index(name)):
-            print(
-                f"      - [{', '.join(f'{x:.4f}' for x in [*capsule.axis.ravel(), capsule.radius])}]",  # noqa: E501
-                flush=True,
-            )
+            row = ", ".join(f"{x:.4f}" for x in [*capsule.axis.ravel(), capsule.radius])
+            print(f"      - [{row}]", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,19 +1,19 @@
-"""Fit the friction laws to the friction table: `python -m joulepath.models.fit_friction [robot]`
-prints the coefficients.
+"""Fit of the friction laws to a friction table: `python -m joulepath.models.fit_friction [robot]`.
 
-Both laws are members of `joulepath.models.robot.FrictionLaw` with non-negative coefficients, fitted
-on relative errors:
+Both laws are instances of `joulepath.models.robot.FrictionLaw` with non-negative coefficients,
+fitted to relative errors:
 
-- `curved`: least worst error over the table. For a given `speed` that is a linear program in
-  coulomb, curved and
-  viscous (Boyd and Vandenberghe, Convex Optimization, 6.1.1), so the fit is a search over `speed`
-  alone.
-- `coulomb_viscous`: least squares with `curved` held at zero.
+- `curved`: least worst error over the table. For a given `speed` this is a linear program in
+  coulomb,
+  curved and viscous (Boyd and Vandenberghe, Convex Optimization, 6.1.1), so that the fit is a
+  one-dimensional search over `speed`.
+- `coulomb_viscous`: least squares without `curved`.
 """
 
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linprog, minimize_scalar, nnls
@@ -21,15 +21,29 @@ from scipy.optimize import linprog, minimize_scalar, nnls
 from joulepath.models.registry import load_figures
 from joulepath.models.robot import Array
 
-# range of `speed` [rad/s]: below it, curved · asinh(v / speed) is almost logarithmic over the
-# table, above it linear
-LEAST_SPEED, GREATEST_SPEED = 1e-3, 1e1
-STARTS = 60
+
+@dataclass(frozen=True)
+class SpeedSearch:
+    """Settings of the search over `speed`."""
+
+    least: float = 1e-3
+    """Least `speed` [rad/s]; below it, curved · asinh(v / speed) is nearly logarithmic."""
+    greatest: float = 1e1
+    """Greatest `speed` [rad/s]; above it, the term is nearly linear over the table."""
+    points: int = 60
+    """Grid points, before a bounded search between two of them."""
+
+
+SEARCH = SpeedSearch()
 
 
 def fit_curved(speed: Array, torque: Array, knee: float) -> tuple[float, float, float, float]:
-    """Coefficients coulomb, curved, speed, viscous of one joint, from torque (k,) [N·m] at speed
-    (k,) [rad/s].
+    """Coefficients coulomb, curved, speed, viscous of one joint.
+
+    Args:
+        speed: speeds (k,) [rad/s] of the table.
+        torque: friction torques (k,) [N·m].
+        knee: speed [rad/s] over which Coulomb friction is smoothed.
     """
 
     def best(log_speed: float) -> tuple[float, Array]:
@@ -47,9 +61,9 @@ def fit_curved(speed: Array, torque: Array, knee: float) -> tuple[float, float, 
         )
         return float(answer.x[3]), np.asarray(answer.x[:3])
 
-    grid = np.linspace(np.log(LEAST_SPEED), np.log(GREATEST_SPEED), STARTS)
+    grid = np.linspace(np.log(SEARCH.least), np.log(SEARCH.greatest), SEARCH.points)
     middle = int(np.argmin([best(s)[0] for s in grid]))
-    bounds = grid[max(middle - 1, 0)], grid[min(middle + 1, STARTS - 1)]
+    bounds = grid[max(middle - 1, 0)], grid[min(middle + 1, SEARCH.points - 1)]
     found = float(
         minimize_scalar(
             lambda s: best(s)[0], bounds=bounds, method="bounded", options={"xatol": 1e-10}
@@ -62,9 +76,7 @@ def fit_curved(speed: Array, torque: Array, knee: float) -> tuple[float, float, 
 def fit_coulomb_viscous(
     speed: Array, torque: Array, knee: float
 ) -> tuple[float, float, float, float]:
-    """Coefficients coulomb, curved = 0, speed = 1 (without effect), viscous of one joint; arguments
-    as `fit_curved`.
-    """
+    """Coefficients coulomb, curved = 0, speed = 1 (without effect), viscous; see `fit_curved`."""
     terms = np.column_stack([speed / np.hypot(speed, knee), speed]) / torque[:, None]
     (coulomb, viscous), _ = nnls(terms, np.ones(speed.size))
     return float(coulomb), 0.0, 1.0, float(viscous)

@@ -1,6 +1,5 @@
-"""What an arm looks like by its own figures: tubes between the joints, and round housings with caps
-at them.
-"""
+"""Appearance of an arm from its figures: tubes between joints, round housings with caps at
+joints."""
 
 from __future__ import annotations
 
@@ -14,23 +13,32 @@ from joulepath.models.robot import Array
 
 Kind = Literal["housing", "cap", "ring", "tube", "foot"]
 
-# points of a capsule's axis that are looked at
-SAMPLES = 9
-# of a capsule's radius: how near its axis is to the joint's, to count as the joint's housing
-NEAR = 0.7
-# the capsules hold the meshes, so that what they hold is a little slimmer
-SLIMMER = 0.94
-# of the z axis of the first joint: from here on it is upright
-UPRIGHT = 0.99
-# height [m] of the foot, and its radius over that of the first housing
-FOOT, WIDER = 0.02, 1.22
+
+@dataclass(frozen=True)
+class FormSettings:
+    """Proportions of the drawing."""
+
+    samples: int = 9
+    """Sampled points of a capsule's axis."""
+    housing_distance: float = 0.7
+    """Largest distance of a capsule's axis from a joint axis, over its radius, at the joint's
+    housing."""
+    slimming: float = 0.94
+    """Radius of a body over the radius of the capsule around it."""
+    upright: float = 0.99
+    """Least vertical component of the first joint axis of an upright arm."""
+    foot_height: float = 0.02
+    """Height of the foot [m]."""
+    foot_width: float = 1.22
+    """Radius of the foot over the radius of the first housing."""
+
+
+FORM = FormSettings()
 
 
 @dataclass(frozen=True)
 class Body:
-    """A round body about the line from `start` to `end` [m] in the frame of its link, with a radius
-    [m].
-    """
+    """A round body about the line from `start` to `end` [m] in the link frame, with radius [m]."""
 
     kind: Kind
     start: list[float]
@@ -40,9 +48,7 @@ class Body:
 
 @dataclass
 class _Housing:
-    """What a link's capsules fill about a joint's axis, the z axis of `T` (4, 4): from `low` to
-    `high` [m].
-    """
+    """Part of a link about a joint axis, the z axis of `T` (4, 4), from `low` to `high` [m]."""
 
     T: Array
     low: float
@@ -72,8 +78,7 @@ def link_bodies(figures: dict[str, Any]) -> list[list[Body]]:
     ]
     placements = [_placement(row) for row in kinematics["joint_origin"]["value"]]
     typical = max(float(np.linalg.norm(T[:3, 3])) for T in placements) / 8
-    # the housings of both links at every joint, about the same axis and measured from the same
-    # point
+    # housings of both links at every joint, about the same axis and with the same origin
     pairs = [
         (_housing(capsules[joint], T, typical), _housing(capsules[joint + 1], np.eye(4), typical))
         for joint, T in enumerate(placements)
@@ -91,7 +96,9 @@ def link_bodies(figures: dict[str, Any]) -> list[list[Body]]:
         begin = (pairs[link - 1][1].middle, pairs[link - 1][1].radius) if link else foot
         end = (pairs[link][0].middle, pairs[link][0].radius) if link < len(pairs) else last
         bodies[link] += _tube(own, *begin, *end, is_base=link == 0)
-    bodies[0].append(Body("foot", [0.0] * 3, [0.0, 0.0, FOOT], WIDER * pairs[0][0].radius))
+    bodies[0].append(
+        Body("foot", [0.0] * 3, [0.0, 0.0, FORM.foot_height], FORM.foot_width * pairs[0][0].radius)
+    )
     return bodies
 
 
@@ -103,20 +110,21 @@ def _placement(origin: list[float]) -> Array:
 
 
 def _housing(capsules: Array, T: Array, typical: float) -> _Housing:
-    """The part along the z axis of T that a link's capsules (n, 7) fill around it; a `typical` one
-    [m] without any.
+    """The housing formed by a link's capsules (n, 7) about the z axis of T.
+
+    Without capsules at this axis, its size follows from the `typical` length [m].
     """
-    start, end, radius = capsules[:, :3], capsules[:, 3:6], np.repeat(capsules[:, 6], SAMPLES)
-    share = np.linspace(0, 1, SAMPLES)[:, None]
+    start, end, radius = capsules[:, :3], capsules[:, 3:6], np.repeat(capsules[:, 6], FORM.samples)
+    share = np.linspace(0, 1, FORM.samples)[:, None]
     points = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3) - T[:3, 3]
     along = points @ T[:3, 2]
     aside = np.linalg.norm(points - along[:, None] * T[:3, 2], axis=1)
-    near = aside <= NEAR * radius
+    near = aside <= FORM.housing_distance * radius
     if not near.any():
         small = min(0.7 * float(radius[aside.argmin()]), typical) if len(radius) else typical / 2
         return _Housing(T, -small, small, small)
     along, aside, radius = along[near], aside[near], radius[near]
-    wide = SLIMMER * np.sqrt(np.maximum(radius**2 - aside**2, 0.4 * radius**2))
+    wide = FORM.slimming * np.sqrt(np.maximum(radius**2 - aside**2, 0.4 * radius**2))
     return _Housing(
         T,
         float((along - 0.8 * radius).min()),
@@ -126,7 +134,7 @@ def _housing(capsules: Array, T: Array, typical: float) -> _Housing:
 
 
 def _meet(first: _Housing, second: _Housing) -> None:
-    """Lets the two housings at a joint end where they meet."""
+    """Trim the two housings of a joint to a common border."""
     lower, upper = (
         (first, second) if first.low + first.high < second.low + second.high else (second, first)
     )
@@ -137,16 +145,16 @@ def _meet(first: _Housing, second: _Housing) -> None:
 
 
 def _ground(placement: Array, foot: _Housing) -> None:
-    """Nothing of the base is below the ground that it stands on."""
+    """Trim the base at the ground."""
     up, height = placement[2, 2], placement[2, 3]
-    if up > UPRIGHT:
+    if up > FORM.upright:
         foot.low = max(foot.low, -height)
-    if up < -UPRIGHT:
+    if up < -FORM.upright:
         foot.high = min(foot.high, height)
 
 
 def _bodies(own: _Housing, other: _Housing) -> list[Body]:
-    """A housing, and the cap on the side that is away from the other link's."""
+    """A housing with a cap on its outer side."""
     outward = -1 if own.low + own.high < other.low + other.high else 1
     inner, outer = (own.low, own.high) if outward > 0 else (own.high, own.low)
     edge = outer - outward * 0.16 * own.radius
@@ -166,8 +174,9 @@ def _ring(own: _Housing, other: _Housing) -> Body:
 def _tube(
     capsules: Array, start: Array, start_radius: float, end: Array, end_radius: float, is_base: bool
 ) -> list[Body]:
-    """The tube between two ends of a link, as thick as its long capsules (n, 7); none where the
-    ends overlap.
+    """The tube between the ends of a link, as thick as its long capsules (n, 7).
+
+    Overlapping ends need no tube.
     """
     span = float(np.linalg.norm(end - start))
     if span < 0.35 * (start_radius + end_radius):
@@ -175,5 +184,5 @@ def _tube(
     lengths = np.linalg.norm(capsules[:, 3:6] - capsules[:, :3], axis=1)
     long = capsules[lengths > 0.4 * span, 6]
     widest = 0.92 * min(start_radius, end_radius)
-    slim = min(widest, SLIMMER * float(long.max()) if len(long) else 0.8 * widest)
+    slim = min(widest, FORM.slimming * float(long.max()) if len(long) else 0.8 * widest)
     return [Body("tube", start.tolist(), end.tolist(), widest if is_base else slim)]

@@ -1,6 +1,4 @@
-"""A robot from its figures: section, figure, then value, unit, source, trust and note, as in a
-`figures.yaml`.
-"""
+"""A robot from its figures: section, figure, then value, unit, source, trust and note."""
 
 from __future__ import annotations
 
@@ -25,14 +23,12 @@ from joulepath.models.robot import (
 from joulepath.models.shape_sizes import check_lengths
 from joulepath.models.urdf import urdf_of
 
-# figures of the section `collision` that are no link's capsules
+# figures of the section `collision` beside the capsules of links
 NO_LINKS = ("elbow", "meshes", "never_meet")
 
 
 def robot_of(name: str, figures: dict[str, Any]) -> Robot:
-    """The robot that the figures describe. Raises ValueError if one of them has not one entry for
-    each joint.
-    """
+    """The robot of these figures. Raises ValueError if an array does not have nq entries."""
     model = pin.buildModelFromXML(urdf_of(name, figures))
     drives = Drives(
         **{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__}
@@ -71,9 +67,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
 
 
 def _joints(figure: dict[str, Any], nq: int) -> Array:
-    """Value of a figure as a read-only array (nq,): the robot is shared by all who load it. Raises
-    ValueError.
-    """
+    """Value of a figure as an array (nq,), read-only since robots are shared. Raises ValueError."""
     return read_only(figure["value"], (nq,), "A figure over joints")
 
 

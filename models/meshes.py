@@ -1,7 +1,8 @@
-"""Triangles of the meshes that the capsules of a robot hold, in its link frames.
+"""Triangles of the meshes covered by the capsules of a robot, in link frames.
 
-The meshes are no part of this package: a folder has them as `visual/NAME.obj` and
-`collision/NAME.obj`, as the package `airo-models` on PyPI ships those of the maker's description.
+The meshes are not part of this package. A folder contains `visual/NAME.obj` and
+`collision/NAME.obj`, like the package `airo-models` on PyPI with the meshes of the maker's
+description.
 """
 
 from __future__ import annotations
@@ -14,27 +15,25 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 
-# what is shown, in detail, and the coarser surfaces that the maker made for collision checking
+# detailed surfaces for display, and the maker's coarser surfaces for collision checks
 KINDS = ("visual", "collision")
-# where the meshes stand: of upper arm, forearm and wrists the shift [m] along the joint's axis,
-# which is all that differs between arms of one maker. From
-# github.com/UniversalRobots/Universal_Robots_ROS2_Description
+# shifts [m] of the meshes of upper arm, forearm and wrists along the joint axis, the only
+# difference between these arms; from github.com/UniversalRobots/Universal_Robots_ROS2_Description
 SHIFTS = {
     "ur3e": (0.12, 0.027, -0.104, -0.08535, -0.0921),
     "ur5e": (0.138, 0.007, -0.127, -0.0997, -0.0989),
     "ur10e": (0.1762, 0.0393, -0.135, -0.12, -0.1168),
     "ur16e": (0.176, 0.04, -0.135, -0.12, -0.1168),
 }
-# file of each link, from the base on, and roll, pitch, yaw [rad] of its mesh in the link frame
-_ALONG, _UPRIGHT = (np.pi / 2, 0.0, -np.pi / 2), (np.pi / 2, 0.0, 0.0)
+# files of the links, base first, and roll, pitch, yaw [rad] of the meshes in the link frames
+_ALONG = (np.pi / 2, 0.0, -np.pi / 2)
+_UPRIGHT = (np.pi / 2, 0.0, 0.0)
 _FILES = ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3")
 _TURNS = ((0.0, 0.0, np.pi), (0.0, 0.0, np.pi), _ALONG, _ALONG, _UPRIGHT, (0.0, 0.0, 0.0), _UPRIGHT)
 
 
 def installed(robot: str) -> Path | None:
-    """The folder of a robot's meshes in the package `airo-models`, which need not be imported; None
-    without it.
-    """
+    """The folder of a robot's meshes in the package `airo-models`; None without the package."""
     package = find_spec("airo_models")
     if robot not in SHIFTS or package is None or package.origin is None:
         return None
@@ -48,7 +47,7 @@ def mesh_file(folder: Path, kind: str, link: int) -> Path:
 
 
 def mesh_placement(robot: str, link: int) -> pin.SE3:
-    """Where the mesh of a link stands in the link's frame. `robot` is one of SHIFTS."""
+    """Pose of the mesh of a link in the link frame. `robot` is one of SHIFTS."""
     position = np.array([0.0, 0.0, (0.0, 0.0, *SHIFTS[robot])[link]])
     return pin.SE3(pin.rpy.rpyToMatrix(*_TURNS[link]), position)
 
@@ -69,7 +68,7 @@ def sampled(triangles: Array, count: int, rng: np.random.Generator) -> Array:
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     chosen = rng.choice(len(triangles), count, p=area / area.sum())
     shares = rng.uniform(size=(count, 2, 1))
-    # the far half of the parallelogram is folded back onto the triangle
+    # Fold the far half of the parallelogram back onto the triangle.
     shares = np.where(shares.sum(axis=1, keepdims=True) > 1, 1 - shares, shares)
     return np.asarray(triangles[chosen, 0] + (shares * sides[chosen]).sum(axis=1))
 
@@ -82,7 +81,7 @@ def _triangles(path: Path) -> Array:
         if kind == "v":
             vertices.append([float(x) for x in rest[:3]])
         elif kind == "f":
-            # numbered from 1; of `vertex/texture/normal` only the first counts
+            # `vertex/texture/normal`, numbered from 1: only the vertex counts.
             corners = [int(corner.split("/")[0]) - 1 for corner in rest]
             faces += [[corners[0], *corners[k : k + 2]] for k in range(1, len(corners) - 1)]
     return np.asarray(np.array(vertices)[np.array(faces)])

@@ -1,13 +1,13 @@
-"""A robot as it looks: the meshes of its maker, simplified, as one GLB file with a node for each
-link.
+"""Simplified meshes of a robot as one GLB file with a node per link.
 
-The nodes are named as the links and stand in the link frames [m]: who draws the file moves each to
-where its link is. Simplification needs the package `fast-simplification`, which is optional, as the
-meshes are.
+Nodes have the names of the links and coordinates in link frames [m], so that a viewer can place
+them. Meshes and the package `fast-simplification` are optional.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,21 +24,29 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 KIND = "visual"
-# of a whole arm; edges of its parts are kept, so that more are left
-FACES = 22_000
-# parts with fewer faces stay as they are
-_SMALL = 100
-# edges that are sharper stay sharp in the light [rad]
-_CREASE = np.radians(35)
-# positions are rounded to these shares of a metre, 0.06 mm, and normals to those of their length:
-# they compress better
-_STEPS, _NORMAL_STEPS = 1 << 14, 1 << 5
+
+
+@dataclass(frozen=True)
+class PictureSettings:
+    """Settings of the simplification."""
+
+    faces: int = 22_000
+    """Desired faces of a whole arm; more remain, since edges of parts are kept."""
+    small: int = 100
+    """Faces below which a part is not simplified."""
+    crease: float = math.radians(35)
+    """Least angle of an edge with sharp shading [rad]."""
+    steps: int = 1 << 14
+    """Steps per metre of rounded positions (0.06 mm), for better compression."""
+    normal_steps: int = 1 << 5
+    """Steps of rounded components of normals, for the same reason."""
+
+
+PICTURE = PictureSettings()
 
 
 def picture_sources(robot: str) -> list[Path] | None:
-    """Files that a robot's picture is made of, base first. None if they, or what simplifies them,
-    are not installed.
-    """
+    """Mesh files of a robot's picture, base first; None without meshes or the simplification."""
     folder = installed(robot)
     if folder is None or find_spec("fast_simplification") is None:
         return None
@@ -46,15 +54,13 @@ def picture_sources(robot: str) -> list[Path] | None:
 
 
 def picture(robot: str) -> bytes:
-    """The GLB file of a robot that has `picture_sources`, with normals and colours. Takes about a
-    second.
-    """
+    """The GLB file of a robot with `picture_sources`, with normals and colours, in about 1 s."""
     import trimesh  # most processes never need it
 
     sources = picture_sources(robot)
     assert sources is not None
     links = [_parts(path) for path in sources]
-    share = FACES / sum(len(part.faces) for parts in links for part, _ in parts)
+    share = PICTURE.faces / sum(len(part.faces) for parts in links for part, _ in parts)
     scene = trimesh.Scene()
     for link, (name, parts) in enumerate(zip(_links(robot), links, strict=True)):
         mesh = _merged(
@@ -70,25 +76,26 @@ def _links(robot: str) -> list[str]:
 
 
 def _parts(path: Path) -> list[tuple[Trimesh, Array]]:
-    """A mesh file by its materials: each part and its colour, red, green, blue and opacity from 0
-    to 255.
+    """Parts of a mesh file by material, with colour and opacity (red, green, blue, alpha: 0 to
+    255).
     """
     import trimesh
 
     parts = []
     for given in trimesh.load_scene(path, process=False).geometry.values():
         part = trimesh.Trimesh(given.vertices, given.faces, process=False)
-        # corners of neighbours are one, so that the surface stays closed
+        # Merge corners of neighbouring faces to keep the surface closed.
         part.merge_vertices(digits_vertex=6)
         parts.append((part, given.visual.material.main_color))
     return parts
 
 
 def _simplified(part: Trimesh, share: float) -> Trimesh:
-    """A part with about this share of its faces. All its corners are corners of the part: capsules
-    hold it, too.
+    """A part with about this share of its faces.
+
+    Its corners are a subset of the original ones, so that capsules still cover it.
     """
-    if len(part.faces) <= _SMALL:
+    if len(part.faces) <= PICTURE.small:
         return part
     simple = part.simplify_quadric_decimation(percent=1 - share)
     simple.vertices = part.vertices[cKDTree(part.vertices).query(simple.vertices)[1]]
@@ -98,10 +105,10 @@ def _simplified(part: Trimesh, share: float) -> Trimesh:
 
 
 def _merged(parts: list[tuple[Trimesh, Array]], T: pin.SE3) -> Trimesh:
-    """One mesh, moved by T. On both sides of a sharp edge it has corners of its own."""
+    """One mesh, moved by T, with separate corners on both sides of sharp edges."""
     import trimesh
 
-    shaded = [trimesh.graph.smooth_shade(part, angle=_CREASE) for part, _ in parts]
+    shaded = [trimesh.graph.smooth_shade(part, angle=PICTURE.crease) for part, _ in parts]
     colours = [
         np.tile(colour, (len(part.vertices), 1))
         for part, (_, colour) in zip(shaded, parts, strict=True)
@@ -109,14 +116,14 @@ def _merged(parts: list[tuple[Trimesh, Array]], T: pin.SE3) -> Trimesh:
     mesh = trimesh.util.concatenate(shaded)
     assert isinstance(mesh, trimesh.Trimesh)
     mesh.apply_transform(T.homogeneous)
-    # where a surface folds, the normals of its faces may cancel
+    # At folds, the normals of adjacent faces may cancel.
     normals = mesh.vertex_normals.copy()
     folded = np.linalg.norm(normals, axis=1) < 0.5
     normals[folded] = mesh.face_normals[mesh.vertex_faces[folded, 0]]
     return trimesh.Trimesh(
-        vertices=np.round(mesh.vertices * _STEPS) / _STEPS,
+        vertices=np.round(mesh.vertices * PICTURE.steps) / PICTURE.steps,
         faces=mesh.faces,
-        vertex_normals=np.round(normals * _NORMAL_STEPS) / _NORMAL_STEPS,
+        vertex_normals=np.round(normals * PICTURE.normal_steps) / PICTURE.normal_steps,
         vertex_colors=np.concatenate(colours),
         process=False,
     )

@@ -14,10 +14,10 @@ import yaml
 from joulepath.models.from_figures import robot_of
 from joulepath.models.robot import Robot
 
-# libyaml where PyYAML has it: ten times as fast
+# libyaml, if PyYAML has it, is ten times as fast
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 FIGURES = "figures.yaml"
-# how the name of a file ends that describes a user's own arm
+# file extensions of descriptions of own arms
 DESCRIPTIONS = (".yaml", ".yml")
 
 
@@ -66,18 +66,17 @@ def load_robot(
         return _identified(load_robot(robot), figures)
     if isinstance(robot, PathLike) or robot.endswith(DESCRIPTIONS):
         from joulepath.models.own_arm.robots import (
-            read_robot,  # its validator takes as long to import as all of this package
+            read_robot,  # importing its validator takes as long as the rest of this package
         )
 
         return read_robot(Path(robot))
-    # robots are compared by identity, and `cache` lets two threads that miss at the same time both
-    # load one
+    # Robots are compared by identity, but `cache` alone would let two threads load one twice.
     with _LOADING:
         return _load_robot(robot)
 
 
 def _identified(robot: Robot, figures: str | PathLike[str] | dict[str, Any]) -> Robot:
-    """The robot with the figures of a document, or of a file. Raises InvalidFigures or OSError."""
+    """The robot with the figures of a document or file. Raises InvalidFigures or OSError."""
     from joulepath.models.own_arm.robots import own_robot  # as above
     from joulepath.models.uncertainty.document import with_document
 
@@ -100,10 +99,10 @@ def _load_robot(name: str) -> Robot:
 
 
 def load_figures(name: str) -> dict[str, Any]:
-    """The robot's figures as they are in figures.yaml: section, figure, then value, unit, source,
-    trust and note.
+    """The content of the robot's figures.yaml: section, figure, then value, unit, source, trust,
+    note.
 
-    Raises LookupError for a name that is not in `robot_names()`.
+    Raises LookupError for an unknown name.
     """
     if name not in robot_names():
         raise LookupError(

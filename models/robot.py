@@ -1,5 +1,4 @@
-"""A robot: its Pinocchio model, and its figures: limits, drives, electronics, friction,
-capsules."""
+"""A robot arm: Pinocchio model, limits, drives, electronics, friction laws and link capsules."""
 
 from __future__ import annotations
 
@@ -15,17 +14,16 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 TorqueSide = Literal["motor", "link"]
 
-# robots of whom models, kernels and inverse kinematics are kept ready; users may bring any number
-# of arms
 MOST_ROBOTS = 64
+"""Robots whose models, kernels and inverse kinematics are cached; users may add any number."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Symmetric limits of every joint, shape (nq,) each, SI units; `q_min`, `q_max` need not be
-    symmetric.
+    """Joint limits in SI units, arrays of shape (nq,).
 
-    `tau_max` limits the torque at the joint on the side that the robot's `torque_side` names.
+    All limits are symmetric, except `q_min` and `q_max`. `tau_max` limits the torque of the motor
+    or of the link, as the robot's `torque_side` says.
     """
 
     q_min: Array
@@ -41,9 +39,7 @@ class Limits:
         return np.stack([self.v_max, self.a_max, self.j_max])
 
     def scaled(self, factors: Limits | float) -> Limits:
-        """These limits with those on speed, acceleration, jerk and torque multiplied by a factor,
-        or one per joint.
-        """
+        """Limits with speed, acceleration, jerk and torque scaled, by one factor or per joint."""
         rates = ("v_max", "a_max", "j_max", "tau_max")
         return replace(
             self,
@@ -55,8 +51,7 @@ class Limits:
         )
 
     def tightened(self, **given: Array | None) -> Limits:
-        """These limits with the given ones in their place. The caller checks that they are
-        tighter."""
+        """Limits with some of the arrays replaced; the caller ensures tighter values."""
         return replace(self, **{name: value for name, value in given.items() if value is not None})
 
 
@@ -67,12 +62,11 @@ class FrictionLaw:
     tau_f = (coulomb + load · |tau_link|) · v / sqrt(v² + knee²) + curved · asinh(v / speed) +
     viscous · v
 
-    The first term is Coulomb friction with its step spread over `knee` [rad/s]. It grows with the
-    torque tau_link of the rigid bodies alone, which passes through the gear, the rotor's does not.
-    The second term is the concave rise that strain-wave gears show, the third viscous friction.
-    Arrays have shape (nq,): coulomb, curved [N·m], load [1], speed [rad/s], viscous [N·m·s/rad].
-    `load` is None for a law that does not depend on the load. With `bend` [N·m] above zero
-    |tau_link| is sqrt(tau_link² + bend²).
+    The first term is Coulomb friction, smoothed over `knee` [rad/s]. It grows with tau_link, the
+    torque of the rigid bodies: the gear transmits this torque, but not the rotor's. The second term
+    is the concave rise of strain-wave gears, the third viscous friction. Arrays have shape (nq,):
+    coulomb, curved [N·m], load [1], speed [rad/s], viscous [N·m·s/rad]. `load` is None for a law
+    without load dependence. A positive `bend` [N·m] smooths |tau_link| to sqrt(tau_link² + bend²).
     """
 
     name: str
@@ -88,11 +82,12 @@ class FrictionLaw:
     LOAD_FORMULA: ClassVar[str] = FORMULA.replace("coulomb", "(coulomb + load |tau_link|)")
 
     def torque(self, v: Any, tau_link: Any = None, xp: Any = np) -> Any:
-        """Friction torque [N·m] for joint speeds v and torques of the rigid bodies tau_link [N·m],
-        shapes (..., nq).
+        """Friction torque (..., nq) [N·m].
 
-        A law that does not depend on the load needs no tau_link. `xp` is numpy, or casadi for
-        symbols.
+        Args:
+            v: joint speeds (..., nq) [rad/s].
+            tau_link: torques of the rigid bodies (..., nq) [N·m]; unused without `load`.
+            xp: numpy, or casadi for symbols.
         """
         dry = self.coulomb
         if self.load is not None:
@@ -105,9 +100,7 @@ class FrictionLaw:
 
     @property
     def unloaded(self) -> FrictionLaw:
-        """The law of a joint that carries nothing: the least friction, as no coefficient is
-        negative.
-        """
+        """The law without load dependence, a lower bound since `load` is never negative."""
         return replace(self, load=None)
 
 
@@ -130,9 +123,9 @@ class Drives:
 
 @dataclass(frozen=True)
 class Electronics:
-    """Power [W] of the arm's electronics, without the motors.
+    """Power [W] of the arm's electronics without motors, and regeneration.
 
-    `regeneration` is the fraction of surplus power that is fed back to the supply.
+    `regeneration` is the fraction of surplus power fed back to the supply.
     """
 
     idle_power: float
@@ -154,7 +147,7 @@ class DefaultMotion:
 class LinkCapsule:
     """A capsule fixed to a link: ends of its axis (2, 3) [m] in the link frame, and radius [m].
 
-    `link` is the number of the joint that moves the link, 0 for the base.
+    `link` is the number of the joint moving the link, 0 for the base.
     """
 
     link: int
@@ -167,17 +160,16 @@ class Robot:
     """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`.
     Compared by identity.
 
-    `model` holds link inertias and rotor inertia (as armature), but neither payload nor tilted
-    gravity: `loaded_model` adds them. `friction_laws` are named; the first one is the default.
-    `figures` is what `GET /robots/{name}` shows: every figure with its unit, source and trust
-    letter. `default_motion` is None where the maker publishes none.
+    `model` has link inertias and rotor inertia (as armature); `loaded_model` adds payload and
+    tilted gravity. `friction_laws` are named, and the first is the default. `figures` is the
+    content of `GET /robots/{name}`: every figure with its unit, source and trust letter.
+    `default_motion` is None if the controller's defaults are unknown.
 
-    Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of
-    links that cannot touch at any joint positions, without adjacent links. `elbow` is the capsule
-    around the elbow, whose speed can be limited; None for an arm without one. `default_motion` is
-    None for an arm whose controller's defaults are unknown. `torque_side`: the torque limits are
-    for the `motor`, rotor and friction included, or for the `link`, without them.
-    `T_base_base_link` (4, 4) is the pose of ROS's frame `base_link` in `base`.
+    The `capsules` cover the meshes of the links. `never_in_collision` has pairs of non-adjacent
+    links which cannot touch in any configuration. `elbow` is the capsule around the elbow, for its
+    speed limit; None for an arm without an elbow. `torque_side` is `motor` if the torque limits
+    include rotor and friction, `link` if they exclude them. `T_base_base_link` (4, 4) is the pose
+    of ROS's frame `base_link` in `base`.
     """
 
     name: str
@@ -208,7 +200,7 @@ class Robot:
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Names of the links from the base to the last one that moves, nq + 1 of them."""
+        """Names of the base and the nq moving links."""
         return link_names(self.model)
 
     @property
@@ -223,7 +215,7 @@ class Robot:
 
     @property
     def has_load_friction(self) -> bool:
-        """Whether the friction of one of its laws grows with the load."""
+        """Whether any friction law depends on the load."""
         return any(law.load is not None for law in self.friction_laws.values())
 
     def loaded_model(
@@ -234,11 +226,14 @@ class Robot:
         gravity: Array,
         link_mass_scale: Array | None = None,
     ) -> pin.Model:
-        """A copy of the model with a payload fixed to the flange, another gravity and scaled links.
+        """A copy of the model with a payload fixed to the flange, other gravity and scaled links.
 
-        mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com in flange
-        axes, gravity (3,) [m/s²] in the base frame. `link_mass_scale` (nq,) multiplies mass and
-        inertia of the moving links, not of the rotors.
+        Args:
+            mass: mass of the payload [kg].
+            com: its centre of mass (3,) [m] in the flange frame.
+            inertia: its inertia (3, 3) [kg·m²] about the centre of mass, in flange axes.
+            gravity: gravity (3,) [m/s²] in the base frame.
+            link_mass_scale: factors (nq,) on mass and inertia of the moving links, without rotors.
         """
         model = self.model.copy()
         for i, scale in enumerate(
@@ -255,12 +250,11 @@ class Robot:
 
 
 def link_names(model: pin.Model) -> tuple[str, ...]:
-    """Names of the links of a chain from the base to the last one that moves, njoints of them.
+    """Names of the base and the moving links of a chain, njoints of them.
 
-    A link that the model has no frame of goes by the name of the joint that carries it.
+    A link without a body frame in the model has the name of its joint.
     """
-    # a link that a fixed joint carries, as the flange is, comes after the one that the moving joint
-    # carries
+    # Several links may be rigidly connected to one joint, such as the flange: the first one counts.
     first = {
         frame.parentJoint: frame.name for frame in reversed(model.frames) if frame.type == pin.BODY
     }

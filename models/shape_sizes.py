@@ -1,8 +1,6 @@
-"""The check of a shape's size, wherever the shape comes from: a URDF, a request, or the figures of
-a robot.
+"""Validation of the sizes of shapes in URDFs, requests and figures of robots.
 
-A collision check takes a shape at its word: one of no size is never hit, and makes a motion through
-it look free.
+A shape without extent would never collide, and any motion through it would look free.
 """
 
 from __future__ import annotations
@@ -17,33 +15,27 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class ShapeSizes:
-    """Sizes that a shape may have."""
+    """Allowed sizes of shapes."""
 
     smallest: float = 1e-4
-    """Least radius, length, edge or greatest extent [m]: below it, units are mistaken."""
+    """Least radius, length, edge or extent [m]; smaller shapes have mistaken units."""
     largest: float = 100.0
-    """Greatest one [m], and greatest distance of a part from its frame."""
+    """Greatest size, and greatest distance of a part from its frame [m]."""
     flat: float = 1e-6
-    """Least ratio of the smallest to the largest extent of a body: below it, its volume is lost in
-    rounding.
-    """
+    """Least ratio of smallest to largest extent of a body, for a volume above rounding errors."""
 
 
 SIZES = ShapeSizes()
 
 
 class WrongSize(ValueError):
-    """A shape has a size that no body has. The message begins with the name that the check was
-    given.
-    """
+    """The size of a shape is implausible. The message begins with the `name` of the check."""
 
 
 def check_lengths(name: str, values: float | Array, largest: float = SIZES.largest) -> None:
-    """Raises WrongSize unless all radii, lengths or edges [m] are from the smallest size to the
-    `largest`.
-    """
+    """Raises WrongSize unless all lengths [m] are between the smallest size and `largest`."""
     given = np.ravel(values)
-    # written so that NaN is refused
+    # This form refuses NaN.
     wrong = given[~((SIZES.smallest <= given) & (given <= largest))]
     if wrong.size:
         raise WrongSize(
@@ -62,10 +54,9 @@ def check_extent(name: str, points: Array) -> None:
 
 
 def check_scale(name: str, scale: Array, points: Array) -> None:
-    """Raises WrongSize for factors (3,) on points (n, 3) that leave nothing of them, or press them
-    flat.
+    """Raises WrongSize for scale factors (3,) flattening points (n, 3).
 
-    Negative factors mirror the points, and are allowed.
+    Negative factors mirror the points and are allowed.
     """
     factors, extents = np.abs(scale), np.ptp(points, axis=0)
     pressed = (extents * factors < SIZES.smallest) & (extents * factors.max() >= SIZES.smallest)

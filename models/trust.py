@@ -1,6 +1,4 @@
-"""How far a robot's parameters can be trusted: the meaning of the trust letters, and a sentence on
-its energies.
-"""
+"""Trust letters of a robot's parameters, and one sentence on the trust in its energies."""
 
 from __future__ import annotations
 
@@ -13,7 +11,7 @@ TRUST = {
     "T": "transferred from a sister robot",
     "E": "engineering default, no source",
 }
-# sections of a robot's figures that its energies depend on
+# sections of a robot's figures on which its energies depend
 ENERGY_SECTIONS = ("inertials", "friction_laws", "drives", "electronics")
 _GROUPS = {
     "A": "the maker's own figures",
@@ -25,13 +23,10 @@ _GROUPS = {
 
 
 def energy_trust(figures: dict[str, Any]) -> str:
-    """One sentence on what the energies of a robot rest on, from the trust letters of its
-    figures."""
-    by_letter: dict[str, list[str]] = {letter: [] for letter in _GROUPS}
-    for words, section in _energy_figures(figures).items():
-        by_letter[worst_letter(section)].append(words)
+    """One sentence on the figures behind the energies of a robot, by their trust letters."""
     groups = [
-        f"{_GROUPS[letter]} ({', '.join(names)})" for letter, names in by_letter.items() if names
+        f"{_GROUPS[letter]} ({', '.join(names)})"
+        for letter, names in figures_by_letter(figures).items()
     ]
     *first, last = groups
     return (
@@ -39,9 +34,16 @@ def energy_trust(figures: dict[str, Any]) -> str:
     )
 
 
+def figures_by_letter(figures: dict[str, Any]) -> dict[str, list[str]]:
+    """What an energy depends on, in words, by the trust letters, best first."""
+    by_letter: dict[str, list[str]] = {letter: [] for letter in _GROUPS}
+    for words, section in _energy_figures(figures).items():
+        by_letter[worst_letter(section)].append(words)
+    return {letter: names for letter, names in by_letter.items() if names}
+
+
 def _energy_figures(figures: dict[str, Any]) -> dict[str, Any]:
-    """What an energy depends on, in words, and the figures of each. Friction is the default
-    law's."""
+    """Figures on which an energy depends, by a phrase for each; friction of the default law."""
     inertials, drives, electronics = (
         figures[section] for section in ("inertials", "drives", "electronics")
     )

@@ -1,6 +1,4 @@
-"""The URDF of a robot, made from its figures: a chain of revolute joints about z, from `base` to
-`flange`.
-"""
+"""The URDF of a robot from its figures: revolute joints about z, from `base` to `flange`."""
 
 from __future__ import annotations
 
@@ -9,14 +7,15 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-BASE, FLANGE = "base", "flange"
+BASE = "base"
+FLANGE = "flange"
 
 
 def urdf_of(name: str, figures: dict[str, Any]) -> str:
-    """The URDF text. Raises ValueError if a figure has not one entry for each joint.
+    """The URDF text. Raises ValueError if an array does not have one entry per joint.
 
-    A joint turns about the z axis of the frame that its origin gives in the frame of the link
-    before. The root link is `base`, the last one `flange`.
+    A joint turns about the z axis of its frame, whose origin is given in the previous link frame.
+    The root link is `base`, the last link `flange`.
     """
     kinematics, inertials, limits = figures["kinematics"], figures["inertials"], figures["limits"]
     links = kinematics["link_names"]["value"]

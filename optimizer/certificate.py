@@ -1,12 +1,13 @@
-"""Certificate of a motion: an independent check of the returned spline by Pinocchio on a grid of at
-most 1 ms.
+"""Certificate of a motion: an independent check of the returned spline on a grid of at most 1 ms.
 
-It takes nothing from the solver except the spline and the energy reported for it. Torques, energies
-and the pose of the TCP come from Pinocchio's own recursions, not from the compiled kernel or the
+The certificate uses nothing of the solver except the spline and the reported energy. Torques,
+energies and TCP poses come from Pinocchio's own recursions, not from the compiled kernel or the
 kinematics of the optimiser.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -34,32 +35,50 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Single, single
 from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
+from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
 from joulepath.optimizer.result.certificate import Certificate, EndError
 from joulepath.optimizer.result.energy import Energy
 
-# instants of the grid between two looks at the deadline: some ten milliseconds
-BLOCK = 5000
-# most instants at which a motion is compared with its tool path
-ON_PATH = 20_000
-# time [s] per instant, at least, of the whole certificate, and of what follows the torques
-WHOLE, REST = 3e-6, 1.5e-6
+
+@dataclass(frozen=True)
+class CertificateSettings:
+    """Settings of the certificate."""
+
+    block: int = 5000
+    """Instants of the grid between two checks of the deadline, some ten milliseconds."""
+    most_on_path: int = 20_000
+    """Most instants at which a motion is compared with its tool path."""
+    time_per_instant: float = 3e-6
+    """Least time of the certificate per instant [s]."""
+    time_after_torques: float = 1.5e-6
+    """Least time of the certificate after the torques, per instant [s]."""
+
+
+CERTIFICATE = CertificateSettings()
 
 
 @one_thread()
 def certify(
     problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy
 ) -> Certificate:
-    """Certificate of `spline` as a motion of `problem` whose energy is `reported`.
+    """Certificate of a motion.
 
-    A problem with several targets must be `narrowed` to those reached. q_start, q_goal (nq,) [rad]
-    are the joint positions that the answer names as its ends. The grid is uniform and includes both
-    ends. A spline that does not cover the grid gives NaN, which passes no tolerance. Ends by
-    DeadlinePassed if the watched deadline passes.
+    The uniform grid includes both ends. A spline that does not cover the grid gives NaN, which
+    passes no tolerance.
+
+    Args:
+        problem: problem of the motion, `narrowed` to the reached targets.
+        spline: the motion.
+        q_start: joint positions reported for the start, shape (nq,) [rad].
+        q_goal: joint positions reported for the goal, shape (nq,) [rad].
+        reported: reported energy.
+
+    Raises:
+        DeadlinePassed: the watched deadline passed.
     """
     arm, replay = problem.arm, _Replay(problem.arm, spline)
-    if len(replay.t) > BLOCK:
-        checkpoint(len(replay.t) * REST)
+    if len(replay.t) > CERTIFICATE.block:
+        checkpoint(len(replay.t) * CERTIFICATE.time_after_torques)
     energy = replay.energy
     if problem.dwell is not None:
         dwell = dwell_energy(problem.dwell, arm, replay.final_holding_power, spline.duration)
@@ -89,10 +108,10 @@ def certify(
 
 
 class _Replay:
-    """A motion on the grid, by Pinocchio: t (k,) [s]; q, v, a, jerk (k, nq) in rad and s; tau (k,
-    nq) [N·m].
+    """A motion on the grid, by Pinocchio.
 
-    tau is the torque of rigid bodies and rotors, without friction.
+    `t` (k,) [s]; `q`, `v`, `a`, `jerk` (k, nq) in rad and s; `tau` (k, nq) [N·m] is the torque of
+    rigid bodies and rotors, without friction.
     """
 
     def __init__(self, arm: Arm, spline: Spline) -> None:
@@ -100,8 +119,8 @@ class _Replay:
         self.data = self.model.createData()
         self._last, self._T_last_tcp = self.model.njoints - 1, T_last_tcp(arm)
         self.t, curve = grid(spline.duration), spline.curve
-        if len(self.t) > BLOCK:
-            checkpoint(len(self.t) * WHOLE)
+        if len(self.t) > CERTIFICATE.block:
+            checkpoint(len(self.t) * CERTIFICATE.time_per_instant)
         self.q, self.v, self.a, self.jerk = (
             np.ascontiguousarray(curve(self.t, order, extrapolate=False)) for order in range(4)
         )
@@ -109,14 +128,16 @@ class _Replay:
         self._lost = friction_torque(arm.friction_law, arm.drives, self.tau, self.v, self.a)
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
-        """Rigid body and rotor torques (k, nq) [N·m]: Pinocchio's recursion adds armature · a."""
+        """Torques (k, nq) [N·m] of rigid bodies and rotors; Pinocchio's recursion includes armature
+        · a.
+        """
         tau = np.empty((v.shape[1], len(v)), order="F")
-        # Pinocchio's loop over the columns, in this thread: twice as fast as one call for each
+        # Pinocchio's loop over the columns in this thread is twice as fast as single calls
         pool = pin.ModelPool(self.model, 1)
-        for low in range(0, len(v), BLOCK):
+        for low in range(0, len(v), CERTIFICATE.block):
             if low:
                 checkpoint()
-            block = slice(low, low + BLOCK)
+            block = slice(low, low + CERTIFICATE.block)
             pin.rneaInParallel(
                 1, pool, *(np.asfortranarray(x[block].T) for x in (q, v, a)), tau[:, block]
             )
@@ -124,7 +145,7 @@ class _Replay:
 
     @property
     def energy(self) -> Energy:
-        """Energy of the motion by Simpson's rule, without waiting afterwards."""
+        """Energy of the motion by Simpson's rule, without the dwell."""
         potential, kinetic = pin.computePotentialEnergy, pin.computeKineticEnergy
         ends = [
             (
@@ -141,18 +162,18 @@ class _Replay:
 
     @property
     def final_holding_power(self) -> float:
-        """Power drawn [W] while the arm stands still at the end of the motion."""
+        """Power of holding the arm still at the end of the motion [W]."""
         standstill = np.zeros_like(self.q[-1:])
         return float(holding_power(self.arm, self.torques(self.q[-1:], standstill, standstill))[0])
 
     @property
     def limit_ratios(self) -> dict[str, float]:
-        """The worst value / limit of position, velocity, acceleration and jerk; that of torque is a
-        bound.
+        """Worst ratio to the limit of position, velocity, acceleration, jerk, and a bound of the
+        torque.
 
         Between two samples, a torque may peak where a joint reverses and friction changes sign. The
-        others are polynomials, whose peaks are beyond the samples by less than the tolerance of a
-        ratio.
+        other quantities are polynomials, whose peaks exceed the samples by less than the tolerance
+        of a ratio.
         """
         samples = TorqueSamples(self.t[None], self.v[None], self.a[None], self.tau[None])
         tau = torque_bounds(self.arm, self._spline.curve, self.torques, samples)[None]
@@ -160,17 +181,14 @@ class _Replay:
 
     @property
     def rest_error(self) -> float:
-        """The worst |v| / v_max and |a| / a_max at the two ends."""
+        """Worst |v| / v_max and |a| / a_max at both ends."""
         limits, ends = self.arm.active_limits, [0, -1]
-        return float(
-            np.max([np.abs(self.v[ends]) / limits.v_max, np.abs(self.a[ends]) / limits.a_max])
-        )
+        v, a = np.abs(self.v[ends]), np.abs(self.a[ends])
+        return float(np.max([v / limits.v_max, a / limits.a_max]))
 
     @property
     def path_ratios(self) -> dict[str, float]:
-        """The worst value / limit of the tool's angle in its cone and of the speeds of TCP and
-        elbow, if limited.
-        """
+        """Worst ratio to the limits of the tool's cone and of the speeds of TCP and elbow."""
         arm, ratios = self.arm, {}
         if arm.tool_cone is None and arm.tcp_speed is None and arm.elbow_speed is None:
             return {}
@@ -191,56 +209,46 @@ class _Replay:
         return ratios
 
     def tool_path_ratios(self, problem: Problem) -> dict[str, float]:
-        """The worst deviations from the tool path over their tolerances, between the samples, too.
+        """Worst ratio of the deviations from the tool path to their tolerances.
 
-        From one sample to the next the TCP leaves the chord between them by at most an eighth of
-        its acceleration times the squared time, and so does the path; the rotation likewise. Both
-        are taken from second differences.
+        Between two samples the TCP leaves their chord by at most an eighth of its acceleration
+        times the squared period, and so does the path; likewise the rotation. Both are estimated by
+        second differences and added.
         """
         path = problem.tool_path
         if path is None:
             return {}
-        start, goal = (
-            each.T
-            if isinstance(each, Pose)
-            else each
-            if isinstance(each, ConeOrientedPose)
-            else self.tcp_pose(each)
-            for each in (single(problem.start), single(problem.goal))
-        )
-        course = ToolCourse.of(path, start, goal)
-        instants = np.append(
-            np.arange(0, len(self.q) - 1, len(self.q) // ON_PATH + 1), len(self.q) - 1
-        )
-        T = np.array([self.tcp_pose(self.q[k]) for k in instants])
+        start, goal = (self._pose(single(end)) for end in (problem.start, problem.goal))
+        course, last = ToolCourse.of(path, start, goal), len(self.q) - 1
+        step = len(self.q) // CERTIFICATE.most_on_path + 1
+        T = np.array([self.tcp_pose(self.q[k]) for k in np.append(np.arange(0, last, step), last)])
         checkpoint()
         if not np.isfinite(T).all():
             return dict.fromkeys(("path_position", "path_rotation"), np.nan)
         position, rotation = course.deviation(T)
-        moving = (
-            T[:, :3]
-            if path.about is None
-            else T[:, :3] @ np.column_stack([[*path.about, 0], [0, 0, 0, 1]])
-        )
-        between = (
-            2
-            * float(np.linalg.norm(np.diff(moving, n=2, axis=0), axis=(1, 2)).max(initial=0.0))
-            / 8
-        )
+        moving = T[:, :3]
+        if path.about is not None:
+            moving = moving @ np.column_stack([[*path.about, 0], [0, 0, 0, 1]])
+        bends = np.linalg.norm(np.diff(moving, n=2, axis=0), axis=(1, 2))
+        between = 2 * float(bends.max(initial=0.0)) / 8
         return {
             "path_position": float(position.max() + between) / path.position_tolerance,
             "path_rotation": float(rotation.max() + between) / path.rotation_tolerance,
         } | self._path_speed_ratio(path)
 
+    def _pose(self, end: Single) -> Array | ConeOrientedPose:
+        if isinstance(end, ConeOrientedPose):
+            return end
+        return end.T if isinstance(end, Pose) else self.tcp_pose(end)
+
     def _path_speed_ratio(self, path: ToolPath) -> dict[str, float]:
-        """The least speed that the path asks for over that of the TCP where it is beyond the ramps
-        at both ends.
+        """Ratio of the least speed of the path to the TCP's speed between the ramps.
 
-        Of a fixed speed, the largest deviation from it over its tolerance, and on the ramps that
-        above it.
+        For a fixed speed: ratio of the largest deviation to its tolerance, on the ramps only of an
+        excess.
 
-        Between two samples the speed is less than on the line between them by at most an eighth of
-        its curvature times the squared time, which is taken from second differences.
+        Between two samples the speed is below their chord by at most an eighth of its second
+        derivative times the squared period, estimated by second differences.
         """
         if path.least_speed is None:
             return {}
@@ -253,21 +261,25 @@ class _Replay:
         if path.fixed_speed is not None:
             off = speed - path.fixed_speed
             worst = float(np.where(beyond, np.abs(off), off).max()) + dip
-            return {"path_speed": worst / (SPEED_TOLERANCE * path.fixed_speed)}
+            return {"path_speed": worst / (TOOL_PATH.speed_tolerance * path.fixed_speed)}
         least = float(speed[beyond].min(initial=np.inf)) - dip
         return {"path_speed": path.least_speed / least if least > 0 else np.inf}
 
     def _link_motions(self, rotating: bool, moving: list[int]) -> tuple[Array, dict[int, Array]]:
-        """Rotations (k, 3, 3) of the last link in the base frame, if `rotating`, and the motions of
-        the links `moving`.
+        """Rotations and velocities of links at all samples.
 
-        A motion (k, 6) is the velocity of the link's origin [m/s] and its angular velocity [rad/s],
-        in its own frame.
+        Args:
+            rotating: whether to return rotations of the last link.
+            moving: indices of the links with velocities.
+
+        Returns:
+            Rotations (k, 3, 3) of the last link in the base frame, and by link the velocity of its
+            origin and its angular velocity in its own frame (k, 6) [m/s, rad/s].
         """
         rotations = np.empty((len(self.q) if rotating else 0, 3, 3))
         twists = {joint: np.empty((len(self.q), 6)) for joint in moving}
         for k, (q, v) in enumerate(zip(self.q, self.v, strict=True)):
-            if k % BLOCK == BLOCK - 1:
+            if k % CERTIFICATE.block == CERTIFICATE.block - 1:
                 checkpoint()
             pin.forwardKinematics(self.model, self.data, q, v)
             for joint, twist in twists.items():
@@ -277,12 +289,17 @@ class _Replay:
         return rotations, twists
 
     def end_error(self, target: Single, named: Array, reached: Array) -> EndError:
-        """Error of the TCP at `reached` (nq,) [rad] against the target.
+        """Error of the TCP at an end of the motion.
 
-        Forward kinematics cannot tell joint positions apart that differ by full turns. The rotation
-        is therefore at least the largest deviation of a joint from the joint positions named, and
-        from those of a joint target. For a pose with an orientation tolerance it is measured from
-        the nearest allowed orientation.
+        Forward kinematics cannot distinguish joint positions that differ by full turns, so the
+        rotation error is at least the largest joint deviation from the reported joint positions,
+        and from a joint target. For a pose with an orientation tolerance it is measured from the
+        nearest allowed orientation.
+
+        Args:
+            target: target of this end.
+            named: reported joint positions, shape (nq,) [rad].
+            reached: joint positions of the motion, shape (nq,) [rad].
         """
         joint_error = float(np.abs(reached - named).max())
         T_reached = self.tcp_pose(reached)
@@ -305,23 +322,22 @@ class _Replay:
 
 
 def _greatest_speed(motions: Array, point: Array) -> float:
-    """Greatest speed [m/s] of a point (3,) [m], fixed to a link and given in its frame, over the
-    link's `motions`.
-    """
+    """Greatest speed [m/s] of a point of a link over the link's motions; see `_speeds`."""
     return float(_speeds(motions, point).max())
 
 
 def _speeds(motions: Array, point: Array) -> Array:
-    """Speeds (k,) [m/s] of a point (3,) [m], fixed to a link and given in its frame, in the link's
-    `motions`.
+    """Speeds (k,) [m/s] of a point of a link.
+
+    Args:
+        motions: velocities of the link in its own frame, shape (k, 6).
+        point: point in the frame of the link, shape (3,) [m].
     """
     return np.asarray(np.linalg.norm(motions[:, :3] + np.cross(motions[:, 3:], point), axis=1))
 
 
 def _tool_angles(cone: ToolCone, R_base_tcp: Array) -> Array:
-    """Angles (k,) [rad] between the tool axis and the direction of its cone, for orientations (k,
-    3, 3).
-    """
+    """Angles (k,) [rad] between tool axis and cone direction, for orientations (k, 3, 3)."""
     tool_axis = R_base_tcp @ cone.axis
     angles: Array = np.arctan2(
         np.linalg.norm(np.cross(tool_axis, cone.direction), axis=1), tool_axis @ cone.direction
@@ -330,5 +346,5 @@ def _tool_angles(cone: ToolCone, R_base_tcp: Array) -> Array:
 
 
 def _worst(*values: float) -> float:
-    """The largest value; NaN if any is NaN, unlike `max`."""
+    """Largest value; NaN if any value is NaN, unlike `max`."""
     return float(np.max(values))

@@ -16,8 +16,8 @@ from joulepath.optimizer.progress import (
     CandidateTried,
     Improved,
     Tell,
-    forward,
-    nobody,
+    no_listener,
+    only_news,
 )
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import Solution
@@ -26,7 +26,7 @@ from joulepath.optimizer.solve.methods import METHODS
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """What one `method` found: its `solution`, or the `error` that says why there is none."""
+    """Outcome of a method: its solution, or the error."""
 
     method: MethodName
     solution: Solution | None
@@ -35,9 +35,9 @@ class Compared:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Solutions of one problem by several methods, at least one of which found a motion.
+    """Solutions of one problem by several methods, with at least one motion.
 
-    `methods` has an entry for each method, in the order in which they were asked for.
+    `methods` has an entry for every method, in the requested order.
     """
 
     objective: Objective
@@ -45,27 +45,27 @@ class Comparison:
 
     @cached_property
     def solutions(self) -> dict[MethodName, Solution]:
-        """Solution of each method that found a motion."""
+        """Solution of every method with a motion."""
         return {each.method: each.solution for each in self.methods if each.solution is not None}
 
     @cached_property
     def best(self) -> MethodName:
-        """Method whose motion needs the least energy of the objective."""
+        """Method with the motion of least objective."""
         return min(self.solutions, key=self._energy)
 
     @property
     def lower_bound(self) -> float:
-        """Largest of the proven lower bounds [J]; each holds for the motions of all methods."""
+        """Largest proven lower bound [J]; it holds for the motions of all methods."""
         return max(solution.lower_bound for solution in self.solutions.values())
 
     def excess(self, method: MethodName) -> float:
-        """Relative excess of the energy of a method's motion over that of the best one [1].
+        """Relative excess of a method's energy over the least one [1].
 
         Args:
-            method: method that found a motion.
+            method: method with a motion.
 
         Returns:
-            energy / least energy - 1; 0 where the least energy is not positive.
+            energy / least energy - 1; 0 if the least energy is not positive.
         """
         least = self._energy(self.best)
         return self._energy(method) / least - 1 if least > 0 else 0.0
@@ -78,32 +78,31 @@ def compare(
     problem: Problem,
     methods: Sequence[MethodName] = tuple(METHODS),
     clock: Clock = time.perf_counter,
-    tell: Tell = nobody,
+    tell: Tell = no_listener,
 ) -> Comparison:
     """Solve one problem by several methods, one after another.
 
-    The methods run in the order of `METHODS`. Each gets an equal share of the time that the ones
-    before it have left of `problem.deadline`.
+    The methods run in the order of `METHODS`. A method gets an equal share of the time left.
 
     Args:
-        problem: what is asked of every method; its own `method` does not matter.
-        methods: names of the methods, each once.
+        problem: the problem; its own `method` is ignored.
+        methods: distinct names of methods.
         clock: function that returns the time [s].
-        tell: gets the progress, with the methods as candidates and the best motion so far.
+        tell: receives the progress, with the methods as candidates and the best motion so far.
 
     Returns:
-        What each method found, in the order of `methods`.
+        The outcome of every method, in the order of `methods`.
 
     Raises:
-        InvalidProblem: `methods` is empty, names a method twice, or one that does not exist.
-        JoulepathError: no method found a motion; the error is that of the first of `methods`.
+        InvalidProblem: `methods` is empty, names a method twice, or an unknown one.
+        JoulepathError: no method found a motion; the error of the first of `methods`.
     """
     if not methods or len(set(methods)) < len(methods) or not set(methods) <= METHODS.keys():
         raise InvalidProblem(
             "methods", f"methods must name some of {', '.join(METHODS)}, each once."
         )
     shares = DeadlineShares(Deadline.after(problem.deadline, clock), len(methods))
-    tell, found = forward(tell), dict[MethodName, Compared]()
+    tell, found = only_news(tell), dict[MethodName, Compared]()
     tell(CandidatesFound(len(methods)))
     for k, method in enumerate(each for each in METHODS if each in methods):
         share = shares.next()

@@ -1,4 +1,4 @@
-"""Lines and numbers of a CSV file, as motions and logs have them. Errors name line and column."""
+"""Lines and numbers of a CSV file, for motions and logs. Errors name line and column."""
 
 from __future__ import annotations
 
@@ -14,24 +14,33 @@ from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidTable
 
 FIRST_ROW = 2
-"""Line of the first row of numbers: the header is line 1."""
+"""Line number of the first row of numbers; the header is line 1."""
 SEPARATORS = ",;\t"
 _WORDS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
 
 
 class Lines(Protocol):
-    """What lines are read from: a file, or what unpacks one."""
+    """Source of lines: a file, or a decompressor."""
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """The next line, or the first `size` bytes of it."""
+        """The next line, or its first `size` bytes."""
 
 
 _SPREADSHEET = b"PK\x03\x04"
 
 
 def line_of(file: Lines, row: int, longest: int) -> str:
-    """The next line, which is line `row`; empty at the end of the file. Raises InvalidTable, also
-    above `longest`, and DeadlinePassed once a watched deadline has passed."""
+    """The next line of a file; empty at its end.
+
+    Args:
+        file: the file.
+        row: number of the line, for errors.
+        longest: greatest number of characters.
+
+    Raises:
+        InvalidTable: the line is too long, binary, or no UTF-8 text.
+        DeadlinePassed: a watched deadline has passed.
+    """
     checkpoint()
     raw = file.readline(longest + 1)
     if len(raw) > longest:
@@ -51,8 +60,10 @@ def line_of(file: Lines, row: int, longest: int) -> str:
 
 
 def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[list[str], str]:
-    """Names of the columns in the first line, and what separates them, as `names_of` says. Raises
-    InvalidTable.
+    """Names of the columns in the first line, and their separator; see `names_of`.
+
+    Raises:
+        InvalidTable: the file is empty or unreadable.
     """
     first = line_of(file, 1, longest)
     if not first:
@@ -61,8 +72,10 @@ def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[
 
 
 def names_of(header: str, separators: str = SEPARATORS) -> tuple[list[str], str]:
-    """Names of the columns of a header, in lower case, and what separates them: the most frequent
-    of `separators`, where a space counts only if there is none of the others."""
+    """Lower-case names of the columns of a header, and the separator.
+
+    The separator is the most frequent of `separators`; a space counts only without any other.
+    """
     separator = max(
         separators, key=lambda each: header.count(each) * (0.01 if each == " " else 1.0)
     )
@@ -71,8 +84,11 @@ def names_of(header: str, separators: str = SEPARATORS) -> tuple[list[str], str]
 
 
 def with_points(lines: Sequence[str], first: int) -> Iterator[str]:
-    """Lines from line `first` on, with decimal points in place of decimal commas. Raises
-    InvalidTable.
+    """Lines with decimal points in place of decimal commas; `first` is the number of the first
+    line.
+
+    Raises:
+        InvalidTable: a line has both commas and points.
     """
     for row, line in enumerate(lines, first):
         if "," not in line:
@@ -95,13 +111,21 @@ def numbers_of(
     separator: str,
     used: Sequence[int],
 ) -> Array:
-    """The columns with the indices `used` of the lines with the numbers `rows`, (k, used). Raises
-    InvalidTable.
+    """Numbers of the used columns, shape (k, used).
 
-    Where not all columns are used, the caller makes sure that the lines have as many cells as the
-    header.
+    Without all columns in use, the caller checks that the lines have as many cells as the header.
+
+    Args:
+        lines: the lines.
+        rows: their line numbers, for errors.
+        columns: names of all columns.
+        separator: separator of the columns.
+        used: indices of the used columns.
+
+    Raises:
+        InvalidTable: a cell is no finite number, or a line has the wrong length.
     """
-    # with a choice of columns, numpy accepts lines that are too long
+    # with a choice of columns, numpy accepts too long lines
     chosen = None if len(used) == len(columns) else used
     try:
         values = np.loadtxt(
@@ -141,9 +165,9 @@ def _first_error(
 
 
 def wrong_length(line: str, row: int, cells: int, columns: int, separator: str) -> InvalidTable:
-    """The error for line `row` with another number of cells than the header has columns."""
+    """Error for a line with another number of cells than the header."""
     message = f"Line {row} has {cells} columns, but the header has {columns}: correct the line."
-    # numbers without a fraction have no comma
+    # numbers without a fraction have no decimal comma
     if separator == "," and 1.5 * columns < cells <= 2 * columns:
         message += (
             " For numbers with a decimal comma, separate the columns by semicolons, also "

@@ -1,12 +1,11 @@
-"""Deadline of a computation: an instant of a clock, at which it ends with the best result so far.
+"""Deadlines of computations: an instant of a clock at which they end with their best result so far.
 
-A loop that can return what it has so far reads `Deadline.passed`. Below such loops lies work that
-may take long by itself and is of no use in part: torques at a million instants, distances of a
-thousand pairs, a quadratic program. It calls `checkpoint`, which raises DeadlinePassed once the
-deadline has passed that a caller further up watches.
+A loop with a useful partial result reads `Deadline.passed`. Work below such loops may take long and
+is useless in part, such as torques at a million instants, distances of a thousand pairs, or a
+quadratic program. It calls `checkpoint`, which raises DeadlinePassed once a deadline watched by a
+caller has passed.
 
-A computation whose result nobody wants any more ends at its next `checkpoint`, too: see
-`stoppable`.
+A computation without further use ends at its next `checkpoint` too; see `stoppable`.
 """
 
 from __future__ import annotations
@@ -23,9 +22,7 @@ Clock = Callable[[], float]
 
 @dataclass(frozen=True)
 class Deadline:
-    """The instant `at` [s] of `clock`, a function that returns the time [s]; a test may pass its
-    own.
-    """
+    """The instant `at` [s] of `clock`, a function that returns the time [s]."""
 
     at: float = math.inf
     clock: Clock = time.perf_counter
@@ -37,7 +34,7 @@ class Deadline:
 
     @property
     def left(self) -> float:
-        """Time until the deadline [s], negative after it, and once the computation is stopped."""
+        """Time until the deadline [s]; negative after it, and for a stopped computation."""
         return min(self.at - self.clock(), -LONG_PAST) if is_stopped() else self.at - self.clock()
 
     @property
@@ -46,11 +43,11 @@ class Deadline:
         return self.left < 0
 
     def within(self, seconds: float) -> Deadline:
-        """The earlier of this deadline and the one `seconds` [s] from now."""
+        """The earlier one of this deadline and `seconds` [s] from now."""
         return replace(self, at=min(self.at, self.clock() + seconds))
 
     def earlier_by(self, seconds: float) -> Deadline:
-        """The deadline `seconds` [s] before this one; after it, if they are negative."""
+        """The deadline `seconds` [s] before this one, or after it if negative."""
         return replace(self, at=self.at - seconds)
 
 
@@ -58,16 +55,15 @@ NEVER = Deadline()
 
 
 class DeadlineShares:
-    """Divides the time until a deadline among runs that follow one another.
+    """Divides the time until a deadline among successive runs.
 
-    A run gets the time left divided by the number of runs left, so that the later runs get the time
-    that it does not use.
+    A run gets the time left divided by the number of remaining runs, so later runs profit from time
+    left over.
 
     Args:
         deadline: instant at which the last run must end.
         runs: number of runs.
-        least: shortest share [s]; a run whose time was used up by earlier ones still says so
-            itself.
+        least: shortest share [s]; a run without time left reports this itself.
     """
 
     def __init__(self, deadline: Deadline, runs: int, least: float = 1e-3) -> None:
@@ -86,50 +82,53 @@ class DeadlineShares:
 
 
 LONG_PAST = 1e6
-"""Time [s] by which every deadline has passed for a computation that is stopped. It is finite, so
-that shares of it are numbers."""
+"""Time since every deadline of a stopped computation [s]; finite, for finite shares of it."""
 
 
 class Stopped(BaseException):
-    """Nobody wants the result of the computation. Handlers of errors let it pass: whoever runs the
-    computation catches it."""
+    """The result of the computation is no longer of use.
+
+    Handlers of errors let it pass; the caller that runs the computation catches it.
+    """
 
 
-_wanted_no_more: ContextVar[Callable[[], bool] | None] = ContextVar(
+_stop_condition: ContextVar[Callable[[], bool] | None] = ContextVar(
     "whether the computation is stopped", default=None
 )
 
 
 @contextmanager
 def stoppable(is_stopped: Callable[[], bool]) -> Iterator[None]:
-    """Within the context, once `is_stopped` says so, every deadline has passed, and `checkpoint`
-    raises Stopped.
+    """Context in which a computation can be stopped.
 
-    `is_stopped` is called often, must be fast, and must never take back that it is so.
+    Once `is_stopped` returns True, every deadline has passed and `checkpoint` raises Stopped. The
+    function is called often, must be fast, and must never return to False.
     """
-    before = _wanted_no_more.set(is_stopped)
+    before = _stop_condition.set(is_stopped)
     try:
         yield
     finally:
-        _wanted_no_more.reset(before)
+        _stop_condition.reset(before)
 
 
 def is_stopped() -> bool:
-    """Whether nobody wants the result of this computation."""
-    stopped = _wanted_no_more.get()
+    """Whether the computation is stopped."""
+    stopped = _stop_condition.get()
     return stopped is not None and stopped()
 
 
 def end_if_stopped() -> None:
-    """Raises Stopped if the computation is stopped: for work that must be finished whatever the
-    deadline.
+    """End a stopped computation, for work without a deadline.
+
+    Raises:
+        Stopped: the computation is stopped.
     """
     if is_stopped():
         raise Stopped
 
 
 class DeadlinePassed(Exception):
-    """The watched deadline has passed. Whoever watches it catches this."""
+    """The watched deadline has passed; caught by the caller that watches it."""
 
 
 _watched: ContextVar[Deadline | None] = ContextVar("watched deadline", default=None)
@@ -137,10 +136,9 @@ _watched: ContextVar[Deadline | None] = ContextVar("watched deadline", default=N
 
 @contextmanager
 def watch(deadline: Deadline) -> Iterator[None]:
-    """Within the context, `checkpoint` raises DeadlinePassed after `deadline`. Of nested contexts
-    the innermost counts.
+    """Context in which `checkpoint` raises DeadlinePassed after `deadline`.
 
-    Each thread watches its own.
+    Of nested contexts the innermost one counts. Every thread watches its own deadline.
     """
     before = _watched.set(deadline)
     try:
@@ -150,8 +148,15 @@ def watch(deadline: Deadline) -> Iterator[None]:
 
 
 def checkpoint(needed: float = 0.0) -> None:
-    """Raises Stopped if the computation is stopped, and DeadlinePassed if less than `needed` [s] is
-    left until the watched deadline, if there is one."""
+    """End the computation if it is stopped or out of time.
+
+    Args:
+        needed: time needed before the watched deadline [s].
+
+    Raises:
+        Stopped: the computation is stopped.
+        DeadlinePassed: less than `needed` is left.
+    """
     end_if_stopped()
     deadline = _watched.get()
     if deadline is not None and deadline.left < needed:

@@ -1,5 +1,4 @@
-"""What the fields of results and errors declare beside their types: units, axes, and how they are
-shown.
+"""Declarations of the fields of results and errors beside their types: units, axes, and display.
 
 The text below a field is its meaning. This module only names the markers;
 `joulepath.app.answers.declared` reads them to write JSON, JSON Schema and the reference.
@@ -15,36 +14,35 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """Unit of a number, or of every number in an array: "J", "rad/s"; "1" for a ratio or a
-    count."""
+    """Unit of a number or of all numbers of an array: "J", "rad/s"; "1" for a ratio or a count."""
 
     symbol: str
 
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """Names of the axes of an array, the slowest first."""
+    """Names of the axes of an array, slowest first."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Keys:
-    """The keys of a dictionary: those of a TypedDict, which has their types and their meanings."""
+    """Keys of a dictionary: a TypedDict with their types and meanings."""
 
     of: type
 
 
 class Internal:
-    """Marks a field that the library has and no answer shows."""
+    """Marks a field of the library that no answer shows."""
 
 
 class NullIfInfinite:
-    """Marks a number that may be infinite, which JSON shows as null."""
+    """Marks a possibly infinite number, shown as null in JSON."""
 
 
 class NotEmpty:
-    """Marks a list that has at least one entry."""
+    """Marks a list with at least one entry."""
 
 
 Joules = Annotated[float, Unit("J")]

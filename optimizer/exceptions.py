@@ -1,8 +1,8 @@
-"""The errors of the library, each with its data.
+"""Errors of the library with their data.
 
-Here are the base classes and the errors that several rooms raise. Those of one room are declared in
-it: `search.errors`, `sequence.errors`, `exports.errors`, `excitation.errors`,
-`identification.errors` and `identification.logs.log_errors`.
+This module has the base classes and the errors shared by several rooms. Errors of a single room are
+declared there: `search.errors`, `cycle.errors`, `export.errors`, `excitation.errors`,
+`identify.errors` and `identify.logs.log_errors`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ MOST_LISTED = 64
 class DeclaredError(Exception):
     """Base of all errors that a caller can correct; `str(error)` says what is wrong and what to do.
 
-    A class with a `title` is a type of error of its own, and a subclass without one belongs to the
-    type of its base. The docstring of a type says when the error occurs, and the dataclass fields
-    are its data. Schemas, problem pages and the reference are made from this declaration.
+    A class with a `title` is a type of error; a subclass without one belongs to the type of its
+    base. The docstring of a type says when the error occurs, and the dataclass fields are its data.
+    Schemas, problem pages and the reference are generated from this declaration.
     """
 
     title: ClassVar[str]
@@ -47,19 +47,17 @@ class DeclaredError(Exception):
         return self.detail
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # the default calls the constructor with `args`, which has no keyword arguments
+        # by default the constructor is called with `args`, without keyword arguments
         return _restore, (type(self), vars(self))
 
     @classmethod
     def type_of_error(cls) -> type[DeclaredError]:
-        """The class whose type of error this one belongs to."""
+        """The class with the type of this error."""
         return next((each for each in cls.__mro__ if "title" in vars(each)), cls)
 
     @classmethod
     def slug(cls) -> str:
-        """Name of the type in URLs, made from the name of the class: `DurationTooShort` is
-        `duration-too-short`.
-        """
+        """Name of the type in URLs: `DurationTooShort` is `duration-too-short`."""
         return re.sub(r"(?<!^)(?=[A-Z])", "-", cls.type_of_error().__name__).lower()
 
 
@@ -179,6 +177,21 @@ class UnknownRobot(JoulepathError):
 
 
 @dataclass(eq=False)
+class UnknownTool(JoulepathError):
+    """No tool has this name."""
+
+    status = 404
+    title = "Unknown tool"
+    remedy = "Use one of the names in `known`, which `GET /tools` lists too, or give the capsules."
+
+    known: list[str]
+    """Names of all tools."""
+
+    def __str__(self) -> str:
+        return f"There is no tool of that name: use one of {', '.join(self.known)}."
+
+
+@dataclass(eq=False)
 class _TargetError(JoulepathError):
     target: str
     """Target at fault: `start`, `goal` (of `POST /ik`, too), or `stops/` and the name of a stop of
@@ -254,7 +267,7 @@ class UnreachableTargets(_TargetError):
         )
 
 
-_TELLING = (
+_BY_RELEVANCE = (
     CandidateStatus.FAILED,
     CandidateStatus.INFEASIBLE,
     CandidateStatus.UNVISITED,
@@ -273,8 +286,8 @@ class _SearchError(JoulepathError):
 
     def __post_init__(self) -> None:
         self.candidate_counts = count_by_status(self.candidates)
-        telling = sorted(self.candidates, key=lambda each: _TELLING.index(each.status))
-        self.candidates = telling[:MOST_LISTED]
+        by_relevance = sorted(self.candidates, key=lambda each: _BY_RELEVANCE.index(each.status))
+        self.candidates = by_relevance[:MOST_LISTED]
 
 
 class NoTrajectory(_SearchError):

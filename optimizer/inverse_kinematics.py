@@ -1,4 +1,4 @@
-"""Public entry point: `inverse_kinematics(arm, pose)` finds the configurations of a pose."""
+"""Public entry point: `inverse_kinematics(arm, pose)` finds all configurations of a pose."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ class IKSolution:
 class IKSolutions(Sequence[IKSolution]):
     """All configurations found for a pose, as a sequence.
 
-    `complete`: every branch is among them. If not, the inverse kinematics of the robot is not
-    proven to find all of them, and some may be missing.
+    `complete`: whether every branch is among the configurations. Otherwise the inverse kinematics
+    of the robot is not proven to find all, and some may be missing.
     """
 
     solutions: tuple[IKSolution, ...]
@@ -87,19 +87,19 @@ def inverse_kinematics(
 ) -> IKSolutions:
     """Find all configurations within the position limits that put the TCP at a pose.
 
-    Where infinitely many configurations reach the pose, as of an arm with seven joints, the result
-    has some of each self-motion, evenly spread.
+    If infinitely many configurations reach the pose, as with seven joints, the result has evenly
+    spread samples of every self-motion.
 
     Args:
         arm: arm with its TCP, limits, tool, payload and scene; a robot stands for a bare arm.
         pose: pose of the TCP in the robot's base frame.
-        windings: whether to include every full turn of a joint that the limits allow. Without them
-            there is one solution per branch, the one nearest to zero.
+        windings: whether to include every full turn of a joint within the limits; otherwise there
+            is one solution per branch, nearest to zero.
         deadline: wall time after which the computation is given up [s].
         clock: function that returns the time [s].
 
     Returns:
-        The configurations, those of a branch together, nearest to zero first.
+        The configurations, grouped by branch, nearest to zero first.
 
     Raises:
         InvalidProblem: there is no inverse kinematics for the robot.

@@ -1,4 +1,4 @@
-"""Public entry point: `optimize(problem)` returns a `Solution`."""
+"""Public entry point: `optimize(problem)` finds the motion of least energy."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from joulepath.optimizer.dynamics.kernel import kernel_for
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import Tell, forward, nobody
+from joulepath.optimizer.progress import Tell, no_listener, only_news
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods import METHODS
 
 
-def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Solution:
+def optimize(
+    problem: Problem, clock: Clock = time.perf_counter, tell: Tell = no_listener
+) -> Solution:
     """Find the motion of least energy between a problem's targets, certified against every limit.
 
     Args:
@@ -41,18 +43,16 @@ def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = no
         InvalidProblem: the payload is beyond the robot's rating, or an end outside the tool's cone.
     """
     with one_thread():
-        return Run(problem, clock=clock, tell=forward(tell)).solution()
+        return Run(problem, clock=clock, tell=only_news(tell)).solution()
 
 
 def warm_up(robot_name: str) -> None:
-    """Load a robot and its kernel and solve a small problem, so that the first request does not
-    wait for them.
-    """
+    """Load a robot and its kernel and solve a small problem, so that the first request is fast."""
     robot = load_robot(robot_name)
     kernel_for(robot)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2
     for method, solver in METHODS.items():
-        # what takes seconds would keep the others waiting
+        # a method that takes seconds would delay the first requests
         if solver.most_solved is None:
             optimize(
                 Problem(arm=Arm(robot=robot), start=middle + 0.1, goal=middle + 0.4, method=method)

@@ -1,4 +1,4 @@
-"""Public entry point: `optimize_many(problems)` solves many problems at a time."""
+"""Public entry point: `optimize_many(problems)` solves many problems in parallel."""
 
 from __future__ import annotations
 
@@ -15,20 +15,28 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
 
-# problems that are handed out ahead of time: however many there are, memory does not grow with them
-AHEAD = 64
+
+@dataclass(frozen=True)
+class OptimizeManySettings:
+    """Settings of `optimize_many`."""
+
+    ahead: int = 64
+    """Problems submitted ahead of time; limits the memory for any number of problems."""
+
+
+OPTIMIZE_MANY = OptimizeManySettings()
 
 
 class DaskClient(Protocol):
     """A client of a Dask cluster: `distributed.Client`."""
 
     def get_executor(self) -> Executor:
-        """The cluster by the interface of `concurrent.futures`."""
+        """The cluster as an executor of `concurrent.futures`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Optimized:
-    """What became of the problem at `index`: its solution, or why there is none."""
+    """Outcome of the problem at `index`: its solution, or the error."""
 
     index: int
     solution: Solution | None
@@ -47,20 +55,20 @@ def optimize_many(
     client: DaskClient | Executor | None = None,
     workers: int | None = None,
 ) -> Iterator[Optimized]:
-    """Solve many problems at a time, each as `optimize` does.
+    """Solve many problems in parallel, each by `optimize`.
 
-    Problems are taken from the iterable as they are needed. If the iteration ends early, what has
-    not begun is not solved. The processes import the main module of a script: it needs
+    Problems are taken from the iterable as needed. If the iteration ends early, waiting problems
+    are not solved. The worker processes import the main module of a script, which therefore needs
     `if __name__ == "__main__":`.
 
     Args:
         problems: problems to solve.
-        client: Dask client, or an executor of `concurrent.futures`; None for processes of this
+        client: Dask client or an executor of `concurrent.futures`; None for processes of this
             machine.
         workers: number of these processes; None for one per CPU.
 
     Yields:
-        What became of each problem, as they end, in any order.
+        The outcome of every problem, in any order.
 
     Raises:
         BrokenProcessPool: a process died.
@@ -83,7 +91,7 @@ def _solved_by(executor: Executor, problems: Iterable[Problem]) -> Iterator[Opti
     open_ = set[Future[Optimized]]()
     try:
         while True:
-            for index, problem in islice(waiting, AHEAD - len(open_)):
+            for index, problem in islice(waiting, OPTIMIZE_MANY.ahead - len(open_)):
                 future = executor.submit(_solved, index, problem)
                 open_.add(future)
                 future.add_done_callback(done.put)

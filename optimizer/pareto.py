@@ -1,20 +1,20 @@
-"""Public entry point: `pareto(problem, points)` returns the front of energy and duration.
+"""Public entry point: `pareto(problem, points)` finds the front of energy and duration.
 
-The last point is the answer of `optimize`. A motion that needs less only by the spread of solves is
-the same optimum.
+The last point is the answer of `optimize`. A motion with less energy only within the scatter of
+solves is the same optimum.
 
-Between two neighbours the front lies within the rectangle that they span: a motion that is slower
-than the left one is dominated unless it needs less energy, and no motion needs less energy than the
-right one. Durations are therefore chosen one by one: each is the geometric mean of the two
-neighbours whose rectangle has the longest sides in log T and energy.
+Between two neighbours the front lies within the rectangle they span: a slower motion than the left
+one is dominated unless it needs less energy, and no motion needs less energy than the right one.
+Durations are therefore chosen one by one, as the geometric mean of the two neighbours whose
+rectangle has the longest sides in log T and energy.
 
 If two neighbours belong to different candidates, the front may jump between them. The candidate of
 the right one has a fastest motion of its own. If this is slower than the left point, the jump is at
-its duration. That duration is tried next, and one just below it, as halving would only converge to
-it.
+its duration. This duration is tried next, with one just below it, as bisection would only converge
+to it.
 
-Each duration is solved with a warm start from the motions on both sides and without one. Every
-other candidate whose lower bound for this duration is below the best energy is solved, too.
+A duration is solved with a warm start from the motions on both sides and without one, and so is
+every other candidate with a lower bound below the best energy for this duration.
 """
 
 from __future__ import annotations
@@ -22,9 +22,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from itertools import accumulate, pairwise
-
-import numpy as np
 
 from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
@@ -36,58 +33,53 @@ from joulepath.optimizer.progress import (
     CandidateTried,
     Improved,
     Tell,
-    forward,
-    nobody,
+    no_listener,
+    only_news,
 )
 from joulepath.optimizer.result.front import Dropped, Front, FrontSolver
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.fastest import fastest, fastest_of
-from joulepath.optimizer.search.reserve import report_time
+from joulepath.optimizer.search.finishing_time import report_time
+from joulepath.optimizer.search.front_nodes import FrontNode, distinct, next_interval, switches
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import between
 
-LEAST_POINTS, MOST_POINTS = 2, 100
-# share of the time left for the search of the fastest motion, and for each end of the front
-SHARE_OF_AN_END = 1 / 3
-# relative distance of two durations that count as one, of two around a jump that is located well
-# enough, and below the duration of a jump at which the front before the jump is solved
-SAME_DURATION, SAME_JUMP, BEFORE_JUMP = 2e-4, 2e-3, (1e-4, 1e-3)
-# least deadline of a search [s]
-LEAST_TIME = 1e-3
-# relative difference of two energies that are the same optimum: solves from other guesses and knots
-# scatter by as much
-CONVERGED = 1e-3
-
 
 @dataclass(frozen=True)
-class _Node:
-    """A duration [s] that was tried: its answer or the reason for none, and its energy in the
-    objective [J] or inf.
-    """
+class ParetoSettings:
+    """Settings of the front."""
 
-    duration: float
-    answer: Solution | None
-    energy: float = math.inf
-    reason: str = ""
+    least_points: int = 2
+    """Least number of points."""
+    most_points: int = 100
+    """Most points."""
+    share_of_end: float = 1 / 3
+    """Share of the time left for the fastest motion, and for either end of the front."""
+    before_jump: tuple[float, ...] = (1e-4, 1e-3)
+    """Relative distances below the duration of a jump at which the front before it is solved."""
+    least_time: float = 1e-3
+    """Least deadline of a search [s]."""
+    same_energy: float = 1e-3
+    """Relative difference up to which two energies are the same optimum, the scatter of solves."""
 
-    @property
-    def spline(self) -> Spline | None:
-        """The motion, if there is one."""
-        return None if self.answer is None else self.answer.trajectory.spline
+
+PARETO = ParetoSettings()
 
 
 def pareto(
-    problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = nobody
+    problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = no_listener
 ) -> Front:
-    """Find the front of energy over duration, from the fastest motion to that of least energy.
+    """Find the front of energy over duration, from the fastest motion to the motion of least
+    energy.
 
     Args:
-        problem: problem whose duration is free or bounded. The mechanical objective needs
+        problem: problem with a free or bounded duration. The mechanical objective needs
             `duration_max`. Its `deadline` holds for the whole front.
         points: largest number of motions, 2 to 100.
         clock: function that returns the time [s].
-        tell: gets the progress, with the durations as candidates and the motion of least energy.
+        tell: receives the progress, with the durations as candidates and the motion of least
+            energy.
 
     Returns:
         The motions of the front, fastest first.
@@ -95,25 +87,26 @@ def pareto(
     Raises:
         JoulepathError: as `optimize`; InvalidProblem also for a fixed duration, or too many points.
     """
-    if not LEAST_POINTS <= points <= MOST_POINTS:
-        raise InvalidProblem("points", f"points must lie between {LEAST_POINTS} and {MOST_POINTS}.")
+    if not PARETO.least_points <= points <= PARETO.most_points:
+        allowed = f"between {PARETO.least_points} and {PARETO.most_points}"
+        raise InvalidProblem("points", f"points must lie {allowed}.")
     if problem.duration_min is not None and problem.duration_min == problem.duration_max:
         raise InvalidProblem(
             "duration", "A front runs over durations: leave duration out or give a range."
         )
     with one_thread():
-        return _Search(problem, points, clock, forward(tell)).front()
+        return _Search(problem, points, clock, only_news(tell)).front()
 
 
 class _Search:
-    """The computation of one front."""
+    """Computation of one front."""
 
     def __init__(self, problem: Problem, n: int, clock: Clock, tell: Tell) -> None:
         self.clock, self.began = clock, clock()
         self.problem, self.n, self.tell = problem, n, tell
-        self.nodes: list[_Node] = []
+        self.nodes: list[FrontNode] = []
         self.solves = 0
-        self.least: _Node
+        self.least: FrontNode
         self.fastest_run = self.run([])
         self.tried: set[bytes] = set()
         self.cut_short = False
@@ -124,10 +117,9 @@ class _Search:
         spline, found = self.fastest()
         problem = self.problem
         first = max(spline.duration, problem.duration_min or 0.0)
-        # first, so that the fastest motion is known even if the deadline passes before the other
-        # end is
+        # solved first, so that it is known even if the deadline passes before the other end is
         self.solve(first, [spline])
-        # as `optimize` solves it: with the same durations, and without what else the front knows
+        # solved as by `optimize`: with the same durations, without the knowledge of the front
         self.least = (
             self.add(self.run([]), problem.duration_max or math.inf)
             if found is None
@@ -138,7 +130,9 @@ class _Search:
                 Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q)
             )
         while (
-            len(self.nodes) < self.n and self.left() > 0 and (k := self.next_interval()) is not None
+            len(self.nodes) < self.n
+            and self.left() > 0
+            and (k := next_interval(self.nodes)) is not None
         ):
             left, right = self.nodes[k : k + 2]
             if len(self.nodes) == self.n - 1 and self.refine_last():
@@ -155,23 +149,22 @@ class _Search:
         return self.result(min(spline.duration, self.nodes[0].duration), complete)
 
     def fastest(self) -> tuple[Spline, Solution | None]:
-        """The fastest motion, and the answer of least energy if it had to be found first. Raises
-        what `optimize` does.
+        """The fastest motion, and the answer of least energy if it was needed to find the former.
 
-        Where no candidate has a motion from the starts that the fastest one is looked for from, the
-        motion of least energy is one more.
+        If no candidate has a motion from the starts of the search for the fastest motion, the
+        motion of least energy is a further start. Raises the errors of `optimize`.
         """
         self.fastest_run.prepare()
-        found, answer = fastest(self.fastest_run.incumbent), None
+        found, answer = fastest(self.fastest_run.state), None
         self.note_end(self.fastest_run)
         if found is None:
             run = self.run([])
             try:
                 answer = run.solution()
-                found = fastest(run.incumbent, [answer.trajectory.spline])
+                found = fastest(run.state, [answer.trajectory.spline])
             finally:
                 self.note_end(run)
-                self.solves += run.incumbent.solves
+                self.solves += run.state.solves
             if found is None:
                 return answer.trajectory.spline, answer
         if found.duration > (self.problem.duration_max or math.inf):
@@ -179,12 +172,13 @@ class _Search:
         return found.spline, answer
 
     def note_end(self, run: Run) -> None:
-        """Note if the deadline ended a search for a fastest motion: it has but a share of the
-        time."""
-        self.cut_short |= run.incumbent.deadline.passed
+        """Record whether the deadline ended a search for a fastest motion, which has a share of the
+        time.
+        """
+        self.cut_short |= run.state.deadline.passed
 
     def left(self) -> float:
-        """Time left [s] but for that to encode the answers so far."""
+        """Time left [s], without the time to encode the answers so far."""
         report = sum(
             report_time(self.problem, node.answer) for node in self.nodes if node.answer is not None
         )
@@ -196,12 +190,12 @@ class _Search:
         """A search between two durations [s], with its share of the time left."""
         problem = self.problem
         share = 1 / max(self.n - len(self.nodes), 1)
-        if len(self.nodes) < LEAST_POINTS:
-            share = max(share, SHARE_OF_AN_END)
+        if len(self.nodes) < PARETO.least_points:
+            share = max(share, PARETO.share_of_end)
         return Run(
             replace(
                 problem,
-                deadline=max(share * self.left(), LEAST_TIME),
+                deadline=max(share * self.left(), PARETO.least_time),
                 duration_min=problem.duration_min if least is None else least,
                 duration_max=problem.duration_max if most is None else most,
             ),
@@ -209,37 +203,38 @@ class _Search:
             self.clock,
         )
 
-    def solve(self, duration: float, known: list[Spline]) -> _Node:
+    def solve(self, duration: float, known: list[Spline]) -> FrontNode:
         """Solve for one duration [s]."""
         return self.add(self.run(known, duration, duration), duration)
 
-    def add(self, run: Run, duration: float) -> _Node:
-        """Run a search and keep its result; `duration` [s] is its place in the front if it finds no
+    def add(self, run: Run, duration: float) -> FrontNode:
+        """Run a search and keep its result; `duration` [s] is its place in the front without a
         motion.
         """
         try:
             return self.keep(run.solution())
         except (DeadlineExceeded, DurationTooShort, NoTrajectory) as error:
-            # a search has but a share of the time: the front may have time left and still lack this
-            # answer
+            # a search has a share of the time: the front may have time left and lack this answer
             self.cut_short |= isinstance(error, DeadlineExceeded)
-            return self.insert(_Node(duration, None, reason=str(error)))
+            return self.insert(FrontNode(duration, None, reason=str(error)))
         finally:
-            self.solves += run.incumbent.solves
+            self.solves += run.state.solves
 
-    def keep(self, answer: Solution) -> _Node:
-        """The node of an answer."""
-        return self.insert(_Node(answer.duration, answer, answer.energy.of(self.problem.objective)))
+    def keep(self, answer: Solution) -> FrontNode:
+        """Node of an answer."""
+        return self.insert(
+            FrontNode(answer.duration, answer, answer.energy.of(self.problem.objective))
+        )
 
-    def insert(self, node: _Node) -> _Node:
-        """The node, put among the others."""
+    def insert(self, node: FrontNode) -> FrontNode:
+        """Insert a node by its duration."""
         self.nodes.append(node)
         self.nodes.sort(key=lambda node: (node.duration, node.energy))
         self.tell_tried(node)
         return node
 
-    def tell_tried(self, node: _Node) -> None:
-        """Tell what became of the last duration."""
+    def tell_tried(self, node: FrontNode) -> None:
+        """Tell the outcome of the last duration."""
         index, answer = len(self.nodes) - 1, node.answer
         if answer is None:
             self.tell(CandidateTried(index, "failed", None, None))
@@ -247,9 +242,11 @@ class _Search:
             self.tell(CandidateTried(index, "solved", answer.lower_bound, node.energy))
             self.tell(Improved(node.energy, node.duration, q_goal=answer.goal.q))
 
-    def try_switch(self, left: _Node, right: _Node) -> bool:
-        """Solve for the right candidate's fastest duration, and just below; false if it is not
-        between the two.
+    def try_switch(self, left: FrontNode, right: FrontNode) -> bool:
+        """Solve for the fastest duration of the right candidate, and just below.
+
+        Returns:
+            False if this duration is not between the two nodes.
         """
         assert right.answer is not None
         q_start, q_goal = right.answer.start.q, right.answer.goal.q
@@ -263,13 +260,13 @@ class _Search:
         except DeadlineExceeded:
             self.cut_short = True
             return False
-        candidate = between(run.incumbent.prepared, run.incumbent.candidates, q_start, q_goal)
-        spline = fastest_of(run.incumbent, candidate)
+        candidate = between(run.state.prepared, run.state.candidates, q_start, q_goal)
+        spline = fastest_of(run.state, candidate)
         self.note_end(run)
-        self.solves += run.incumbent.solves
+        self.solves += run.state.solves
         if spline is None or not distinct(left.duration, spline.duration):
             return False
-        durations = [spline.duration * (1 - share) for share in BEFORE_JUMP]
+        durations = [spline.duration * (1 - share) for share in PARETO.before_jump]
         if distinct(spline.duration, right.duration):
             self.solve(spline.duration, [spline])
         for duration in durations:
@@ -280,8 +277,8 @@ class _Search:
         return True
 
     def refine_last(self) -> bool:
-        """Search the end of least energy again from the motion of least energy, if that is not the
-        last node.
+        """Search the end of least energy again from the motion of least energy, if it is another
+        node.
         """
         least_energy = min(self.nodes, key=lambda node: node.energy)
         if (
@@ -294,17 +291,16 @@ class _Search:
         self.add(self.run([least_energy.spline], least=self.nodes[0].duration), most)
         return True
 
-    def beats_least(self, node: _Node) -> bool:
-        """Whether a node needs clearly less energy than the answer of `optimize`: by more than
-        solves differ.
+    def beats_least(self, node: FrontNode) -> bool:
+        """Whether a node needs less energy than the answer of `optimize`, by more than the scatter
+        of solves.
         """
-        return self.least.answer is None or node.energy < self.least.energy - CONVERGED * abs(
-            self.least.energy
-        )
+        scatter = PARETO.same_energy * abs(self.least.energy)
+        return self.least.answer is None or node.energy < self.least.energy - scatter
 
-    def same_as_least(self, node: _Node) -> bool:
-        """Whether a node needs less energy than the answer of `optimize`, but by no more than
-        solves differ.
+    def same_as_least(self, node: FrontNode) -> bool:
+        """Whether a node needs less energy than the answer of `optimize`, within the scatter of
+        solves.
         """
         return (
             node is not self.least
@@ -312,35 +308,8 @@ class _Search:
             and not self.beats_least(node)
         )
 
-    def next_interval(self) -> int | None:
-        """The node behind which another duration tells most about the front; None if all are near
-        enough.
-        """
-        found = [node.energy for node in self.nodes if node.answer is not None]
-        if not found:
-            return None
-        # least energy within each duration: dominated nodes and those without a motion do not lower
-        # it
-        least = list(accumulate((min(node.energy, max(found)) for node in self.nodes), min))
-        last = next(k for k, energy in enumerate(least) if energy == least[-1])
-        rise = math.log(self.nodes[last].duration / self.nodes[0].duration)
-        fall = least[0] - least[-1]
-        longest, chosen = 0.0, None
-        for k, (left, right) in enumerate(pairwise(self.nodes[: last + 1])):
-            if not distinct(
-                left.duration, right.duration, SAME_JUMP if switches(left, right) else SAME_DURATION
-            ):
-                continue
-            falls = least[k] - least[k + 1]
-            if falls == 0 and not switches(left, right):
-                continue  # one candidate, whose slower motions here need no less energy
-            sides = math.log(right.duration / left.duration) / rise + falls / fall
-            if sides > longest:
-                longest, chosen = sides, k
-        return chosen
-
     def result(self, shortest: float, complete: bool) -> Front:
-        """The front, without the dominated nodes."""
+        """The front without dominated nodes."""
         points: list[Solution] = []
         dropped: list[Dropped] = []
         least = math.inf
@@ -366,7 +335,7 @@ class _Search:
                 least = node.energy
         if not points:
             raise DeadlineExceeded(
-                [candidate.report() for candidate in self.fastest_run.incumbent.candidates]
+                [candidate.report() for candidate in self.fastest_run.state.candidates]
             )
         return Front(
             status="optimal" if complete else "feasible",
@@ -375,19 +344,6 @@ class _Search:
             dropped=[each for each in dropped if math.isfinite(each.duration)],
             solver=FrontSolver(
                 wall_time=self.clock() - self.began,
-                nlp_solves=self.solves + self.fastest_run.incumbent.solves,
+                nlp_solves=self.solves + self.fastest_run.state.solves,
             ),
         )
-
-
-def distinct(earlier: float, later: float, share: float = SAME_DURATION) -> bool:
-    """Whether a duration [s] is longer than another by more than a relative distance."""
-    return later > earlier * (1 + share)
-
-
-def switches(left: _Node, right: _Node) -> bool:
-    """Whether two nodes have motions of different candidates."""
-    a, b = left.answer, right.answer
-    if a is None or b is None:
-        return False
-    return not (np.array_equal(a.start.q, b.start.q) and np.array_equal(a.goal.q, b.goal.q))

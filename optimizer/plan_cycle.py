@@ -1,5 +1,4 @@
-"""Public entry point: `plan_cycle(cycle)` returns a `CycleSolution`: the configurations and motions
-of a cycle of stops that need the least energy together."""
+"""Public entry point: `plan_cycle(cycle)` finds the cycle of least energy over several stops."""
 
 from __future__ import annotations
 
@@ -8,50 +7,60 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from joulepath.optimizer.cycle.against_stopping import (
-    SHARE,
-    Rested,
-    as_passed,
-    start_from,
-    stopping_baselines,
-)
 from joulepath.optimizer.cycle.cycle_baselines import (
-    compared_again,
+    chain_baseline,
     controller_default,
     given_order,
     move_by_move,
-    of_chain,
+    recompared,
 )
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import (
     CycleBaseline,
+    CycleEnergies,
     CycleMove,
     CycleSolution,
-    Needed,
-    needed_by,
+    energies_of,
 )
-from joulepath.optimizer.cycle.cycles_in_hand import CycleInHand, shared, simple_cycles
 from joulepath.optimizer.cycle.divided_paths import with_divided_paths
+from joulepath.optimizer.cycle.equal_times import in_equal_times
+from joulepath.optimizer.cycle.feasible_cycles import FeasibleCycle, allocated_cycle, simple_cycles
 from joulepath.optimizer.cycle.free_orientations import with_free_orientations
-from joulepath.optimizer.cycle.move_problem import LEAST_TIME
+from joulepath.optimizer.cycle.move_problem import MOVE
 from joulepath.optimizer.cycle.moves import moves_of
 from joulepath.optimizer.cycle.order_search import OrderSearch
 from joulepath.optimizer.cycle.proven_bound import proven_bound
+from joulepath.optimizer.cycle.stopping_cycle import (
+    STOPPING,
+    StoppingCycle,
+    moves_from_stopping,
+    solve_from_stopping,
+    stopping_baselines,
+)
 from joulepath.optimizer.cycle.stored_cycle import with_storage
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
-from joulepath.optimizer.in_hand import least_certified
+from joulepath.optimizer.feasible_answer import least_certified
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.progress import Improved, Tell, forward, nobody, only_improved
+from joulepath.optimizer.progress import Improved, Tell, no_listener, only_improved, only_news
 
-# relative: what a cycle in a given time may need above the least of its chain, and still be optimal
-WELL_SHARED = 1e-3
+
+@dataclass(frozen=True)
+class PlanCycleSettings:
+    """Settings of `plan_cycle`."""
+
+    optimal_gap: float = 1e-3
+    """Relative gap to the lower bound of the chain up to which the allocation of the time counts as
+    optimal."""
+
+
+PLAN_CYCLE = PlanCycleSettings()
 
 
 def plan_cycle(
-    cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = nobody
+    cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = no_listener
 ) -> CycleSolution:
     """Find the cycle of least energy, every move of it certified against every limit.
 
@@ -60,7 +69,7 @@ def plan_cycle(
     of least energy shares its time among the moves, and waits where that costs least.
 
     Args:
-        cycle: stops and what is asked of the cycle. Its `deadline` bounds the wall time.
+        cycle: stops and settings of the cycle. Its `deadline` bounds the wall time.
         clock: function that returns the time [s].
         tell: gets the progress: moves as candidates, and the best cycle so far.
 
@@ -69,42 +78,42 @@ def plan_cycle(
 
     Raises:
         NoSequence: no chain of configurations leads over all stops.
-        CycleTooShort: no cycle is as fast as asked for.
+        CycleTooShort: no cycle is as fast as requested.
         PathInfeasible: no configuration follows the path or a line of a stop.
         InCollision: every configuration at the start or at a stop collides.
         DeadlineExceeded: the deadline passed before any cycle was certified.
         JoulepathError: a stop or a move fails for another reason of `optimize`; it names the stop.
     """
     with one_thread():
-        began, tell = clock(), forward(tell)
-        asked = _divided(cycle, clock)
-        found = with_free_orientations(asked, lambda other: _valued(other, clock, tell), clock)
+        began, tell = clock(), only_news(tell)
+        cycle = _divided(cycle, clock)
+        found = with_free_orientations(cycle, lambda other: _valued(other, clock, tell), clock)
         _tell_found(tell, found)
-        return replace(found, wall_time=clock() - began)
+        return replace(in_equal_times(cycle, found), wall_time=clock() - began)
 
 
-def _valued(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
+def _valued(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
     """The cycle of least energy on its bus."""
-    if asked.arm.bus.mode == "storage":
-        # energies on the buses on which it is looked for are not those of the cycle
-        return with_storage(asked, lambda other: _optimized(other, clock, nobody), clock)
-    return _optimized(asked, clock, tell)
+    if cycle.arm.bus.mode == "storage":
+        # energies on the buses of the search are not those of the cycle
+        return with_storage(cycle, lambda other: _optimized(other, clock, no_listener), clock)
+    return _optimized(cycle, clock, tell)
 
 
-def _optimized(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
-    """The cycle of least energy, in the order that is given or the best one."""
+def _optimized(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
+    """The cycle of least energy, in the given or the best order."""
     began = clock()
-    if asked.order is None:
-        return _in_given_order(asked, clock, tell)
-    orders = OrderSearch(asked, clock, tell)
+    if cycle.order is None:
+        return _in_given_order(cycle, clock, tell)
+    orders = OrderSearch(cycle, clock, tell)
     ordered = orders.run()
-    left = max(asked.deadline - (clock() - began), LEAST_TIME)
-    # the moves of every order have been told already
+    left = max(cycle.deadline - (clock() - began), MOVE.least_time)
+    # the moves of all orders have been told before
     found = _in_given_order(replace(ordered, deadline=left), clock, only_improved(tell))
-    left = asked.deadline - (clock() - began)
-    baseline = given_order(asked, left, found, clock) if asked.objective == "electrical" else None
+    left = cycle.deadline - (clock() - began)
+    baseline = given_order(cycle, left, found, clock) if cycle.objective == "electrical" else None
     # unsolved moves weigh more than their bounds on mechanical work
-    by_bounds = asked.objective == "electrical"
+    by_bounds = cycle.objective == "electrical"
     # the bound of the best order does not hold for the others
     found = replace(
         found,
@@ -113,93 +122,103 @@ def _optimized(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
         else "feasible",
         lower_bound=min(orders.bound, found.lower_bound),
     )
-    return found if baseline is None else _no_dearer_than(asked, found, baseline)
+    return found if baseline is None else _no_dearer_than(cycle, found, baseline)
 
 
-def _no_dearer_than(asked: Cycle, found: CycleSolution, baseline: CycleBaseline) -> CycleSolution:
-    """The cycle with one more baseline, which becomes the answer itself if it needs less."""
+def _no_dearer_than(cycle: Cycle, found: CycleSolution, baseline: CycleBaseline) -> CycleSolution:
+    """The cycle with one more baseline, which becomes the answer if it needs less energy."""
     found = replace(found, baselines=[*found.baselines, baseline])
-    if baseline.saving >= 0:
+    if baseline.saving is None or baseline.saving >= 0:
         return found
     found = replace(found, status="feasible", moves=list(baseline.moves), price_of_time=0.0)
     return replace(
-        found, baselines=[compared_again(asked, each, found.needed) for each in found.baselines]
+        found, baselines=[recompared(cycle, each, found.energies) for each in found.baselines]
     )
 
 
-def _divided(asked: Cycle, clock: Clock) -> Cycle:
-    """The cycle with its paths divided where they have to be, in the time that is left."""
-    end = Deadline.after(asked.deadline, clock)
+def _divided(cycle: Cycle, clock: Clock) -> Cycle:
+    """The cycle with divided paths, and the remaining time as its deadline."""
+    end = Deadline.after(cycle.deadline, clock)
     try:
         with watch(end):
-            divided = with_divided_paths(asked)
+            divided = with_divided_paths(cycle)
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
-    return asked if divided is asked else replace(divided, deadline=max(end.left, LEAST_TIME))
+    return cycle if divided is cycle else replace(divided, deadline=max(end.left, MOVE.least_time))
 
 
 def _tell_found(tell: Tell, found: CycleSolution) -> None:
-    tell(Improved(found.needed.of(found.objective), found.duration, found.lower_bound))
+    tell(Improved(found.energies.of(found.objective), found.duration, found.lower_bound))
 
 
-def _in_given_order(asked: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
-    """The cycle of least energy over the stops in their order, no worse than with rests where it
-    passes.
+def _in_given_order(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:
+    """The cycle of least energy in the given order, no worse than the cycle with rests at all
+    stops.
     """
-    if not asked.passes:
-        return _searched(asked, clock, tell)
+    if not cycle.has_passes:
+        return _searched(cycle, clock, tell)
     began, stopping = clock(), None
-    # where there is none with rests, there may be one without: it takes less time
+    # a cycle without rests takes less time and may exist where none with rests does
     with suppress(JoulepathError):
         stopping = _searched(
-            replace(asked, stopping=True, deadline=SHARE * asked.deadline), clock, nobody
+            replace(cycle, rests_at_passes=True, deadline=STOPPING.deadline_share * cycle.deadline),
+            clock,
+            no_listener,
         )
-    left = max(asked.deadline - (clock() - began), LEAST_TIME)
-    return _searched(replace(asked, deadline=left), clock, tell, stopping)
+    left = max(cycle.deadline - (clock() - began), MOVE.least_time)
+    return _searched(replace(cycle, deadline=left), clock, tell, stopping)
 
 
 @dataclass(frozen=True)
 class _Found:
-    """The moves of a chain, the price of time [W], and the bound [J] that holds for any time;
-    `timing` is the search in a given time, if there was one, and `shared`: its time is shared so
-    that no chain can be better. `greedy` is the chain of `move_by_move`; `simple` are the cycles
-    that take no search."""
+    """A cycle found.
+
+    Attributes:
+        nodes: nodes of its chain.
+        moves: its moves.
+        price: price of time [W].
+        bound: lower bound for cycles of any duration [J].
+        timing: search in a given time; None without one.
+        optimal_time: whether the time is allocated so well that no other chain can be better.
+        greedy: chain of `move_by_move`.
+        simple: feasible cycles that needed no search.
+    """
 
     nodes: list[int]
     moves: list[CycleMove]
     price: float
     bound: float
     timing: TimedSearch | None = None
-    shared: bool = True
+    optimal_time: bool = True
     greedy: list[int] | None = None
-    simple: Sequence[CycleInHand] = ()
+    simple: Sequence[FeasibleCycle] = ()
 
 
 def _searched(
-    asked: Cycle, clock: Clock, tell: Tell, stopping: CycleSolution | None = None
+    cycle: Cycle, clock: Clock, tell: Tell, stopping: CycleSolution | None = None
 ) -> CycleSolution:
-    """The cycle of least energy; `stopping` is that with rests at the stops that it passes."""
-    search = CycleSearch(asked, clock, tell=tell)
-    rested = None if stopping is None else start_from(search, stopping)
+    """The cycle of least energy; `stopping` is the solution with rests at all stops."""
+    search = CycleSearch(cycle, clock, tell=tell)
+    rested = None if stopping is None else solve_from_stopping(search, stopping)
     try:
         found = _best_of(search)
         if (
             rested is not None
             and rested.nodes
-            and rested.known.energy < needed_by(found.moves).electrical.energy
+            and rested.known.energy < energies_of(found.moves).electrical.energy
         ):
             found = replace(_as_stopping(search, rested), timing=found.timing)
     except JoulepathError:
         if rested is None or not rested.nodes:
             raise
         found = _as_stopping(search, rested, better=False)
-    ours, bound = needed_by(found.moves), found.bound
+    ours, bound = energies_of(found.moves), found.bound
     if found.timing is not None:
-        bound = max(bound, found.timing.bound(found.price, ours.of(asked.objective)))
+        bound = max(bound, found.timing.bound(found.price, ours.of(cycle.objective)))
     complete = all(layer.complete for leg in search.legs for layer in leg.layers)
     # a path may be divided at other places
     divided = any(
-        move.tool_path is not None and move.tool_path.section is not None for move in asked.moves
+        move.tool_path is not None and move.tool_path.section is not None for move in cycle.moves
     )
     return CycleSolution(
         status="optimal" if complete and not divided and _is_done(search, found) else "feasible",
@@ -208,31 +227,31 @@ def _searched(
         price_of_time=found.price,
         baselines=_baselines(search, found, ours)
         if rested is None
-        else stopping_baselines(asked, rested, ours),
+        else stopping_baselines(cycle, rested, ours),
         complete=complete,
         wall_time=0.0,
-        objective=asked.objective,
+        objective=cycle.objective,
     )
 
 
 def _best_of(search: CycleSearch) -> _Found:
-    """The best chain that the search finds, in the time that is asked for."""
-    asked = search.asked
-    if asked.objective == "mechanical":
-        assert asked.duration_max is not None
+    """The best chain found by a search, in an allowed duration."""
+    cycle = search.cycle
+    if cycle.objective == "mechanical":
+        assert cycle.duration_max is not None
         # slower moves do less work: the cycle has no time of its own
-        return _in_time(search, asked.duration_max, [])
+        return _in_time(search, cycle.duration_max, [])
     nodes = search.run()
-    # what passes has the cycle with rests instead
-    greedy = move_by_move(search) if asked.compared and not asked.passes else None
+    # the baseline of a passing cycle is the cycle with rests
+    greedy = move_by_move(search) if cycle.with_baselines and not cycle.has_passes else None
     if greedy is not None and search.cost(greedy) < search.cost(nodes):
-        # by what the search could not tell apart: motions that were not yet optimised to the end
+        # the search could not distinguish motions before their convergence
         nodes = greedy
     moving = [search.solutions[each] for each in search.pairs(nodes)]
-    own = sum(each.duration for each in moving) + asked.dwelling
-    duration = asked.nearest_duration(own)
+    own = sum(each.duration for each in moving) + cycle.dwell_time
+    duration = cycle.clamped_duration(own)
     if duration == own:
-        bound = proven_bound(asked, search.legs, search.end)
+        bound = proven_bound(cycle, search.legs, search.end)
         return _Found(nodes, moves_of(search, nodes, moving, {}), 0.0, bound, greedy=greedy)
     chains = [nodes, *([greedy] if greedy is not None and greedy != nodes else [])]
     found = _in_time(search, duration, chains)
@@ -242,51 +261,61 @@ def _best_of(search: CycleSearch) -> _Found:
 
 
 def _in_time(search: CycleSearch, duration: float, chains: Sequence[list[int]]) -> _Found:
-    """The best cycle found in a duration [s], from the first of the `chains` whose motions are
-    known, or from the fastest one; never one that needs more than a simple cycle in hand."""
+    """The best cycle found in a given duration, never dearer than a certified simple cycle.
+
+    Args:
+        search: search of the cycle in its own time.
+        duration: duration of the cycle [s].
+        chains: chains with known motions, to start from the first one.
+    """
     timing, timed, best = TimedSearch(search, duration), None, None
     failure: JoulepathError = NoTrajectory([])
     try:
         timed = timing.run(chains[0] if chains else None)
-        best = shared(timing, timed)
+        best = allocated_cycle(timing, timed)
     except (NoTrajectory, DeadlineExceeded) as error:
         failure = error
     chains = [*chains, *([timed.nodes] if timed is not None and timed.nodes not in chains else [])]
     simple = simple_cycles(
-        timing, chains, best is None or (search.asked.compared and not search.asked.passes)
+        timing,
+        chains,
+        best is None or (search.cycle.with_baselines and not search.cycle.has_passes),
     )
     found = least_certified([*([] if best is None else [best]), *simple])
     if found is None:
         raise failure
-    bound = proven_bound(search.asked, search.legs, search.end)
-    needed, waits = found.cost, {found.at: (found.waited, found.wait_energy)}
-    is_shared = timed is not None and needed - timed.least <= WELL_SHARED * abs(needed)
+    bound = proven_bound(search.cycle, search.legs, search.end)
+    needed, waits = found.cost, {found.wait_after: (found.wait_time, found.wait_energy)}
+    gap = PLAN_CYCLE.optimal_gap * abs(needed)
+    is_optimal = timed is not None and needed - timed.least <= gap
     return _Found(
         found.nodes,
         moves_of(search, found.nodes, found.solutions or [], waits, timing.sought),
-        timed.shared.price if timed is not None and found is best else found.price,
+        timed.allocation.price if timed is not None and found is best else found.price,
         bound,
         timing,
-        timing.exact and is_shared,
+        timing.exact and is_optimal,
         simple=simple,
     )
 
 
-def _as_stopping(search: CycleSearch, rested: Rested, better: bool = True) -> _Found:
-    """The chain of the cycle with rests, `better` where it passes if the search finds that."""
-    moves = moves_of(search, rested.nodes, *as_passed(search, rested, better))
-    bound = proven_bound(search.asked, search.legs, search.end)
-    return _Found(rested.nodes, moves, rested.solution.price_of_time, bound, shared=False)
+def _as_stopping(search: CycleSearch, rested: StoppingCycle, better: bool = True) -> _Found:
+    """The cycle with rests at all stops, with passing motions where `better` and found."""
+    moves = moves_of(search, rested.nodes, *moves_from_stopping(search, rested, better))
+    bound = proven_bound(search.cycle, search.legs, search.end)
+    return _Found(rested.nodes, moves, rested.solution.price_of_time, bound, optimal_time=False)
 
 
-def _baselines(search: CycleSearch, found: _Found, ours: Needed) -> list[CycleBaseline]:
-    """The cycle in other ways, as far as they are known."""
-    if search.asked.passes or not search.asked.compared:
+def _baselines(search: CycleSearch, found: _Found, ours: CycleEnergies) -> list[CycleBaseline]:
+    """The baselines of a cycle, as far as they are known."""
+    if search.cycle.has_passes or not search.cycle.with_baselines:
         return []
     compared = [
-        None if found.greedy is None else of_chain(search, found.greedy, "move_by_move", ours),
+        None
+        if found.greedy is None
+        else chain_baseline(search, found.greedy, "move_by_move", ours),
         controller_default(search, found.nodes[0], ours),
-        # moves slowed alike are those of our chain
+        # uniformly slowed moves are compared for our chain alone
         *(
             each.baseline(ours)
             for each in found.simple
@@ -297,8 +326,8 @@ def _baselines(search: CycleSearch, found: _Found, ours: Needed) -> list[CycleBa
 
 
 def _is_done(search: CycleSearch, found: _Found) -> bool:
-    """Whether no other chain can be better, and every move converged."""
+    """Whether no other chain can be better, and every move has converged."""
     sampled = any(layer.sampled for leg in search.legs for layer in leg.layers)
     converged = all(move.solution.status == "optimal" for move in found.moves)
     open_ = sampled or search.cut_short or search.failed or search.leaves_better
-    return converged and found.shared and not open_
+    return converged and found.optimal_time and not open_

@@ -1,5 +1,4 @@
-"""A problem with its models, ready to compute with: torques, energy and constraints of its
-motions."""
+"""A problem with its models: torques, energy and constraints of its motions."""
 
 from __future__ import annotations
 
@@ -8,20 +7,22 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import ClosestPair
-from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, waits
+from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, holding_times
 from joulepath.optimizer.dynamics.interval import arm_spread
+from joulepath.optimizer.dynamics.kernel import Kernel
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.dynamics.sensitivity import waiting_sensitivity
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, joint_path, traces
+from joulepath.optimizer.kinematics.tool_path.followed_paths import FollowedPaths
 from joulepath.optimizer.kinematics.tool_path.least_speed import LeastSpeed
 from joulepath.optimizer.kinematics.tool_path.least_time import least_time
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.motion.limit_ratios import too_much
+from joulepath.optimizer.motion.limit_ratios import excess_text
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
@@ -30,37 +31,23 @@ from joulepath.optimizer.problem.targets import Target
 from joulepath.optimizer.result.energy import Energy, Sensitivity
 from joulepath.optimizer.surroundings import Surroundings
 
-# value of a second in a minimum-time solve [W]: a hundred times what energy could make up for
-TIME_WEIGHT = 1e4
-# rounding of a constraint ratio
-RATIO_ROUNDING = 1e-6
-# what is built for an arm, whatever the problem
-_OF_THE_ARM = frozenset(
-    ("kernel", "model", "_data", "electrical_parameters", "surroundings", "path")
-)
+
+@dataclass(frozen=True)
+class PreparedProblemSettings:
+    """Settings of a prepared problem."""
+
+    time_weight: float = 1e4
+    """Value of a second in a minimum-time solve [W]: 100 times what energy could make up for."""
+    ratio_rounding: float = 1e-6
+    """Rounding error of a constraint ratio [1]."""
+
+
+PREPARED = PreparedProblemSettings()
 
 
 @dataclass(frozen=True)
-class PreparedProblem(Plant):
-    """A problem with everything that its candidates share: kernel, rigid-body model, path
-    constraints, surroundings.
-    """
-
-    problem: Problem
-
-    @classmethod
-    def of(cls, problem: Problem) -> PreparedProblem:
-        """The problem with its models. They are built when they are first used."""
-        return cls(problem.arm, problem)
-
-    def sharing(self, problem: Problem) -> PreparedProblem:
-        """Another problem of the same arm, with those models of the arm that are built."""
-        assert problem.arm is self.arm
-        other = PreparedProblem.of(problem)
-        vars(other).update(
-            {name: value for name, value in vars(self).items() if name in _OF_THE_ARM}
-        )
-        return other
+class ArmModels(Plant):
+    """Models of an arm. They are built at their first use and shared by all problems of the arm."""
 
     @cached_property
     def surroundings(self) -> Surroundings:
@@ -69,41 +56,97 @@ class PreparedProblem(Plant):
 
     @cached_property
     def path(self) -> PathConstraints | None:
-        """Constraints along the path except clearance; None if there are none."""
+        """Path constraints except clearance; None if there are none."""
         return path_constraints_of(self.arm)
+
+
+@dataclass(frozen=True)
+class PreparedProblem(Plant):
+    """A problem with the models that all its candidates share."""
+
+    problem: Problem
+    models: ArmModels
+
+    @classmethod
+    def of(cls, problem: Problem, models: ArmModels | None = None) -> PreparedProblem:
+        """The problem with models of its arm.
+
+        Args:
+            problem: problem to prepare.
+            models: models of the same arm, to be shared; None for new ones.
+        """
+        assert models is None or models.arm is problem.arm
+        return cls(problem.arm, problem, ArmModels(problem.arm) if models is None else models)
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """Compiled functions of the robot."""
+        return self.models.kernel
+
+    @cached_property
+    def model(self) -> pin.Model:
+        """Pinocchio model of the arm, payload and gravity included."""
+        return self.models.model
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        return self.models._data
+
+    @cached_property
+    def electrical_parameters(self) -> Array:
+        """Kernel parameters of the electrical energy as the cost."""
+        return self.models.electrical_parameters
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Collisions of the arm with itself and the scene."""
+        return self.models.surroundings
+
+    @property
+    def path(self) -> PathConstraints | None:
+        """Path constraints except clearance; None if there are none."""
+        return self.models.path
 
     @cached_property
     def course(self) -> ToolCourse | None:
-        """The course of the problem's tool path; None if there is none."""
+        """Course of the TCP along the problem's tool path; None without one."""
         path, start, goal = self.problem.tool_path, self.problem.start, self.problem.goal
         if path is None:
             return None
         return ToolCourse.of(path, self._pose(start), self._pose(goal))
 
     def _pose(self, end: Target) -> Array | ConeOrientedPose:
-        """T_base_tcp (4, 4) at an end that is a pose or joint positions; the end itself if a
-        rotation is free there.
-        """
+        """T_base_tcp (4, 4) at an end; the end itself if it leaves a rotation free."""
         if isinstance(end, ConeOrientedPose):
             return end
         return end.T if isinstance(end, Pose) else tcp_pose(self.arm, np.asarray(end))
 
     @cached_property
+    def followed(self) -> FollowedPaths:
+        """Memo of the tool path as the arm follows it; only for a problem with a tool path."""
+        assert self.course is not None
+        return FollowedPaths(self.arm, self.course)
+
+    @cached_property
     def least_speed(self) -> LeastSpeed | None:
-        """The least speed on the tool path; None if there is none."""
+        """Least speed on the tool path; None without one."""
         return None if self.course is None else LeastSpeed.of(self.arm, self.course)
 
     @cached_property
     def least_time(self) -> float:
-        """Least duration [s] that the tool path leaves to a motion; zero without one."""
+        """Least duration of a motion along the tool path [s]; zero without one."""
         return 0.0 if self.course is None else least_time(self.arm, self.course)
 
     def freed(self, start: Target | None = None, goal: Target | None = None) -> Problem:
-        """The problem without its tool path, of motions that last as long as those along it: their
-        bounds hold for these.
+        """The problem without its tool path, for motions of at least the path's duration.
 
-        It is between `start` and `goal`, or the problem's own ends. Only along a path may a start
-        leave its orientation free: such a problem needs another start.
+        Every motion along the tool path is a motion of this problem, so lower bounds of this
+        problem hold along the path.
+
+        Args:
+            start: start of the problem; None for its own start. Only along a path may a start leave
+                its orientation free, so such a problem needs another start.
+            goal: goal of the problem; None for its own goal.
         """
         problem, least = self.problem, self.least_time
         shortest = min(max(problem.duration_min or 0.0, least), problem.duration_max or np.inf)
@@ -115,75 +158,28 @@ class PreparedProblem(Plant):
             goal=problem.goal if goal is None else goal,
         )
 
-    @cached_property
-    def traces(self) -> dict[bytes, Trace]:
-        """The tool path as it was followed from starts q (nq,) [rad], by the bytes of these."""
-        return {}
-
-    @cached_property
-    def even_motions(self) -> dict[tuple[bytes, float, float], tuple[Spline | None, bool]]:
-        """Motions at the tool path's fixed speed, and whether they are within the limits, by the
-        joints' path and the times [s] of both ramps."""
-        return {}
-
-    @cached_property
-    def _joint_paths(self) -> dict[bytes, Spline | None]:
-        return {}
-
-    def joint_path(self, q_start: Array) -> Spline | None:
-        """The joints' path over [0, 1] along the tool path, from q_start (nq,) [rad]; None if they
-        cannot follow it.
-        """
-        assert self.course is not None
-        key = q_start.tobytes()
-        if key not in self._joint_paths:
-            if key not in self.traces:
-                (self.traces[key],) = traces(self.arm, self.course, q_start[None])
-            trace = self.traces[key]
-            self._joint_paths[key] = (
-                joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
-            )
-        return self._joint_paths[key]
-
-    @cached_property
-    def _chosen(self) -> set[bytes]:
-        return set()
-
-    def is_chosen(self, q_start: Array) -> bool:
-        """Whether other turnings of the tool have been looked for from q_start (nq,) [rad] on."""
-        return q_start.tobytes() in self._chosen
-
-    def choose(
-        self, q_start: Array, trace: Trace | None = None, path: Spline | None = None
-    ) -> None:
-        """Note that turnings have been looked for from q_start (nq,) [rad] on; the joints follow
-        that of a trace, by `path`, from now on."""
-        key = q_start.tobytes()
-        self._chosen.add(key)
-        if trace is not None:
-            self.traces[key], self._joint_paths[key] = trace, path
-
     def broken_on_the_way(self, q: Sequence[Array], v: Sequence[Array]) -> list[list[str]]:
-        """What samples q [rad], v [rad/s] (k, nq) of each motion break, in words: path constraints,
-        a margin.
+        """Violated path constraints and margins of several motions, in words.
+
+        Args:
+            q: positions of every motion, shape (k, nq) [rad].
+            v: velocities of every motion, shape (k, nq) [rad/s].
         """
         collisions = self.surroundings.worst_collisions(q)
-        return [self._broken(*each) for each in zip(q, v, collisions, strict=True)]
+        return [self._broken(*sampled) for sampled in zip(q, v, collisions, strict=True)]
 
     def _broken(self, q: Array, v: Array, collision: ClosestPair | None) -> list[str]:
-        broken = []
+        broken, rounding = [], PREPARED.ratio_rounding
         if self.path is not None:
             worst = self.path.ratios(q, v).max(axis=0)
             ratios = dict(
                 sorted(zip(self.path.names, worst, strict=True), key=lambda each: each[1])
             )
             broken = [
-                too_much(name, ratio)
-                for name, ratio in ratios.items()
-                if ratio > 1 + RATIO_ROUNDING
+                excess_text(name, ratio) for name, ratio in ratios.items() if ratio > 1 + rounding
             ]
         slowest = np.inf if self.least_speed is None else self.least_speed.reached(q, v)
-        if slowest < 1 - RATIO_ROUNDING:
+        if slowest < 1 - rounding:
             broken.append(f"path speed {(1 - slowest) * 100:.3g} % below its least one")
         if collision is not None:
             first, second = collision.pair
@@ -193,8 +189,7 @@ class PreparedProblem(Plant):
         return broken
 
     def holding_power(self, q: Array) -> Array:
-        """Power drawn (...) [W] while the motors hold the arm at standstill at q (..., nq)
-        [rad]."""
+        """Power (...) [W] drawn while the motors hold the arm still at q (..., nq) [rad]."""
         configurations = q.reshape(-1, q.shape[-1])
         standstill = np.zeros_like(configurations)
         return holding_power(
@@ -202,7 +197,7 @@ class PreparedProblem(Plant):
         ).reshape(q.shape[:-1])
 
     def energy(self, spline: Spline) -> Energy:
-        """Energy of a motion and of waiting after it, exact except for quadrature."""
+        """Energy of a motion and of the dwell after it, exact except for quadrature."""
         energy, dwell = super().energy(spline), self.problem.dwell
         if dwell is None:
             return energy
@@ -210,16 +205,14 @@ class PreparedProblem(Plant):
         return energy.with_dwell(dwell_energy(dwell, self.arm, hold, spline.duration))
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
-        """How the electrical energy of a motion, and of waiting after it, hangs on the arm's
-        figures.
-        """
+        """Sensitivity of the electrical energy of a motion and its dwell to the arm's figures."""
         moving, dwell = super().sensitivity(spline), self.problem.dwell
         if dwell is None:
             return moving
         still = np.zeros((1, self.arm.robot.nq))
         q_end = spline.control_points[-1]
         held = self.torques(q_end[None], still, still)[0]
-        times = waits(dwell, spline.duration)
+        times = holding_times(dwell, spline.duration)
         return moving + waiting_sensitivity(
             self.arm, q_end, held, *times, dwell, arm_spread(self.arm)
         )
@@ -231,15 +224,13 @@ class PreparedProblem(Plant):
 
     @cached_property
     def fastest_parameters(self) -> Array:
-        """Kernel parameters that minimise the duration; a little energy beside it conditions the
-        NLP.
-        """
-        return self.parameters(electrical=1.0, time=TIME_WEIGHT)
+        """Kernel parameters of the duration as objective; a little energy conditions the NLP."""
+        return self.parameters(electrical=1.0, time=PREPARED.time_weight)
 
     def objective_of(self, energy: Energy) -> float:
-        """The part of an energy that is minimised [J]."""
+        """Part of an energy that the problem minimises [J]."""
         return energy.of(self.problem.objective)
 
     def cost_of(self, spline: Spline | None) -> float:
-        """The part of a motion's energy that is minimised [J]; infinite if there is no motion."""
+        """Objective of a motion [J]; infinite without a motion."""
         return np.inf if spline is None else self.objective_of(self.energy(spline))

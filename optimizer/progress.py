@@ -1,6 +1,4 @@
-"""What a search tells while it runs: the number of its candidates, what became of those it tried,
-the best so far.
-"""
+"""Progress of a search: number and outcomes of its candidates, and the best answer so far."""
 
 from __future__ import annotations
 
@@ -13,17 +11,20 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class CandidatesFound:
-    """There are `total` candidates. There may be more later."""
+    """Number of candidates; more may follow later."""
 
     total: int
 
 
 @dataclass(frozen=True)
 class CandidateTried:
-    """What became of the candidate of this index: the `energy` [J] of its motion, None without one.
+    """Outcome of a candidate.
 
-    `pruned`: it was given up, since it comes to no less energy than the best motion. `bound` [J] is
-    its proven lower bound, None if none is known.
+    Attributes:
+        index: number of the candidate.
+        status: `solved`, `failed`, or `pruned` if it cannot need less energy than the best motion.
+        bound: proven lower bound [J]; None if unknown.
+        energy: objective of its motion [J]; None without a motion.
     """
 
     index: int
@@ -34,11 +35,13 @@ class CandidateTried:
 
 @dataclass(frozen=True, eq=False)
 class Improved:
-    """The best answer so far: its `energy` [J], its `duration` [s], and `q_goal` (nq,) [rad] in
-    which it ends.
+    """Best answer so far. None stands for an unknown value.
 
-    No answer needs less than `bound` [J]. None stands for what is not known yet, or what the answer
-    does not have.
+    Attributes:
+        energy: objective [J].
+        duration: duration [s].
+        bound: lower bound for all answers [J].
+        q_goal: configuration at the goal, shape (nq,) [rad].
     """
 
     energy: float
@@ -51,12 +54,14 @@ Event = CandidatesFound | CandidateTried | Improved
 Tell = Callable[[Event], None]
 
 
-def nobody(event: Event) -> None:
-    """Listens to a search that nobody listens to."""
+def no_listener(event: Event) -> None:
+    """No-op listener."""
 
 
-class Forward:
-    """Passes on what is news: no number falls, no energy rises, no candidate comes twice."""
+class NewsFilter:
+    """Passes on events with news: more candidates, new candidates, less energy or a higher
+    bound.
+    """
 
     def __init__(self, tell: Tell) -> None:
         self._tell = tell
@@ -65,7 +70,7 @@ class Forward:
         self._best: Improved | None = None
 
     def __call__(self, event: Event) -> None:
-        """Passes the event on, if it is news."""
+        """Pass the event on if it has news."""
         if isinstance(event, CandidatesFound):
             if event.total <= self._total:
                 return
@@ -82,25 +87,26 @@ class Forward:
         self._tell(event)
 
 
-def forward(tell: Tell) -> Tell:
-    """What passes on to `tell` what is news."""
-    return tell if tell is nobody else Forward(tell)
+def only_news(tell: Tell) -> Tell:
+    """Listener that passes on to `tell` only events with news."""
+    return tell if tell is no_listener else NewsFilter(tell)
 
 
 def only_improved(tell: Tell) -> Tell:
-    """What passes on to `tell` the best answers alone, of a search whose bound does not hold for
-    all of them.
+    """Listener that passes on to `tell` only the best answers, without bounds.
+
+    For a search whose bound does not hold for all answers.
     """
 
     def passed(event: Event) -> None:
         if isinstance(event, Improved):
             tell(replace(event, bound=None))
 
-    return nobody if tell is nobody else passed
+    return no_listener if tell is no_listener else passed
 
 
 def _better(event: Improved, known: Improved | None) -> Improved:
-    """What is known after an event: `known` itself if nothing is better."""
+    """The best answer after an event; the very object `known` if nothing is better."""
     if known is None:
         return event
     bounds = [each.bound for each in (known, event) if each.bound is not None]

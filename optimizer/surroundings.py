@@ -1,11 +1,9 @@
-"""Collisions of an arm with itself and its scene: clearance of motions, clearance constraints,
-collision-free paths.
-"""
+"""Collisions of an arm with itself and its scene: clearances, constraints and planned paths."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,13 +13,9 @@ from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.clearance_constraint import ClearanceConstraint
 from joulepath.optimizer.collision.clearance_proof import is_proven_clear, proven_clearance
 from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
-from joulepath.optimizer.collision.planner.path_planner import (
-    USUAL,
-    Effort,
-    PlannedPaths,
-    PlanningEnd,
-    plan_paths,
-)
+from joulepath.optimizer.collision.planner.path_planner import USUAL_EFFORT, Effort, plan_paths
+from joulepath.optimizer.collision.planner.planned_path_memo import PlannedPathMemo
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths
 from joulepath.optimizer.collision.planner.state_validity import ValidityCheckers
 from joulepath.optimizer.collision.stand_ins import StandIns
 from joulepath.optimizer.deadline import Deadline
@@ -31,20 +25,28 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.certificate import Clearance
 
-# samples of a motion at which distances are computed
-CONTACT_SAMPLES = 96
-# pairs that stay farther apart than this [m] throughout a motion get no clearance constraint
-ACTIVE = 0.15
-# clearance [m] beyond the margins below which an obstacle is likely to limit the optimum
-NEAR_CONTACT = 5e-3
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """Settings of the sampled collision checks."""
+
+    samples: int = 96
+    """Samples of a motion at which distances are computed."""
+    active_distance: float = 0.15
+    """Distance above which a pair of bodies gets no clearance constraint [m]."""
+    near_contact: float = 5e-3
+    """Clearance beyond the margins below which an obstacle is likely to limit the optimum [m]."""
+
+
+CONTACT = ContactSettings()
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The collision side of a problem's arm, shared by all candidates. If `arm.collisions` is
-    false, nothing collides.
+    """Collision models of an arm, shared by all problems of this arm.
 
-    All distances [m] have the margins of the obstacles subtracted.
+    All distances [m] have the margins of the obstacles subtracted. If `arm.collisions` is false,
+    nothing collides.
     """
 
     arm: Arm
@@ -59,80 +61,91 @@ class Surroundings:
         return StandIns.of(self.arm)
 
     def unmodelled_contacts(self, spline: Spline) -> list[Clearance]:
-        """What would touch in a motion, by samples, if stand-ins took the place of a tool and
-        payload without shape.
-        """
+        """Sampled contacts of bodies that stand in for a tool or payload without a shape."""
         if self._stand_ins is None:
             return []
         return self._stand_ins.contacts(
-            np.linspace(0.0, spline.duration, CONTACT_SAMPLES), self._samples(spline)
+            np.linspace(0.0, spline.duration, CONTACT.samples), self._samples(spline)
         )
 
     def worst_violation(self, spline: Spline) -> Clearance | None:
-        """Clearance of a motion whose margins are violated or not proven: distance, pair and time.
+        """Clearance of a motion whose margins are violated or not proven.
 
-        None if the margins are proven, or if collisions are not checked.
+        Returns:
+            The distance, pair of bodies and time; None if the margins are proven, or if collisions
+            are not checked.
         """
         if not self.arm.collisions:
             return None
         if is_proven_clear(self.model, spline):
             return None
-        distance = self.model.along(self._samples(spline), 0.0)
+        distance = self.model.distances_along(self._samples(spline), 0.0)
         least = float(distance.min(initial=np.inf))
         if least < 0:
             k, pair = np.unravel_index(int(distance.argmin()), distance.shape)
-            time = spline.duration * float(k) / (CONTACT_SAMPLES - 1)
+            time = spline.duration * float(k) / (CONTACT.samples - 1)
             return Clearance(least, least, self.model.names(int(pair)), time)
         found = proven_clearance(self.model, spline)
         return found if found is not None and found.min_clearance < 0 else None
 
     def is_collision_free(self, q: Array) -> bool:
-        """Whether samples q (k, nq) [rad] of a motion keep all margins. About CONTACT_SAMPLES of
-        them are checked.
+        """Whether the samples q (k, nq) [rad] of a motion keep all margins.
+
+        About `CONTACT.samples` of the samples are checked.
         """
         if not self.arm.collisions:
             return True
         return self._least_distance(q, 0.0) >= 0
 
     def worst_collisions(self, motions: Sequence[Array]) -> list[ClosestPair | None]:
-        """The pair that violates its margin most over the samples q (k, nq) [rad] of each motion;
-        None if none does.
+        """Most violated pair of bodies of several motions.
 
-        About CONTACT_SAMPLES of the samples are checked, those of motions along the same path once.
+        About `CONTACT.samples` of the samples are checked. Motions through the same samples are
+        checked once.
+
+        Args:
+            motions: samples q of every motion, shape (k, nq) [rad].
+
+        Returns:
+            The pair for every motion; None if all margins are kept.
         """
         if not self.arm.collisions or not len(self.model.pairs):
             return [None] * len(motions)
-        paths = {id(q): _thinned(q) for q in motions}
-        distance = self.model.along(np.concatenate(list(paths.values())), within=0.0)
+        keys = [q.tobytes() for q in motions]
+        paths = {key: _thinned(q) for key, q in zip(keys, motions, strict=True)}
+        distance = self.model.distances_along(np.concatenate(list(paths.values())), within=0.0)
         parts = np.split(distance, np.cumsum([len(q) for q in paths.values()])[:-1])
         found = {key: self._worst(part) for key, part in zip(paths, parts, strict=True)}
-        return [found[id(q)] for q in motions]
+        return [found[key] for key in keys]
 
     def _worst(self, distance: Array) -> ClosestPair | None:
-        """The pair of the least of the distances (k, pairs) [m]; None if none is negative."""
+        """Pair with the least of the distances (k, pairs) [m]; None if none is negative."""
         sample, pair = np.unravel_index(int(distance.argmin()), distance.shape)
         least = float(distance[sample, pair])
         return ClosestPair(self.model.names(int(pair)), least) if least < 0 else None
 
     def is_near_contact(self, q: Array) -> bool:
-        """Whether any of q (k, nq) [rad] has a clearance below NEAR_CONTACT.
+        """Whether any sample q (k, nq) [rad] has a clearance below `CONTACT.near_contact`.
 
-        An obstacle is then likely to limit the optimum. About CONTACT_SAMPLES of them are checked.
+        An obstacle is then likely to limit the optimum. About `CONTACT.samples` of the samples are
+        checked.
         """
-        return self.arm.collisions and self._least_distance(q, NEAR_CONTACT) < NEAR_CONTACT
+        near = CONTACT.near_contact
+        return self.arm.collisions and self._least_distance(q, near) < near
 
     def active_pairs(self, spline: Spline) -> Indices:
-        """Indices (k,) of the pairs that need a clearance constraint: closer than ACTIVE at a
-        sample of the motion.
+        """Indices (k,) of the pairs closer than `CONTACT.active_distance` at a sample of a motion.
+
+        Only these pairs need a clearance constraint.
         """
         return np.flatnonzero(
-            self.model.pairs_within(self.model.frames(self._samples(spline)), ACTIVE)
+            self.model.pairs_within(
+                self.model.frames(self._samples(spline)), CONTACT.active_distance
+            )
         )
 
     def with_clearance(self, pairs: Indices) -> PathConstraints:
-        """The path constraints of the arm, and the clearance of `pairs` (k,) of the collision
-        model.
-        """
+        """Path constraints of the arm, with the clearance of `pairs` (k,) of the model."""
         constraints = [*path_constraint_list(self.arm), ClearanceConstraint(self.model, pairs)]
         return PathConstraints(joint_placements(self.arm.robot.model), constraints)
 
@@ -142,89 +155,59 @@ class Surroundings:
         q_goal: Array,
         deadline: Deadline,
         other_goals: Sequence[Array] = (),
-        effort: Effort = USUAL,
+        effort: Effort = USUAL_EFFORT,
     ) -> PlannedPaths:
-        """Collision-free joint paths from q_start to q_goal or one of the others, (nq,) [rad]; see
-        `plan_paths`.
+        """Collision-free joint paths to a goal or to one of several others; see `plan_paths`.
 
-        Paths found are kept: a later call for the goal that they lead to returns them, and the
-        first one for a goal that differs by full turns follows the shortest of them. A planning
-        without a path is kept, for all goals that differ by full turns, only until more states are
-        allowed, and not at all if the deadline ended it.
+        Results are kept in a `PlannedPathMemo`. The first planning for a goal that differs from a
+        reached one by full turns follows the shortest known path.
+
+        Args:
+            q_start: joint positions at the start, shape (nq,) [rad].
+            q_goal: joint positions at the goal, shape (nq,) [rad].
+            deadline: end of the planning.
+            other_goals: further goals, shape (nq,) [rad].
+            effort: most states to be checked.
         """
-        known, turned = (
-            self._planned.get(_key(q_start, q_goal)),
-            self._turned.get(_turned_key(q_start, q_goal)),
-        )
-        for earlier in (known, turned if turned is not None and not turned.paths else None):
-            if earlier is not None and (
-                earlier.paths or earlier.checked_states >= effort.most_states
-            ):
-                return earlier
-        like = turned.paths[0] if known is None and turned is not None and turned.paths else None
-        goals = q_goal[None] if like is not None else np.vstack([q_goal, *other_goals])
+        known = self._memo.recall(q_start, q_goal, effort.most_states)
+        if known is not None:
+            return known
+        template = self._memo.template(q_start, q_goal)
+        goals = np.vstack([q_goal, *other_goals]) if template is None else q_goal[None]
         planned = plan_paths(
-            self.arm, q_start, goals, deadline, effort, checkers=self._checkers, like=like
+            self.arm, q_start, goals, deadline, effort, checkers=self._checkers, template=template
         )
-        for goal in {path[-1].tobytes(): path[-1] for path in planned.paths}.values():
-            self._keep(q_start, goal, replace(planned, paths=planned.leading_to(goal)))
-        if planned.end is PlanningEnd.EXHAUSTED:
-            for goal in goals:
-                self._keep(q_start, goal, planned)
+        self._memo.keep(q_start, goals, planned)
         return planned
 
-    def _keep(self, q_start: Array, q_goal: Array, planned: PlannedPaths) -> None:
-        self._planned[_key(q_start, q_goal)] = planned
-        turned = self._turned.get(_turned_key(q_start, q_goal))
-        if turned is None or not turned.paths:
-            self._turned[_turned_key(q_start, q_goal)] = planned
-
     def has_planned_paths(self, q_start: Array, q_goal: Array) -> bool:
-        """Whether paths from q_start to q_goal (nq,) have been planned and found."""
-        known = self._planned.get(_key(q_start, q_goal))
-        return known is not None and bool(known.paths)
+        """Whether a planning found a path from q_start to q_goal (nq,) [rad]."""
+        return self._memo.has_paths(q_start, q_goal)
 
     def seems_enclosed(self, q_start: Array, q_goal: Array) -> bool:
-        """Whether plannings to q_goal (nq,) [rad], and to what differs from it by full turns, have
-        found no path.
-        """
-        known = self._turned.get(_turned_key(q_start, q_goal))
-        return known is not None and not known.paths
+        """Whether plannings to q_goal (nq,) [rad], up to full turns, found no path."""
+        return self._memo.has_failed(q_start, q_goal)
 
     @cached_property
     def _checkers(self) -> ValidityCheckers:
         return ValidityCheckers(self.arm, self.model)
 
     @cached_property
-    def _planned(self) -> dict[bytes, PlannedPaths]:
-        return {}
-
-    @cached_property
-    def _turned(self) -> dict[bytes, PlannedPaths]:
-        """The first paths that were found, else the last planning, for all goals that differ by
-        full turns.
-        """
-        return {}
+    def _memo(self) -> PlannedPathMemo:
+        return PlannedPathMemo()
 
     def _least_distance(self, q: Array, within: float) -> float:
-        """The least signed distance [m] over some of the samples q (k, nq) of a motion; if above
-        `within` [m], a lower bound above it."""
-        return float(self.model.along(_thinned(q), within).min(initial=np.inf))
+        """Least signed distance [m] over the thinned samples q (k, nq) of a motion.
+
+        Above `within` [m], the value is a lower bound greater than `within`.
+        """
+        return float(self.model.distances_along(_thinned(q), within).min(initial=np.inf))
 
     def _samples(self, spline: Spline) -> Array:
-        """Samples q (CONTACT_SAMPLES, nq) [rad] at equal steps of a motion."""
-        return np.asarray(spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES)))
+        """Samples q (CONTACT.samples, nq) [rad] at equal time steps of a motion."""
+        return np.asarray(spline.curve(np.linspace(0.0, spline.duration, CONTACT.samples)))
 
 
 def _thinned(q: Array) -> Array:
-    """About CONTACT_SAMPLES of the samples q (k, nq)."""
-    return q[:: max(len(q) // CONTACT_SAMPLES, 1)]
-
-
-def _key(q_start: Array, q_goal: Array) -> bytes:
-    return q_start.tobytes() + q_goal.tobytes()
-
-
-def _turned_key(q_start: Array, q_goal: Array) -> bytes:
-    """The same for all goals that differ by full turns."""
-    return q_start.tobytes() + (np.round([np.cos(q_goal), np.sin(q_goal)], 6) + 0.0).tobytes()
+    """About CONTACT.samples of the samples q (k, nq)."""
+    return q[:: max(len(q) // CONTACT.samples, 1)]

@@ -1,8 +1,8 @@
-"""Public entry point: `what_if(solution, problem)` compares a motion with that of another arm.
+"""Public entry point: `what_if(solution, problem)` compares a motion with that of a changed arm.
 
-The change may be lighter links, another payload or other drives. It has two effects, reported
-apart: the energy of the same motion on the changed arm (`same_motion`), and the energy of a motion
-optimised for it (`reoptimised`).
+A change, such as lighter links, another payload or other drives, has two effects, reported
+separately: the energy of the same motion on the changed arm (`same_motion`), and the energy of a
+motion optimised for it (`reoptimised`).
 """
 
 from __future__ import annotations
@@ -23,21 +23,34 @@ from joulepath.optimizer.problem.problem import Problem, narrowed
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.incumbent import SLACK
 from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.state import ENERGY_TOLERANCE
 
-# least deadline of a search [s]; shares of the time that the first search leaves to the known
-# motion, and of what is left then for a search from it
-LEAST_TIME, KEPT, SOLVED = 1e-3, 0.05, 0.8
+
+@dataclass(frozen=True)
+class WhatIfSettings:
+    """Settings of `what_if`."""
+
+    least_time: float = 1e-3
+    """Least deadline of a search [s]."""
+    kept_share: float = 0.05
+    """Share of the deadline that the first search leaves to the known motion."""
+    warm_start_share: float = 0.8
+    """Share of the time left then for a search from the known motion."""
+
+
+WHAT_IF = WhatIfSettings()
 
 
 @dataclass(frozen=True)
 class WhatIf:
     """Result of a change.
 
-    `same_motion` is the energy [J] of the known motion on the changed arm, `certificate` says
-    whether it is feasible there. `reoptimised` is the best motion of the changed arm; None, with
-    the `error`, if none was found.
+    Attributes:
+        same_motion: energy of the known motion on the changed arm.
+        certificate: certificate of the known motion on the changed arm.
+        reoptimised: best motion of the changed arm; None if none was found.
+        error: reason if none was found.
     """
 
     same_motion: Energy
@@ -51,15 +64,14 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
     """Compare a motion with the best one of a changed arm.
 
     The changed problem is solved on its own. If the known motion is feasible on the changed arm and
-    needs less energy than the new one, or there is none, the problem is solved again with a warm
-    start from it; where time is too short for that, the known motion is the answer. So no answer
-    needs more energy than a feasible known motion.
+    needs less energy than the new one, or there is no new one, the problem is solved again from the
+    known motion; without enough time, the known motion is the answer. No answer thus needs more
+    energy than a feasible known motion.
 
     Args:
         solution: solution of the problem without the change.
-        problem: the same problem with the change, as by `dataclasses.replace(problem, arm=…)`, of
-            an
-            arm with as many joints. Its `deadline` holds for the whole comparison.
+        problem: the problem with the change, as by `dataclasses.replace(problem, arm=…)`, of an arm
+            with as many joints. Its `deadline` holds for the whole comparison.
         clock: function that returns the time [s].
 
     Returns:
@@ -83,17 +95,15 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
     found: Solution | None = None
     failure: JoulepathError | None = None
     try:
-        found = optimize(
-            replace(problem, deadline=max(deadline.left - KEPT * problem.deadline, LEAST_TIME)),
-            clock,
-        )
+        time_left = deadline.left - WHAT_IF.kept_share * problem.deadline
+        found = optimize(replace(problem, deadline=max(time_left, WHAT_IF.least_time)), clock)
     except JoulepathError as error:
         failure = error
     same, objective = energy.of(problem.objective), problem.objective
     if (
         certificate.valid
         and not deadline.passed
-        and (found is None or same < found.energy.of(objective) * (1 - SLACK))
+        and (found is None or same < found.energy.of(objective) * (1 - ENERGY_TOLERANCE))
     ):
         again = _from_known(problem, spline, deadline)
         known = [each for each in (found, again) if each is not None]
@@ -102,18 +112,20 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
 
 
 def _from_known(problem: Problem, spline: Spline, deadline: Deadline) -> Solution | None:
-    """The solution from a feasible motion on, or this motion as it is; None if there is no time for
-    that either.
+    """Solution by a search from a feasible motion, or with the motion itself; None without time for
+    it.
     """
 
     def run(share: float, known: list[Spline]) -> Run:
         return Run(
-            replace(problem, deadline=max(share * deadline.left, LEAST_TIME)), known, deadline.clock
+            replace(problem, deadline=max(share * deadline.left, WHAT_IF.least_time)),
+            known,
+            deadline.clock,
         )
 
     with suppress(JoulepathError):
-        return run(SOLVED, [spline]).solution()
+        return run(WHAT_IF.warm_start_share, [spline]).solution()
     with suppress(JoulepathError):
         last = run(1.0, [])
-        return last.as_it_is(spline) if last.incumbent.allows(spline.duration) else None
+        return last.as_it_is(spline) if last.state.allows(spline.duration) else None
     return None

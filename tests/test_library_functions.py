@@ -214,7 +214,9 @@ def test_replay() -> None:
     run = found.under("feed_forward")
     assert electrical(run.energy) == pytest.approx(electrical(solution().energy), rel=5e-3)
     assert not run.collides
-    assert {each.name for each in found.savings} == {each.name for each in solution().baselines}
+    # those within the limits that take as long, in front of all the straight one
+    names = {each.name for each in found.savings}
+    assert {"ruckig_slowed", "straight"} <= names <= {each.name for each in solution().baselines}
     for each in found.savings:
         assert each.simulated == pytest.approx(each.planned, abs=5e-3)
 

@@ -28,6 +28,7 @@ FUNCTIONS = {
     "identify",
     "inverse_kinematics",
     "load_robot",
+    "load_tool",
     "optimize",
     "optimize_many",
     "pareto",
@@ -35,6 +36,7 @@ FUNCTIONS = {
     "read_log",
     "replay",
     "robot_names",
+    "tool_names",
     "what_if",
 }
 ERRORS = {
@@ -70,6 +72,7 @@ ERRORS = {
     "StopInCollision",
     "TorqueInfeasible",
     "UnknownRobot",
+    "UnknownTool",
     "UnreachablePose",
 }
 TYPES = {
@@ -146,7 +149,7 @@ TYPES = {
     "PlannedTorques",
     "Points",
     "Pose",
-    "PosesAround",
+    "SampledPoses",
     "Problem",
     "Program",
     "RapidOptions",
@@ -171,6 +174,7 @@ TYPES = {
     "StopPath",
     "StorageUse",
     "TableOptions",
+    "Tool",
     "ToolCone",
     "ToolPath",
     "Trajectory",
@@ -333,9 +337,9 @@ def test_the_library_needs_no_web_framework() -> None:
     """With all names loaded, nothing of the service is."""
     heavy = ("fastapi", "pydantic", "sqlalchemy", "starlette", "uvicorn", "joulepath.app")
     code = (
-        "import sys, joulepath; names = [n for n in joulepath.__all__ if n != 'InvalidArm'];"
-        f"[getattr(joulepath, n) for n in names]; print([each for each in {heavy} if each in "
-        "sys.modules])"
+        "import sys, joulepath; names = [n for n in joulepath.__all__ if n != "
+        f"'InvalidArm'];[getattr(joulepath, n) for n in names]; print([each for each in {heavy} if "
+        "each in sys.modules])"
     )
     assert in_a_process(code, ROOT) == "[]"
 

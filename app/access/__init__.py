@@ -1,1 +1,1 @@
-"""Who sends a request, and what this client may do."""
+"""Clients: authentication, roles and owners."""

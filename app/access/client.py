@@ -1,4 +1,4 @@
-"""The client of a request: what limits count by, what the log names, what owns things."""
+"""The client of a request, for limits, logs and ownership."""
 
 from __future__ import annotations
 
@@ -10,42 +10,36 @@ from joulepath.app.exceptions.access import Role
 Address = IPv4Address | IPv6Address
 
 _IPV6_PREFIX = 64
-"""Bits that one customer's IPv6 addresses have in common: whoever has one of them has all."""
+"""Prefix length of an IPv6 network of one customer [bit]."""
 
 
 @dataclass(frozen=True)
 class Client:
-    """Who sent a request. `address`: of its sender, behind trusted proxies the one that they
-    report.
-    """
+    """The sender of a request. `address` is reported by trusted proxies, if there are any."""
 
     address: str
     key: str | None = None
-    """Name of the API key that it carried; None without one."""
+    """Name of the API key; None without a key."""
     role: Role = "admin"
-    """Of the key; where access is open, everyone may do everything."""
+    """Role of the key; with open access every client is an administrator."""
 
     @property
     def name(self) -> str:
-        """By what fair shares and limits count: the key, without one the address, of IPv6 its /64
-        network.
-        """
+        """Identity for fair shares and limits: the key, else the address or IPv6 /64 network."""
         return f"key {self.key}" if self.key is not None else _network(self.address)
 
     @property
     def owner(self) -> str | None:
-        """Owner of what this client creates; None where access is open."""
+        """Owner of the client's objects; None with open access."""
         return self.key
 
 
 OPERATOR = Client("console")
-"""Who uses the database by the console command."""
+"""The user of the console command."""
 
 
 def address_of(text: str) -> Address | None:
-    """The IP address in a text, None if it is something else. IPv4 that is mapped into IPv6 is
-    IPv4.
-    """
+    """The IP address in a text; None for other text. IPv4 mapped into IPv6 becomes IPv4."""
     try:
         parsed = ip_address(text)
     except ValueError:

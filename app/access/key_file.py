@@ -10,6 +10,7 @@ import hashlib
 import os
 import secrets
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -20,32 +21,43 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from joulepath.app.exceptions.access import Role
 
-_NAME_LENGTH = 64
-"""Of a name, at most: the database keeps it as the owner of what the client created."""
+
+@dataclass(frozen=True)
+class KeySettings:
+    """Properties of API keys and of their file."""
+
+    name_length: int = 64
+    """Longest name of a key; the database stores it as owner."""
+    secret_bytes: int = 32
+    """Random bytes of a key: too many for a search, so that a fast hash without salt suffices."""
+    id_length: int = 8
+    """Characters of the id of a key."""
+    mode: int = 0o600
+    """Permissions of the file."""
+
+
+KEYS = KeySettings()
+
 _HEAD = (
     "# API keys of joulepath, written by `joulepath keys`. Only hashes: no key can be read "
     "from this file.\n"
 )
 _PREFIX = "joulepath_"
-"""Of every key, so that scanners of source code find one that was committed."""
-_SECRET_BYTES = 32
-"""Random bytes of a key: too many to try, so that a fast hash without salt protects it."""
-_ID_LENGTH = 8
-_PRIVATE = 0o600
+"""Prefix of every key, so that scanners of source code find committed keys."""
 
 
 class WrongKeyFile(Exception):
-    """The file of API keys cannot be read; the message says why, and what to do."""
+    """The file of API keys is invalid; the message says why, and what to do."""
 
 
 class ApiKey(BaseModel):
-    """One key. Several keys may have one name: they are the same client, so that a key can be
-    replaced at leisure.
-    """
+    """One key. Keys with the same name belong to the same client, so that keys can be rotated."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=_NAME_LENGTH)]
+    name: Annotated[
+        str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=KEYS.name_length)
+    ]
     role: Role
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     created: datetime
@@ -53,7 +65,7 @@ class ApiKey(BaseModel):
     @property
     def id(self) -> str:
         """The beginning of the hash: tells keys of one name apart."""
-        return self.sha256[:_ID_LENGTH]
+        return self.sha256[: KEYS.id_length]
 
 
 _ENTRIES = TypeAdapter(list[ApiKey])
@@ -65,8 +77,8 @@ def hash_of(secret: str) -> str:
 
 
 def new_key(name: str, role: Role) -> tuple[str, ApiKey]:
-    """A new random key, and its entry. Raises ValidationError for a name that is none."""
-    secret = _PREFIX + secrets.token_urlsafe(_SECRET_BYTES)
+    """A new random key and its entry. Raises ValidationError for an invalid name."""
+    secret = _PREFIX + secrets.token_urlsafe(KEYS.secret_bytes)
     entry = ApiKey(
         name=name,
         role=role,
@@ -116,7 +128,7 @@ def changing(file: Path) -> Iterator[list[ApiKey]]:
 
 
 def _replace(file: Path, entries: Sequence[ApiKey]) -> None:
-    """A service that reads meanwhile sees the old file or the new one, never a part."""
+    """Replaces the file atomically for services reading it."""
     text = _HEAD + yaml.safe_dump(_ENTRIES.dump_python(list(entries)), sort_keys=False)
     with NamedTemporaryFile(
         "w", encoding="utf-8", dir=file.parent, prefix=f".{file.name}.", delete=False
@@ -126,7 +138,7 @@ def _replace(file: Path, entries: Sequence[ApiKey]) -> None:
             new.flush()
             os.fsync(new.fileno())
             known = file.stat() if file.exists() else None
-            os.fchmod(new.fileno(), _PRIVATE if known is None else known.st_mode & 0o777)
+            os.fchmod(new.fileno(), KEYS.mode if known is None else known.st_mode & 0o777)
             if (
                 known is not None and os.geteuid() == 0
             ):  # it stays readable to the user of the service

@@ -1,4 +1,4 @@
-"""The API keys that are valid now: a change of their file applies from the next request on."""
+"""The valid API keys: a change of their file applies from the next request on."""
 
 from __future__ import annotations
 
@@ -25,17 +25,15 @@ class KeyRing:
         """The entry of a key; None if it is not valid."""
         self._refresh()
         found, digest = None, hash_of(secret)
-        # every entry is compared, in constant time: how long it takes says nothing of where it
-        # matched
+        # All entries are compared in constant time: the time does not reveal the match.
         for key in self._keys:
             if hmac.compare_digest(key.sha256, digest):
                 found = key
         return found
 
     def _refresh(self) -> None:
-        """Reads a file that changed. Without a file nobody gets in; one that makes no sense changes
-        nothing.
-        """
+        """Reads a changed file. Without a file there are no keys; an invalid file changes
+        nothing."""
         stamp = _stamp(self._file)
         if stamp == self._stamp:
             return
@@ -49,7 +47,7 @@ class KeyRing:
 
 
 def _stamp(file: Path) -> _Stamp | None:
-    """What differs once the file was written or replaced; None without a file."""
+    """A value changing with the content of the file; None without a file."""
     try:
         found = file.stat()
     except OSError:

@@ -1,6 +1,4 @@
-"""Which role a request needs, and who may change a thing. Anything that is not named here needs a
-key.
-"""
+"""Roles required by requests, and owners. Every path not listed here needs a key."""
 
 from __future__ import annotations
 
@@ -13,18 +11,14 @@ from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow
 PUBLIC = re.compile(
     r"/healthz|/readyz|/openapi\.json|/redoc|/docs(/[^/]+)?|/problems/[^/]+|/|/studio(/\w[\w.-]*)*"
 )
-"""Paths without anything of a user's: probes, the documentation, the pages that explain problems,
-the studio page.
-"""
+"""Paths without user data: probes, documentation, problem pages, the studio page."""
 _READING = ("GET", "HEAD", "OPTIONS")
 # it answers a question, but takes the workers' time
 _COMPUTING = re.compile(r"/studies/[^/]+/suggest")
 
 
 def needed_role(method: str, path: str) -> Role | None:
-    """The role that a request needs; None if it needs no key. `path` may also be a route's
-    template.
-    """
+    """The role required by a request; None without a key. `path` may be a route's template."""
     if method in _READING and PUBLIC.fullmatch(path):
         return None
     return "read" if method in _READING and not _COMPUTING.fullmatch(path) else "compute"
@@ -38,8 +32,6 @@ def check_role(client: Client, needed: Role) -> None:
 
 
 def check_owner(client: Client, owner: str | None) -> None:
-    """Raises NotOwner, unless the client created the thing or is an admin. What has no owner is an
-    admin's.
-    """
+    """Raises NotOwner unless the client owns the object or is an administrator."""
     if client.role != "admin" and (owner is None or client.owner != owner):
         raise NotOwner(owner)

@@ -1,4 +1,4 @@
-"""What the service checks and says of access when it starts."""
+"""Checks and log messages about access at the start of the service."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ logger = logging.getLogger(__name__)
 
 
 def key_ring(settings: Settings) -> KeyRing | None:
-    """The API keys; None where access is open. Raises WrongSettings."""
+    """The API keys; None with open access. Raises WrongSettings."""
     if settings.api_keys_file is None:
         return None
     try:
@@ -23,9 +23,7 @@ def key_ring(settings: Settings) -> KeyRing | None:
 
 
 def check_access(settings: Settings) -> None:
-    """Raises WrongSettings if other machines could reach a service without API keys that was not
-    told to be open.
-    """
+    """Raises WrongSettings if other machines could reach a service neither protected nor open."""
     if key_ring(settings) is None and not settings.open and not is_loopback(settings.host):
         raise WrongSettings(
             f"JOULEPATH_HOST={settings.host!r} is reached from other machines, and there are no "
@@ -38,7 +36,7 @@ def check_access(settings: Settings) -> None:
 
 
 def log_access(settings: Settings) -> None:
-    """Says in the log who may do what."""
+    """Logs the kind of access."""
     if settings.api_keys_file is not None:
         logger.info("API keys are required", extra={"file": str(settings.api_keys_file)})
     elif is_loopback(settings.host):

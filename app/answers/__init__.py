@@ -1,1 +1,1 @@
-"""JSON documents and schemas of the answers that the library declares."""
+"""JSON documents and schemas of the library's declared answers."""

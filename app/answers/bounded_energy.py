@@ -16,7 +16,7 @@ def optimality_gap(bound: float, energy: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class EnergyAndBound(Energy):
-    """Energy and power of the motion, and what other motions could save."""
+    """Energy and power of the motion, and the possible saving of other motions."""
 
     lower_bound: Joules
     """Lower bound of the objective: no motion of any shape and any allowed duration between these
@@ -26,7 +26,7 @@ class EnergyAndBound(Energy):
 
     @classmethod
     def bounded(cls, energy: Energy, lower_bound: float, objective: Objective) -> Self:
-        """An energy, and the lower bound of the part of it that the objective minimises [J]."""
+        """An energy, and the lower bound of its minimised part [J]."""
         parts = {part.name: getattr(energy, part.name) for part in fields(Energy)}
         gap = optimality_gap(lower_bound, energy.of(objective))
         return cls(**parts, lower_bound=lower_bound, optimality_gap=gap)

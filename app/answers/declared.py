@@ -1,8 +1,8 @@
-"""Answers from what classes declare: their JSON for orjson, their pydantic models for OpenAPI.
+"""Answers from declared classes: JSON for orjson, pydantic models for OpenAPI.
 
 A declared class is a dataclass, a NamedTuple or a TypedDict. Its fields have types with the markers
-of `joulepath.optimizer.declared`, and their meaning as the text below them. Nothing else reads
-these markers.
+of `joulepath.optimizer.declared`, and their meaning as the text below them. Only this module reads
+the markers.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
 def as_json(value: Any) -> Any:
-    """What orjson cannot encode by itself: declared classes, and arrays that are not in C order."""
+    """Converts objects unknown to orjson: declared classes, and arrays without C order."""
     if isinstance(value, np.ndarray):
         return np.ascontiguousarray(value)
     kind: type = type(value)
@@ -57,7 +57,7 @@ def _reader(kind: type) -> Callable[[Any], dict[str, Any]]:
 
 @cache
 def shown_fields(kind: type) -> tuple[str, ...]:
-    """Names of the fields of a declared class that answers show, in their order."""
+    """Names of the public fields of a declared class, in order."""
     if not _is_declared(kind):
         raise TypeError(f"{kind.__name__} declares no fields")
     hints = _hints(kind)
@@ -85,9 +85,7 @@ def with_unit(text: str, unit: str | None) -> str:
 
 
 def texts_of(kind: type) -> dict[str, str]:
-    """The meaning of every field of a class: the text below it, in the class itself or in one that
-    it extends.
-    """
+    """The meaning of all fields of a class: the texts below them, in the class or its bases."""
     found: dict[str, str] = {}
     for each in reversed(kind.__mro__):
         found |= _texts(each.__module__).get(each.__qualname__, {})
@@ -96,7 +94,7 @@ def texts_of(kind: type) -> dict[str, str]:
 
 @cache
 def _texts(module: str) -> dict[str, dict[str, str]]:
-    """The texts below the fields of every class of a module; none for one that has no source."""
+    """The texts below the fields of all classes of a module; none without source code."""
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except (OSError, TypeError):
@@ -156,7 +154,7 @@ def _field(hint: Any, text: str) -> Any:
 
 
 def _type(hint: Any) -> Any:
-    """The type of a field in a pydantic model: what its JSON is."""
+    """The type of a field in a pydantic model, according to its JSON."""
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _annotated(args[0], args[1:])

@@ -1,4 +1,4 @@
-"""The fields that answers have in common."""
+"""Fields common to all answers."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class AnswerFigures:
-    """What lists show of an answer: robot, energy [J], duration [s] and status; None if it has
-    none.
-    """
+    """Figures of an answer in lists: robot, energy [J], duration [s] and status, or None."""
 
     robot: str | None = None
     energy: float | None = None
@@ -33,14 +31,14 @@ class Answer:
 
     @property
     def figures(self) -> AnswerFigures:
-        """What lists show of this answer."""
+        """The figures of this answer in lists."""
         return AnswerFigures(self.robot)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionAnswer(Answer):
-    """The fields of an answer that is a motion."""
+    """Fields of a motion as answer."""
 
     arm: dict[str, Any] | None
-    """What the request says of the arm beside its robot: payload, limits, scene, ... as it was
-    sent. Null if that is larger than 64 KiB of JSON."""
+    """The request's fields of the arm beside its robot: payload, limits, scene, ... Null above 64
+    KiB of JSON."""

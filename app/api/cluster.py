@@ -22,7 +22,7 @@ class Machine(Response):
 
 
 class ClusterState(Response):
-    """The cluster that works on jobs."""
+    """The cluster for jobs."""
 
     scheduler: str | None = described(
         "Address of the scheduler; null if the service's own workers work on jobs.",
@@ -39,8 +39,8 @@ class ClusterState(Response):
     responses=problem_responses(ClusterUnavailable),
 )
 async def show(cluster: ServiceCluster) -> ClusterState:
-    """The machines of the cluster that this service sends the requests of jobs to. Without a
-    cluster, the service's own workers compute them."""
+    """The machines of the cluster for the requests of jobs. Without a cluster, the service's own
+    workers compute them."""
     if cluster is None:
         return ClusterState(scheduler=None, machines=[])
     machines = [

@@ -18,10 +18,10 @@ _ASSETS = {
     "swagger-ui.css": "text/css",
     "redoc.standalone.js": "text/javascript",
 }
-# a picture that Redoc would fetch from the internet
+# a picture fetched by Redoc from the internet
 _REDOC_LOGO = b"https://cdn.redoc.ly/redoc/logo-mini.svg"
 _NO_PICTURE = "data:,"
-# the browser blocks anything else that a later version of the scripts would fetch from elsewhere
+# The browser blocks all other external resources of later versions of the scripts.
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self'; script-src 'self' 'unsafe-inline'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data:; worker-src 'self' blob:; "

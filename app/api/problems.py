@@ -23,8 +23,7 @@ router = APIRouter(prefix="/problems", tags=["problems"])
 
 _STYLE = (
     "body{font:1rem/1.5 sans-serif;max-width:42rem;margin:3rem auto;padding:0 "
-    "1rem}dt{margin-top:.5rem}"
-    "pre{overflow:auto;background:#eee;padding:.5rem}"
+    "1rem}dt{margin-top:.5rem}pre{overflow:auto;background:#eee;padding:.5rem}"
 )
 
 

@@ -1,6 +1,4 @@
-"""`python -m joulepath.app.cli`: the console command where the package is not installed, as in the
-container image.
-"""
+"""`python -m joulepath.app.cli`: the console command without an installed package."""
 
 from __future__ import annotations
 

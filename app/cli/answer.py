@@ -1,4 +1,4 @@
-"""From the bytes of a request to those of its answer, by the schemas and tasks of the service."""
+"""Answers to requests by the schemas and tasks of the service."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
-    """The answer of a task for which `deadline` [s] is left. Raises Refused."""
+    """The answer of a task in at most `deadline` [s]. Raises Refused."""
     result = result_of(task, deadline, request_id)
     return (result if result.kept_as is None else result.not_kept()).document
 
 
 def result_of(task: Task, deadline: float, request_id: str) -> TaskResult:
-    """The result of a task for which `deadline` [s] is left. Raises Refused."""
+    """The result of a task in at most `deadline` [s]. Raises Refused."""
     from joulepath.app.cli.store import run_with_store
     from joulepath.optimizer.exceptions import DeclaredError
 
@@ -87,7 +87,7 @@ def result_of(task: Task, deadline: float, request_id: str) -> TaskResult:
 
 
 def refused(error: Exception, request_id: str | None = None) -> Refused:
-    """What a command raises for an error of the library or the service."""
+    """The exception of a command for an error of the library or the service."""
     from joulepath.app.engine.result import json_document
     from joulepath.app.http.problems import problem_of
 
@@ -95,21 +95,20 @@ def refused(error: Exception, request_id: str | None = None) -> Refused:
 
 
 def compile_kernel_of(robot_name: str) -> None:
-    """Compiles the robot's kernel if the cache does not have it: a process that ends earlier would
-    leave none.
+    """Compiles the robot's kernel for the cache, which an earlier end of the process would prevent.
 
-    Without a C compiler, and for a robot that nobody knows, nothing happens. One that hangs is told
+    Without a C compiler, or for an unknown robot, nothing happens. A hanging compiler is reported
     and given up.
     """
     from joulepath.app.cli.store import robot_named
     from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
     from joulepath.optimizer.exceptions import UnknownRobot
-    from joulepath.optimizer.native.library_cache import PATIENCE, CompilerHangs
+    from joulepath.optimizer.native.library_cache import CACHE, CompilerHangs
 
     try:
         compile_kernel(
-            robot_named(robot_name), patience=replace(PATIENCE, compiler=PATIENCE.command)
+            robot_named(robot_name), settings=replace(CACHE, compiler_timeout=CACHE.command_timeout)
         )
     except (UnknownRobot, StoreUnavailable):
         return  # the answer says so
@@ -126,8 +125,8 @@ def compile_kernel_of(robot_name: str) -> None:
 def write(answer: bytes, output: Path | None) -> None:
     """Writes an answer to a file, or to standard output. Raises click.FileError."""
     if output is None:
-        # a reader that ends first ends this process silently, as it does with the shell's own
-        # tools; a connection that breaks at another time is an error like any other
+        # A closed pipe ends this process silently, like the shell's own tools; a broken connection
+        # at another time is an ordinary error.
         before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
         try:
             sys.stdout.buffer.write(answer if answer.endswith(b"\n") else answer + b"\n")

@@ -14,11 +14,11 @@ Example:
 )
 @click.argument("scheduler")
 def cluster_worker(scheduler: str) -> None:
-    """Has this machine work on jobs for the Dask scheduler at SCHEDULER, `tcp://HOST:PORT`.
+    """Works on jobs for the Dask scheduler at SCHEDULER, `tcp://HOST:PORT`.
 
-    JOULEPATH_WORKERS processes compute, by default one for each CPU. Services with
-    JOULEPATH_CLUSTER=SCHEDULER send the work. SIGTERM and Ctrl-C end it with 0: what it is at work
-    on is then done elsewhere.
+    JOULEPATH_WORKERS processes compute, by default one per CPU. Services with
+    JOULEPATH_CLUSTER=SCHEDULER send the work. SIGTERM and Ctrl-C end the command with 0; other
+    machines repeat its unfinished work.
     """
     from joulepath.app.settings import WrongSettings, read_settings
 

@@ -36,6 +36,8 @@ def summary_of(answer: dict[str, Any]) -> dict[str, str]:
         "energy": f"{answer['energy'][answer['objective']]['total']:.4g} J {answer['objective']}",
         **proof(answer),
         **{
-            f"saved against {each['name']}": f"{each['saving']:.1%}" for each in answer["baselines"]
+            f"saved against {each['name']}": f"{each['saving']:.1%}"
+            for each in answer["baselines"]
+            if each["saving"] is not None
         },
     }

@@ -12,7 +12,7 @@ from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import FILE, OUTPUT, content_of, new_id, result_of, validated, write
 from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
 
-# wall time [s] that an export may take; it takes milliseconds
+# longest wall time of an export [s]; usual ones take milliseconds
 DEADLINE = 120.0
 
 
@@ -46,7 +46,7 @@ def export(
 
     FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`,
     whose moves must be in the database; or - for standard input. If standard error is a terminal, a
-    summary follows: how far the file deviates, and what it leaves out.
+    summary follows: deviations of the file, and omitted parts.
     """
     from joulepath.app.api.export.request import ExportRequest, option_field
     from joulepath.app.api.export.task import ExportResult, ExportTask

@@ -1,4 +1,4 @@
-"""Ctrl-C that ends a command even if compiled code drops it."""
+"""Ctrl-C ends a command even if compiled code drops the exception."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# processor time [s] after which an interrupt that was dropped is raised again
+# processor time [s] after which a dropped interrupt is raised again
 PERIOD = 0.5
 
 
@@ -14,7 +14,7 @@ PERIOD = 0.5
 def interruptible() -> Iterator[None]:
     """Raises KeyboardInterrupt at Ctrl-C, and again until it leaves the body.
 
-    Python drops an exception that arrives in a finaliser or in a callback of compiled code.
+    Python drops exceptions in finalisers and in callbacks of compiled code.
     """
 
     def interrupt(*_: object) -> None:

@@ -55,8 +55,7 @@ Example:
 )
 @_FILE
 def add(name: str, role: str, file: Path) -> None:
-    """Makes a key for the client NAME and writes it to standard output, the only time that it is
-    shown.
+    """Makes a key for the client NAME and writes it once to standard output.
 
     The file holds its hash. Further keys of the same name are the same client: to replace a key,
     add another one, give it to the client, and remove the old one by its id.
@@ -105,7 +104,7 @@ Example:
 @click.argument("name_or_id", metavar="NAME|ID")
 @_FILE
 def remove(name_or_id: str, file: Path) -> None:
-    """Removes all keys of a name, or the one key of an id. What its client created stays."""
+    """Removes all keys of a name, or the key with an id. Objects of its client stay."""
     with _changing(file) as entries:
         left = [entry for entry in entries if name_or_id not in (entry.name, entry.id)]
         if len(left) == len(entries):

@@ -1,4 +1,4 @@
-"""The command group, and the exit code of every way in which a command can end."""
+"""The command group, and the exit codes of commands."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ from joulepath.app.cli.interrupts import interruptible
 from joulepath.app.cli.keys import keys
 from joulepath.app.cli.optimize import optimize
 from joulepath.app.cli.replay import replay
+from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
 from joulepath.app.cli.serve import serve
+from joulepath.app.cli.tools import tools
 
 
 @click.group(
@@ -40,8 +42,8 @@ Example:
 def joulepath() -> None:
     """Finds the motion of least energy of a robot arm, with its energy breakdown and a certificate.
 
-    Requests and answers are those of the HTTP service. SI units throughout: m, rad, s, kg, N·m, W,
-    J. A request that fails writes its problem (RFC 9457) to standard error.
+    Requests and answers are the same as in the HTTP service. SI units throughout: m, rad, s, kg,
+    N·m, W, J. A request that fails writes its problem (RFC 9457) to standard error.
     """
 
 
@@ -53,7 +55,10 @@ for command in (
     export,
     identify,
     replay,
+    report,
+    check,
     robots,
+    tools,
     keys,
     cluster_worker,
 ):
@@ -70,7 +75,7 @@ def main() -> None:
         code = refusal.exit_code
     except click.ClickException as error:
         error.show()
-        # click's own code for a file that cannot be written is 1
+        # click would return 1 for an unwritable file
         code = INVALID
     except (click.Abort, KeyboardInterrupt):
         code = INTERRUPTED

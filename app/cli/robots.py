@@ -26,10 +26,10 @@ Examples:
 )
 @click.pass_context
 def robots(context: click.Context) -> None:
-    """Lists the robots that a request can name; adds and removes robots of your own.
+    """Lists the available robots; adds and removes robots of your own.
 
     The columns are the name, the title, the number of joints, the rated payload [kg], and the trust
-    letters of the parameters that energies depend on. A: published by the manufacturer, B: fitted
+    letters of the parameters behind energies. A: published by the manufacturer, B: fitted
     to measured data, C: second-hand from a paper or another's file, T: transferred from a sister
     robot, E: engineering default without a source.
     """
@@ -48,7 +48,7 @@ Example:
 def add(file: Path, name: str | None, replace: bool) -> None:
     """Adds an arm of your own to the database of the service: JOULEPATH_DATABASE_URL.
 
-    FILE is a YAML file that names a URDF and says what a URDF does not hold: see docs/own_robot.md.
+    FILE is a YAML file with the path of a URDF and further figures: see docs/own_robot.md.
     """
     from joulepath.app.access.client import OPERATOR
     from joulepath.app.api.robots.request import NAME_PATTERN
@@ -93,7 +93,7 @@ Example:
 )
 @click.argument("name")
 def remove(name: str) -> None:
-    """Deletes a robot that was added. Studies and stored answers about it stay."""
+    """Deletes an added robot. Studies and stored answers about it stay."""
     from joulepath.app.access.client import OPERATOR
     from joulepath.app.exceptions.base import ServiceError
     from joulepath.app.store import robots as stored
@@ -106,8 +106,7 @@ def remove(name: str) -> None:
 
 
 def _table() -> str:
-    """Bundled robots, then those in the database; without these where the database does not
-    answer."""
+    """Bundled robots, then added ones if the database answers."""
     from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.app.store import robots as stored
     from joulepath.models.registry import load_robot, robot_names

@@ -1,6 +1,4 @@
-"""What the commands that search have in common: from a file to the answer, and the lines of its
-summary.
-"""
+"""Common parts of the searching commands: from a file to the answer, and its summary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The database of the service, for commands that name a robot which a user added."""
+"""The database of the service, for commands about added robots."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ T = TypeVar("T")
 
 
 def run_with_store(task: Task, deadline: float) -> TaskResult:
-    """The result of a task, with the log, the robot, the figures and the answers that it takes from
-    the database.
+    """The result of a task with its log, robot, figures and answers from the database.
 
-    Raises what the task raises; StoreUnavailable if the database is needed.
+    Raises the error of the task; StoreUnavailable if the database is needed.
     """
     from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
     from joulepath.app.tasks.arm_engine import Equipped, Needs
@@ -35,7 +34,7 @@ def run_with_store(task: Task, deadline: float) -> TaskResult:
 
 
 def robot_named(name: str) -> Robot:
-    """The robot of this name: one that comes with the library, or one in the database.
+    """The bundled or added robot of this name.
 
     Raises UnknownRobot; StoreUnavailable if the database is needed.
     """
@@ -48,7 +47,7 @@ def robot_named(name: str) -> Robot:
 
 
 def in_store(work: Callable[[Store], Any]) -> Any:
-    """What a coroutine on the database returns. Raises what it raises."""
+    """The result of a coroutine on the database, or its error."""
     from joulepath.app.settings import Settings
     from joulepath.app.store.store import Store
 

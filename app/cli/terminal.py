@@ -1,4 +1,4 @@
-"""What only a person at a terminal sees: progress and a summary, on standard error."""
+"""Progress and summaries for terminals, on standard error."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""A machine of a cluster as a process of its own: a Dask worker that comes back when its scheduler
-does.
-"""
+"""A machine of a cluster: a Dask worker reconnecting to a restarted scheduler."""
 
 from __future__ import annotations
 
@@ -13,12 +11,13 @@ from joulepath.app.settings import Settings
 logger = logging.getLogger(__name__)
 
 _PAUSE = 2.0
-"""Time [s] until a scheduler that was lost is tried again."""
+"""Time [s] between two attempts to reach a lost scheduler."""
 
 
 async def serve(address: str, settings: Settings) -> None:
-    """Works for the scheduler at `address` until SIGTERM or Ctrl-C. What it is at work on then is
-    done elsewhere.
+    """Works for the scheduler at `address` until SIGTERM or Ctrl-C.
+
+    Other machines repeat its unfinished work.
     """
     from distributed import Worker
 
@@ -27,7 +26,7 @@ async def serve(address: str, settings: Settings) -> None:
         loop.add_signal_handler(number, stopped.set)
     stopping = asyncio.create_task(stopped.wait())
     while not stopped.is_set():
-        # the processes that compute are none of Dask's: it is not to watch their memory
+        # The computing processes do not belong to Dask, which must not watch their memory.
         worker = Worker(
             address,
             nthreads=settings.workers,

@@ -7,34 +7,43 @@ import logging
 import pickle
 import uuid
 from concurrent.futures import CancelledError as Cancelled
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from joulepath.app.cluster.machine import RESOURCES, compute, resource, version
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
-from joulepath.optimizer.progress import nobody
+from joulepath.optimizer.progress import no_listener
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
 logger = logging.getLogger(__name__)
 
-LOOK = 0.5
-"""Time [s] between two looks at the machines, and between two attempts to reach the scheduler."""
-TOGETHER = 0.25
-"""Work [s] that becomes one task of Dask."""
-PER_PROCESS = 2
-"""Tasks of Dask for each process of a machine: while one is computed, the next one is there."""
-_PATIENCE = 5.0
-"""Time [s] in which the scheduler must answer."""
+
+@dataclass(frozen=True)
+class LinkSettings:
+    """Settings of the link to the scheduler."""
+
+    look: float = 0.5
+    """Time [s] between two checks of the machines, and between two attempts to connect."""
+    together: float = 0.25
+    """Work [s] combined into one task of Dask."""
+    per_process: int = 2
+    """Tasks of Dask per process of a machine: the next one is ready when one ends."""
+    patience: float = 5.0
+    """Longest time [s] until the scheduler's answer."""
+
+
+LINK = LinkSettings()
 
 
 class _Unsuitable(Exception):
-    """The scheduler cannot pass on what is sent to the machines; the message says why."""
+    """The scheduler cannot pass on tasks; the message says why."""
 
 
 class Cluster:
-    """A Dask cluster whose scheduler listens at `address`."""
+    """A Dask cluster with a scheduler at `address`."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -48,15 +57,15 @@ class Cluster:
 
     @property
     def workers(self) -> dict[str, int]:
-        """Worker processes of each machine, by its address. Raises ClusterUnavailable."""
+        """Worker processes of the machines by address. Raises ClusterUnavailable."""
         if self._client is None:
             raise ClusterUnavailable
         return self._workers
 
     @property
     def slots(self) -> int:
-        """Runs that keep all machines at work; 0 if the scheduler cannot be reached."""
-        return 0 if self._client is None else PER_PROCESS * sum(self._workers.values())
+        """Number of runs for full use of all machines; 0 without a scheduler."""
+        return 0 if self._client is None else LINK.per_process * sum(self._workers.values())
 
     def start(self) -> None:
         """Connects in the background, and again whenever the connection is lost."""
@@ -69,14 +78,13 @@ class Cluster:
             await asyncio.gather(self._keeper, *self._releasing, return_exceptions=True)
 
     async def run(self, take: Take) -> None:
-        """Runs works on some machine, one after another: several short ones as one task of Dask,
-        which costs more than each of them.
+        """Runs works on a machine one after another, several short ones as one task of Dask.
 
-        Each ends with what it raises if it fails, DeadlineExceeded, or WorkerLost. If cancelled,
-        the work is stopped. Raises ClusterUnavailable.
+        A work ends with its result, its error, DeadlineExceeded, or WorkerLost. If cancelled, the
+        work is stopped. Raises ClusterUnavailable.
         """
         works, expected = list[Work](), 0.0
-        while expected < TOGETHER and (work := take()) is not None:
+        while expected < LINK.together and (work := take()) is not None:
             works.append(work)
             expected += work.expected
         if works:
@@ -89,11 +97,11 @@ class Cluster:
         if client is None:
             raise ClusterUnavailable
         key = f"joulepath-{uuid.uuid4().hex}"
-        asked = [(work.task, work.deadline, work.tell is not nobody) for work in works]
+        asked = [(work.task, work.deadline, work.tell is not no_listener) for work in works]
         self._works[key] = works
-        # short ones share a process with others, which are at the machine when it has ended these
-        is_long = len(works) == 1 and expected >= TOGETHER
-        use = {resource(): 1.0 if is_long else 1.0 / PER_PROCESS}
+        # Short works share a process, so that the next ones are ready at the machine.
+        is_long = len(works) == 1 and expected >= LINK.together
+        use = {resource(): 1.0 if is_long else 1.0 / LINK.per_process}
         future = client.submit(
             compute, asked, key, self._topic, key=key, pure=False, retries=0, resources=use
         )
@@ -112,13 +120,13 @@ class Cluster:
             self._release(future)
         if len(ended) < len(works):  # machines died of one of them
             for work in works:
-                await self._run([work], TOGETHER)
+                await self._run([work], LINK.together)
             return
         for work, each in zip(works, ended, strict=True):
             work.ended(each)
 
     def _release(self, future: Future[Any]) -> None:
-        """Has the cluster forget a task: nobody waits for it any more."""
+        """Releases an unwanted task of the cluster."""
         if future.done():
             future.release()
             return
@@ -140,7 +148,7 @@ class Cluster:
         while True:
             try:
                 async with Client(
-                    self.address, asynchronous=True, timeout=_PATIENCE, set_as_default=False
+                    self.address, asynchronous=True, timeout=LINK.patience, set_as_default=False
                 ) as client:
                     await self._check(client)
                     client.subscribe_topic(self._topic, self._heard)
@@ -156,16 +164,13 @@ class Cluster:
                     )
                     told = kind
                 if isinstance(error, _Unsuitable):  # each attempt leaves a traceback in its log
-                    await asyncio.sleep(_PATIENCE)
-            await asyncio.sleep(LOOK)
+                    await asyncio.sleep(LINK.patience)
+            await asyncio.sleep(LINK.look)
 
     async def _check(self, client: Client) -> None:
-        """Raises _Unsuitable unless the scheduler has this version of this package.
-
-        It reads tasks before it passes them on.
-        """
+        """Raises _Unsuitable unless the scheduler, which unpickles tasks, has this version."""
         try:
-            async with asyncio.timeout(_PATIENCE):
+            async with asyncio.timeout(LINK.patience):
                 found = await client.run_on_scheduler(version)
         except (OSError, TimeoutError, Cancelled):
             raise
@@ -177,8 +182,7 @@ class Cluster:
         if found != version():
             raise _Unsuitable(
                 "the scheduler has another version of this package: install the same one on all "
-                "machines "
-                f"(there {found}, here {version()})"
+                f"machines (there {found}, here {version()})"
             )
 
     async def _watch(self, client: Client) -> None:
@@ -189,7 +193,7 @@ class Cluster:
         assert scheduler is not None
         try:
             while client.status == "running":
-                async with asyncio.timeout(_PATIENCE):
+                async with asyncio.timeout(LINK.patience):
                     known = await scheduler.identity()
                 has = {name: each["resources"] for name, each in known["workers"].items()}
                 found = {name: int(each.get(resource(), 0)) for name, each in has.items()}
@@ -202,13 +206,13 @@ class Cluster:
                     }
                 )
                 self._client = client
-                await asyncio.sleep(LOOK)
+                await asyncio.sleep(LINK.look)
         finally:
             self._client = None
         raise OSError("the connection was lost")
 
     def _tell_others(self, others: set[str]) -> None:
-        """Says once of each machine of another version why it gets nothing to do."""
+        """Logs once why a machine with another version gets no work."""
         if new := others - self._others:
             logger.warning(
                 "machines of another version get no work: install the same one there",
@@ -217,7 +221,7 @@ class Cluster:
         self._others = others
 
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
-        """Something that a task has found."""
+        """Handles an event of a task."""
         _, message = event
         works = self._works.get(message["key"])
         if works is not None:

@@ -1,9 +1,9 @@
-"""One machine of a cluster: an engine inside a Dask worker, as `dask worker --preload
-joulepath.app.cluster` starts it.
+"""A machine of a cluster: an engine in a Dask worker (`dask worker --preload
+joulepath.app.cluster`).
 
-Dask carries tasks. It does not compute them: cancelling one of its futures stops no computation. A
-task is a coroutine here, which has it computed by a process of the engine, and kills that process
-once Dask no longer wants the result.
+Dask transports tasks without computing them, since cancelling its futures stops no computation. A
+task is a coroutine: a process of the engine computes it, and is killed once Dask no longer wants
+the result.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from joulepath.app.engine.warm_up import warm
 from joulepath.app.engine.work import Ended, Work, taking
 from joulepath.app.exceptions.queue import WorkerLost
 from joulepath.app.settings import read_settings
-from joulepath.optimizer.progress import Event, nobody
+from joulepath.optimizer.progress import Event, no_listener
 
 if TYPE_CHECKING:
     from distributed import Worker
 
 RESOURCES = "joulepath-"
-"""What the resources of all versions begin with."""
+"""Prefix of the resources of all versions."""
 LOOK = 0.2
-"""Time [s] between two looks at whether the result is still wanted, and at what was found."""
+"""Time [s] between two checks of Dask's interest and of new events."""
 _WANTED = ("executing", "long-running", "resumed")
-"""States of a task, in a Dask worker, whose result somebody waits for."""
+"""States of a wanted task in a Dask worker."""
 _engines: WeakKeyDictionary[Worker, Engine] = WeakKeyDictionary()
 
 _CODE = ("*.py", "*.c", "*.yaml")
@@ -41,9 +41,7 @@ _CODE = ("*.py", "*.c", "*.yaml")
 
 @cache
 def version() -> str:
-    """A digest of the code and the figures of this installation: objects that travel are read by
-    the same ones only.
-    """
+    """A digest of the code and figures: objects are exchanged only between equal installations."""
     digest = hashlib.sha256()
     package = Path(joulepath.__file__).parent
     for folder in sorted(each for each in package.iterdir() if each.is_dir()):
@@ -62,11 +60,11 @@ def resource() -> str:
 
 
 Asked = tuple[Task, float, bool]
-"""A task, its deadline [s], and whether somebody listens to what it finds."""
+"""A task, its deadline [s], and whether a client listens to its events."""
 
 
 async def dask_setup(worker: Worker) -> None:
-    """Starts the engine, with one process for each thread that the Dask worker has."""
+    """Starts the engine with one process per thread of the Dask worker."""
     settings = read_settings().model_copy(update={"workers": worker.state.nthreads})
     _engines[worker] = engine = Engine(settings, partial(warm, settings.robots))
     engine.start()
@@ -75,17 +73,15 @@ async def dask_setup(worker: Worker) -> None:
 
 
 async def dask_teardown(worker: Worker) -> None:
-    """Stops the engine. Dask has what it was at work on done elsewhere."""
+    """Stops the engine. Dask repeats its unfinished work elsewhere."""
     if worker in _engines:
         await _engines[worker].stop()
 
 
 async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
-    """How each of several tasks ended, as `SpareWorkers.run` has it. Runs in a Dask worker, as its
-    task `key`.
+    """Outcomes of several tasks, see `SpareWorkers.run`; the task `key` of a Dask worker.
 
-    One worker computes them, one after another. What a task finds goes to those who subscribed to
-    `topic`.
+    One worker computes them one after another. Events go to the subscribers of `topic`.
     """
     from distributed import Reschedule, get_worker
 
@@ -114,12 +110,12 @@ def _work(
     index: int, asked: Asked, found: list[tuple[int, Event]], ended: dict[int, Ended]
 ) -> Work:
     task, deadline, is_heard = asked
-    tell = (lambda event: found.append((index, event))) if is_heard else nobody
+    tell = (lambda event: found.append((index, event))) if is_heard else no_listener
     return Work(task, deadline, partial(ended.__setitem__, index), stoppable=False, tell=tell)
 
 
 async def _all(works: list[Work], ended: dict[int, Ended], engine: Engine) -> None:
-    # a worker that dies, or is killed at a deadline, leaves the rest to another one
+    # After the end of a worker, another one continues.
     while left := [work for index, work in enumerate(works) if index not in ended]:
         await engine.spare.run(taking(*left))
 

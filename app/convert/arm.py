@@ -8,19 +8,26 @@ import numpy as np
 
 from joulepath.app.convert.identified import with_figures
 from joulepath.app.convert.own_robots import own_figures_of, own_robot_of
-from joulepath.app.convert.pose import to_base, to_matrix
-from joulepath.app.convert.scene import to_attachment, to_scene, to_tool
+from joulepath.app.convert.pose import to_base
+from joulepath.app.convert.scene import to_attachment, to_scene
+from joulepath.app.convert.tool import to_tcp, to_tool, with_tool
 from joulepath.app.schemas import arm as asked
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
-from joulepath.optimizer.problem.arm import INVERTER_PARTS, LIMIT_NAMES, Arm, Inverter, Payload
+from joulepath.optimizer.problem.arm import (
+    INVERTER_COEFFICIENTS,
+    LIMIT_NAMES,
+    Arm,
+    Inverter,
+    Payload,
+)
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
 
 def robot_named(name: str) -> Robot:
-    """The robot with this name: one that comes with the library, or the own robot of this request.
+    """The bundled robot of this name, or the own robot of this request.
 
     Raises UnknownRobot or InvalidProblem.
     """
@@ -33,19 +40,20 @@ def robot_named(name: str) -> Robot:
 
 
 def to_arm(request: asked.ArmRequest) -> Arm:
-    """The arm of the library. Raises UnknownRobot, UnknownFigures or InvalidProblem."""
+    """The arm of the library. Raises UnknownRobot, UnknownTool, UnknownFigures or
+    InvalidProblem."""
     robot = robot_named(request.robot)
     if request.figures is not None:
         robot = with_figures(robot, request.figures)
     return Arm(
         robot=robot,
-        T_flange_tcp=to_matrix(request.tcp),
-        payload=to_payload(request.payload),
+        T_flange_tcp=to_tcp(request.tcp, request.tool),
+        payload=with_tool(request.tool, to_payload(request.payload)),
         gravity=np.array(request.gravity),
         limits=to_limits(request.limits, robot),
         friction=request.friction,
         inverter=Inverter(
-            **{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}
+            **{name: getattr(request.drives.inverter, name) for name in INVERTER_COEFFICIENTS}
         ),
         bus=_to_bus(request.bus),
         link_mass_scale=np.array(request.link_mass_scale),
@@ -85,9 +93,7 @@ def to_payload(payload: asked.Payload | None) -> Payload:
 
 
 def to_limits(limits: asked.MoveLimits, robot: Robot) -> Limits:
-    """The limits of the library: those of the robot, with the given ones in their place. Raises
-    InvalidProblem.
-    """
+    """The robot's limits, updated by the request. Raises InvalidProblem."""
     tighter = {
         name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq)
         for public, name in LIMIT_NAMES.items()

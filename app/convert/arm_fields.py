@@ -9,13 +9,15 @@ import orjson
 from joulepath.app.schemas.arm import ArmRequest
 
 LARGEST = 1 << 16
-"""Largest arm [byte of JSON] that is repeated: a front repeats it a hundred times."""
+"""Largest repeated arm [byte of JSON]; a front repeats it a hundred times."""
 _NAMES = set(ArmRequest.model_fields) - {"robot"}
 
 
 def arm_fields(request: ArmRequest, **instead: Any) -> dict[str, Any] | None:
-    """The fields of the arm that the request sets, without its robot; None if they are large.
-    `instead` replaces some."""
+    """The arm fields set by the request, without the robot; None if they are large.
+
+    `instead` replaces some fields.
+    """
     content = request.model_dump(mode="json", exclude_unset=True, include=_NAMES) | instead
     return (
         content

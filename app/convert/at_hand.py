@@ -1,6 +1,4 @@
-"""What a request needs of the database comes along with its task, in variables of the context in
-which it runs.
-"""
+"""Context variables with the items of the database that accompany a task."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bytes that a request gives in base64."""
+"""Bytes in base64 fields of requests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 
 def decoded(data: str, field: str) -> bytes:
-    """The bytes of a field in base64. Raises InvalidProblem at that field."""
+    """The bytes of a base64 field. Raises InvalidProblem at the field."""
     try:
         return base64.b64decode(data, validate=True)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Candidates as an answer lists them: which ones, and how many have each status."""
+"""The list of candidates in an answer, and the counts by status."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from joulepath.optimizer.result.candidates import CandidateReport
 
 
 def chosen(candidates: Sequence[CandidateReport], which: WhichCandidates) -> list[CandidateReport]:
-    """The candidates that an answer lists, in their order."""
+    """The listed candidates of an answer, in order."""
     if which == "none":
         return []
     return [each for each in candidates if which == "all" or each.tried]

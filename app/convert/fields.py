@@ -10,8 +10,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 
 def location(error: InvalidProblem, where: str) -> list[str | int]:
-    """Path in the request of the field that the error is about; `where` is the part of the
-    request."""
+    """Path of the invalid field in the request; `where` is the part of the request."""
     return [where, *(int(part) if part.isdigit() else part for part in error.field.split("."))]
 
 

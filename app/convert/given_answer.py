@@ -1,6 +1,4 @@
-"""From an answer that comes back in a request to the program of its motions: for exports and
-replays.
-"""
+"""The program of motions of an answer in a request, for exports and replays."""
 
 from __future__ import annotations
 
@@ -15,18 +13,20 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import RobotName
 from joulepath.models.robot import Array
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.evaluate.sample_check import check_samples
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 
-MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
+MOST_KNOTS = 4096
+HIGHEST_DEGREE = 31
+LONGEST_REST = CYCLE_RANGES.longest
 # of a stop: a move, two lines, a path, a dwell and a wait
-MOST_LEGS = 6 * MOST_STOPS + 5
+MOST_LEGS = 6 * CYCLE_RANGES.max_stops + 5
 MOVING = ("move", "line", "path")
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Row = Annotated[list[Number], Field(min_length=1, max_length=16)]
@@ -45,11 +45,11 @@ class _Spline(Part):
 
 
 class _Samples(Part):
-    t: Annotated[list[Number], Field(min_length=2, max_length=MOST_SAMPLES)]
-    q: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
-    v: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
-    a: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
-    tau: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
+    t: Annotated[list[Number], Field(min_length=2, max_length=MOTION_LIMITS.max_samples)]
+    q: Annotated[list[_Row], Field(max_length=MOTION_LIMITS.max_samples)]
+    v: Annotated[list[_Row], Field(max_length=MOTION_LIMITS.max_samples)]
+    a: Annotated[list[_Row], Field(max_length=MOTION_LIMITS.max_samples)]
+    tau: Annotated[list[_Row], Field(max_length=MOTION_LIMITS.max_samples)]
 
     def arrays(self) -> tuple[Array, Array, Array, Array]:
         """q, v, a, tau (k, nq)."""
@@ -104,9 +104,9 @@ _MOTION = (
 def to_program(
     answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]
 ) -> Program:
-    """The motion of an answer at full speed, its samples checked.
+    """The motion of an answer at full speed, with validated samples.
 
-    `kept` gives the kept answers of paths: those of the moves of a cycle. Raises ValidationError
+    `kept` returns the kept answers of paths, such as the moves of a cycle. Raises ValidationError
     (of pydantic), InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
     """
     if "legs" in answer:

@@ -12,18 +12,16 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 
 def own_times() -> InvalidProblem:
-    """The error for times that are given beside a log."""
+    """The error for times beside a log."""
     message = (
-        "A CSV file with a column of times has its own times: leave out time_per_segment "
-        "and interpolation."
+        "A CSV file with a column of times has its own times: leave out time_per_segment and "
+        "interpolation."
     )
     return InvalidProblem("time_per_segment", message)
 
 
 def to_motion(request: EvaluateRequest) -> Waypoints | Recording:
-    """The motion in a JSON request. Raises InvalidProblem, and UnknownLog for a log that it did not
-    bring.
-    """
+    """The motion in a JSON request. Raises InvalidProblem, and UnknownLog for a missing log."""
     if request.log is not None:
         return reading_of(request.log).log.recording()
     if request.trajectory is not None:
@@ -40,8 +38,9 @@ def to_motion(request: EvaluateRequest) -> Waypoints | Recording:
 
 
 def to_waypoints(settings: EvaluateSettings, q: Array, first_row: int) -> Waypoints:
-    """Configurations q (n, nq) [rad] with times. Raises InvalidProblem; `first_row` is that of the
-    file.
+    """Configurations q (n, nq) [rad] with times; `first_row` is a row of the file.
+
+    Raises InvalidProblem.
     """
     if settings.time_per_segment is None:
         raise InvalidProblem("time_per_segment", "Configurations require time_per_segment.")

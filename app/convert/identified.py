@@ -1,4 +1,4 @@
-"""The identified figures that a request names: they come along with the task, from the database."""
+"""Identified figures of a request, which accompany the task from the database."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 @dataclass(frozen=True)
 class Identified:
-    """Figures by their id: those of a robot that take the place of its own."""
+    """Identified figures by their id, replacing the robot's own."""
 
     id: str
     robot: str
@@ -35,8 +35,7 @@ def identified_as(figures: Identified) -> AbstractContextManager[None]:
 def with_figures(robot: Robot, id: str) -> Robot:
     """The robot with the figures of this id: the same object for the same content.
 
-    Raises UnknownFigures if the request did not bring them, and InvalidProblem if they are of
-    another robot.
+    Raises UnknownFigures for missing figures, and InvalidProblem for figures of another robot.
     """
     figures = _FIGURES.get()
     if figures is None or figures.id != id:

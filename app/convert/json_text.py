@@ -1,6 +1,4 @@
-"""Reads JSON that a client sent: errors say line and column, and no name may be given twice in one
-object.
-"""
+"""Strict reading of JSON from clients: errors with line and column, no duplicate names."""
 
 from __future__ import annotations
 
@@ -14,11 +12,10 @@ from joulepath.app.exceptions.base import InvalidRequest
 _PLACE = re.compile(r"(?s)(.*) at line (\d+) column (\d+)")
 _REPEATED = re.compile(r'(?s)Detected duplicate key "(.*)"')
 PLAIN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
-"""A name that an answer may repeat: nothing but letters, digits, `_` and `-`."""
+"""A name that answers may repeat: letters, digits, `_` and `-`."""
 _VALUE = (
     "a value is expected here: a number, a text in double quotes, or true, false or null in small "
-    "letters. JSON has no "
-    "comments"
+    "letters. JSON has no comments"
 )
 _REMEDIES = {
     "trailing comma": "delete the comma before the closing bracket",

@@ -1,4 +1,4 @@
-"""Known motions as the database keeps them: JSON, compressed."""
+"""Known motions in the form of the database: compressed JSON."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _SPLINE = ("degree", "knots", "control_points")
 
 
 def to_known_motions(kept: Mapping[str, bytes]) -> KnownMotions:
-    """Known motions from kept ones."""
+    """Known motions from the database."""
     return KnownMotions(
         {key: _to_motion(orjson.loads(unpacked(body))) for key, body in kept.items()}
     )
 
 
 def to_kept(motions: KnownMotions) -> dict[str, bytes]:
-    """What is to be kept of known motions: those that were used or found."""
+    """Used or found motions in the form of the database."""
     return {key: _kept(motion) for key, motion in motions.used.items()}
 
 

@@ -1,7 +1,7 @@
-"""From mesh files in a request to triangles of the library.
+"""Triangles of mesh files in requests.
 
-A file is untrusted. Its size is limited before it is decoded, and what it holds is counted before a
-mesh is made of it. Files in these formats hold no compressed parts that are unpacked here.
+Files are untrusted: their size is limited before decoding, and their content is counted before
+meshes are built. Compressed parts of these formats are not unpacked.
 """
 
 from __future__ import annotations
@@ -20,21 +20,19 @@ from joulepath.models.uploads.mesh import read_mesh
 from joulepath.models.uploads.mesh_text import MeshSize
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.clouds import MOST_TRIANGLES, TriangleMesh
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES, TriangleMesh
 
-# meshes that are kept for the next request with the same file, of so many triangles in all: 72
-# bytes each
+# triangles of cached meshes, 72 bytes each
 MOST_KEPT_TRIANGLES = 400_000
-_MOST = MeshSize(triangles=MOST_TRIANGLES)
+_MOST = MeshSize(triangles=CLOUD_RANGES.max_triangles)
 
 Format = Literal["stl", "obj", "glb"]
 
 
 def mesh_from_file(file_format: Format, data: str, scale: float) -> TriangleMesh:
-    """The mesh of a file in base64, whose unit of length is `scale` [m].
+    """The mesh of a base64 file with a unit of length of `scale` [m].
 
-    Raises InvalidProblem at the field `data`, and DeadlinePassed once a watched deadline has
-    passed.
+    Raises InvalidProblem at the field `data`, and DeadlinePassed after a watched deadline.
     """
     return _mesh(file_format, decoded(data, "data"), scale)
 

@@ -1,6 +1,4 @@
-"""The robot of a user's own that a request is about: its figures come along with the task, from the
-database.
-"""
+"""The own robot of a request, whose figures accompany the task from the database."""
 
 from __future__ import annotations
 
@@ -23,15 +21,13 @@ def own_robot_named(name: str, figures: dict[str, Any]) -> AbstractContextManage
 
 
 def own_figures_of(name: str) -> dict[str, Any] | None:
-    """Figures of the robot of that name; None if the request brought none."""
+    """Figures of the own robot of this name; None without them."""
     robot = _ROBOT.get()
     return robot[1] if robot is not None and robot[0] == name else None
 
 
 def own_robot_of(name: str, figures: dict[str, Any]) -> Robot:
-    """The robot of these figures. Raises InvalidProblem for one that was added when its shapes were
-    not yet checked.
-    """
+    """The robot of these figures. Raises InvalidProblem for invalid shapes of earlier versions."""
     try:
         return own_robot(name, figures)
     except WrongSize as error:

@@ -1,4 +1,4 @@
-"""Documents as the database keeps them: compressed, since one has up to a hundred megabytes."""
+"""Compressed documents of the database; one may have a hundred megabytes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def packed(document: bytes) -> bytes:
 
 
 def unpacked(kept: bytes) -> bytes:
-    """The document that is kept. Earlier versions of the service compressed with zlib."""
+    """The document. Earlier versions of the service compressed with zlib."""
     if kept.startswith(_ZSTANDARD):
         return zstandard.ZstdDecompressor().decompress(kept)
     return zlib.decompress(kept)

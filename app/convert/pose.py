@@ -30,7 +30,7 @@ def to_base(frame: asked.Frame, robot: Robot) -> Array:
 
 
 def to_base_pose(pose: asked.BasePose, robot: Robot) -> Pose:
-    """The pose in the robot's base frame of one that is given in this frame or in `base_link`."""
+    """A pose given in `base` or `base_link`, in the robot's base frame."""
     if pose.frame == "base":
         return to_pose(pose.position, pose)
     return Pose(to_base(pose.frame, robot) @ to_matrix(pose))

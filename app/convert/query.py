@@ -1,4 +1,4 @@
-"""Settings of a request whose body is a file: query parameters, each JSON or a bare word."""
+"""Settings of a request with a file as body: query parameters in JSON or as bare words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Logs and how they are read: the database has them, or a request whose body they are."""
+"""Logs from the database or from the body of a request, and the settings of their reader."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest,
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.reading import LogOptions, LogReading, check_header, read_log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import LogReading, check_header, read_log
 from joulepath.optimizer.problem import arm as library
 
 S = TypeVar("S", bound=EvaluateSettings)
@@ -38,13 +39,13 @@ def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
         effort=settings.effort,
         name=settings.name,
         tags=tuple(settings.tags),
-        most_bytes=most_bytes,
+        max_bytes=most_bytes,
     )
 
 
 @dataclass(frozen=True)
 class GivenLog:
-    """A stored log by its id: the settings with which it is read, and its packed file."""
+    """A stored log: its id, the settings of its reader, and its packed file."""
 
     id: str
     settings: dict[str, Any]
@@ -56,7 +57,7 @@ class GivenLog:
         settings = LogSettings.model_validate(self.settings)
         # its size was checked when it was added
         return read_log(
-            self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.most_bytes)
+            self.body, robot_named(settings.robot), to_log_options(settings, LogOptions.max_bytes)
         )
 
 
@@ -77,16 +78,26 @@ def reading_of(id: str) -> LogReading:
 
 
 def as_logged(asked: EvaluateRequest) -> EvaluateRequest:
-    """The request, with what its log says of the arm. Raises UnknownLog or InvalidProblem."""
+    """The request with robot, payload and gravity of its log. Raises UnknownLog or
+    InvalidProblem."""
     return asked if asked.log is None else told_by(reading_of(asked.log).log, asked)
 
 
 def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) -> LogReading:
-    """The log in a CSV file, whose header is wrong for a motion because of `otherwise`. Efforts
-    that are not usable are not read: the energy needs none, and a remark says so.
+    """The log in a CSV file without the header of a motion.
 
-    Raises LogTooLarge, InvalidProblem, or InvalidTable: `otherwise` where the header has a motion's
-    columns, or none.
+    Unusable efforts are skipped with a remark, since the energy does not need them.
+
+    Args:
+        file: the CSV file.
+        asked: settings of the request.
+        otherwise: the error of reading the file as a motion.
+
+    Raises:
+        LogTooLarge: the log is too large.
+        InvalidProblem: the settings are invalid.
+        InvalidTable: the file is no log; `otherwise` if it has the columns of a motion or no
+            header.
     """
     options = LogOptions(
         payload=to_payload(asked.payload) if "payload" in asked.model_fields_set else None,
@@ -111,9 +122,7 @@ def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) ->
 
 
 def told_by(log: Log, asked: S) -> S:
-    """The request, with robot, payload and gravity of the log where it leaves them out. Raises
-    InvalidProblem.
-    """
+    """The request, completed by robot, payload and gravity of the log. Raises InvalidProblem."""
     given = asked.model_fields_set
     if "robot" in given and asked.robot != log.robot:
         raise InvalidProblem("robot", f"The log is of the robot {log.robot}: leave robot out.")

@@ -1,5 +1,4 @@
-"""The deadline of what is read from a request before anything is computed: mesh files, URDFs,
-logs."""
+"""The deadline of reading mesh files, URDFs and logs of a request."""
 
 from __future__ import annotations
 
@@ -10,16 +9,12 @@ from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded
 
 _LEAST_TIME = 1e-3
-"""Shortest time of a computation [s]: one whose time was used up by the reading still says so by
-itself.
-"""
+"""Shortest time of a computation [s]; after a long reading it then reports the deadline itself."""
 
 
 @contextmanager
 def until(end: Deadline) -> Iterator[None]:
-    """Within the context, `checkpoint` ends what is read once `end` has passed. Raises
-    DeadlineExceeded then.
-    """
+    """A context in which `checkpoint` ends the reading after `end`. Raises DeadlineExceeded."""
     try:
         with watch(end):
             yield
@@ -28,5 +23,5 @@ def until(end: Deadline) -> Iterator[None]:
 
 
 def time_left(end: Deadline) -> float:
-    """The time [s] that is left for a computation, never zero."""
+    """The time left for a computation [s], never zero."""
     return max(end.left, _LEAST_TIME)

@@ -1,4 +1,4 @@
-"""From the occupied cells of a grid in a request to those of the library."""
+"""Conversion of occupied grid cells of requests."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 from joulepath.app.convert.base64_data import decoded
-from joulepath.app.schemas.scene import MOST_CELLS, VoxelBits, Voxels
+from joulepath.app.schemas.shapes import MOST_CELLS, VoxelBits, Voxels
 from joulepath.optimizer.exceptions import InvalidProblem
 
 
 def occupied_cells(given: Voxels) -> npt.NDArray[np.int64]:
-    """Cells (n, 3) that are occupied. Raises InvalidProblem, with the field named."""
+    """Occupied cells (n, 3). Raises InvalidProblem with the field."""
     if (given.cells is None) == (given.bits is None):
         raise InvalidProblem("cells", "Give the occupied cells either as `cells` or as `bits`.")
     return np.array(given.cells, dtype=np.int64) if given.bits is None else _from_bits(given.bits)
@@ -29,8 +29,7 @@ def _from_bits(bits: VoxelBits) -> npt.NDArray[np.int64]:
         raise InvalidProblem(
             "bits.data",
             f"bits.data holds {len(data)} bytes, but {count} cells need {-(-count // 8)}: one bit "
-            "per cell, eight to a "
-            "byte.",
+            "per cell, eight to a byte.",
         )
     numbers = np.flatnonzero(
         np.unpackbits(np.frombuffer(data, dtype=np.uint8), count=count, bitorder="little")

@@ -1,8 +1,8 @@
-"""What an answer warns of, in words."""
+"""Warnings of answers."""
 
 from __future__ import annotations
 
-from joulepath.optimizer.collision.close_pass import CLOSE
+from joulepath.optimizer.collision.close_pass import CLOSE_PASS
 from joulepath.optimizer.collision.stand_ins import StandInSettings
 from joulepath.optimizer.evaluate.evaluate import Evaluation
 from joulepath.optimizer.problem.arm import PAYLOAD, TOOL
@@ -17,23 +17,22 @@ ADVICE = "Make sure that the arm and its cell are known as accurately, or ask fo
 
 
 LITTLE_LEFT = 0.9
-"""Part of a torque limit above which a plan leaves a controller too little."""
+"""Share of a torque limit above which a motion leaves too little reserve for a controller."""
 MISSED = (
     "The inverse kinematics of this arm may have missed arm configurations: the answer is the best "
-    "of those found, its "
-    "status is not `optimal`, and its lower bound covers those that may be missing."
+    "of those found, its status is not `optimal`, and its lower bound covers those that may be "
+    "missing."
 )
 DIVIDED = (
     "{} is where the path is divided, at {:.1%} of its length: no arm configuration follows it "
-    "whole. `status` and "
-    "`lower_bound` are for this division."
+    "whole. `status` and `lower_bound` are for this division."
 )
 STAND_INS = {
     TOOL: f"a rod of {1e3 * StandInSettings.tool_radius:g} mm radius from the flange to the TCP",
     PAYLOAD: f"a ball of its mass at {StandInSettings.payload_density:g} kg/m³ about its centre of "
     "mass",
 }
-"""What stands in for a body of the arm that has no shape."""
+"""Descriptions of the stand-ins for bodies without a shape."""
 SHAPES = {TOOL: "tool.capsules", PAYLOAD: "payload.shape"}
 NO_DEFAULT_MOTION = (
     "No default motion of the robot's controller is known: `controller_default` is left out."
@@ -53,7 +52,7 @@ def certified_warnings(solution: Solution) -> list[str]:
 
 
 def sampled_warnings(result: Evaluation) -> list[str]:
-    """The warnings of a motion whose distances were sampled."""
+    """The warnings of a motion with sampled distances."""
     close = result.close_pass
     found = [] if close is None else [_close(close.pair, close.distance, close.time, "")]
     return found + [_unmodelled(contact) for contact in result.unmodelled]
@@ -82,8 +81,8 @@ def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> l
         if time > 0:
             advice = ": plan with a tighter limits.torque." if ratio > LITTLE_LEFT else "."
             said.append(
-                f"{what}, {joint} asks for more than its torque limit for {time:.4g} s. "
-                f"It is planned at {ratio:.1%} of this limit{advice}"
+                f"{what}, {joint} asks for more than its torque limit for {time:.4g} s. It is "
+                f"planned at {ratio:.1%} of this limit{advice}"
             )
     if run.collides and run.contact is not None:
         first, second = run.contact.pair
@@ -96,11 +95,11 @@ def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> l
 
 def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> str:
     first, second = pair
-    # the proven distance may be below CLOSE, and the sampled one a little above it
+    # the proven distance may be below CLOSE_PASS.distance, and the sampled one a little above it
     how = f"{_mm(distance)} mm apart" if distance > 0 else f"overlapping by {_mm(-distance)} mm"
     return (
-        f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} "
-        f"s{proven}. {ADVICE}"
+        f"Closer than {CLOSE_PASS.distance * 1e3:g} mm: {first} and {second} are {how} "
+        f"at {time:.3f} s{proven}. {ADVICE}"
     )
 
 
@@ -108,10 +107,8 @@ def _unmodelled(contact: Clearance) -> str:
     obstacle, carried = contact.pair
     return (
         f"The {carried} has no shape, and nothing keeps it out of the obstacles: "
-        f"{STAND_INS[carried]} would be "
-        f"{-1e3 * contact.sampled:.0f} mm deep in {obstacle} at {contact.time:.3f} s. Give its "
-        "shape in "
-        f"`{SHAPES[carried]}`."
+        f"{STAND_INS[carried]} would be {-1e3 * contact.sampled:.0f} mm deep in {obstacle} at "
+        f"{contact.time:.3f} s. Give its shape in `{SHAPES[carried]}`."
     )
 
 

@@ -1,1 +1,1 @@
-"""Where CPU work runs: worker processes behind a bounded queue, each task with a deadline."""
+"""Worker processes behind a bounded, fair queue; every task has a deadline."""

@@ -1,4 +1,4 @@
-"""Whose turn it is: clients share the workers evenly, and none can take all places of the queue."""
+"""A fair queue: clients share the workers evenly, and one client cannot fill the queue."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions.queue import Busy, TooManyRequests
 
 PATIENCE = 2.0
-"""Time [s] that a client without a worker waits, before a client that has several gives one
-back."""
+"""Time [s] a client without a worker waits before a client with several workers gives one back."""
 
 
 class State(Enum):
-    """Where a place is on its way."""
+    """State of a place."""
 
     IDLE = auto()
     """It does not wait: it has not begun to, or its request is over."""
@@ -53,33 +52,30 @@ class Place:
 
     @property
     def waits(self) -> bool:
-        """Whether a worker may be lent to it. One whose request has just left or timed out waits no
-        more.
-        """
+        """Whether a worker may be lent to the place: its request has neither left nor timed out."""
         return self.state is State.WAITING and self.granted is not None and not self.granted.done()
 
 
 class Loan:
-    """A worker that is lent to a place, or to work that can wait (None), until it is given back and
-    at no task.
-    """
+    """A worker lent to a place, or to deferrable work (None), until it is returned without a
+    task."""
 
     def __init__(self, worker: Worker, place: Place | None) -> None:
         self.worker, self.place = worker, place
         self.counts = place is not None
-        """Whether it counts as a worker that the place's client has."""
+        """Whether the worker counts as one of the client's workers."""
         self.is_returned = False
 
 
 class FairQueue:
-    """Hands workers to those who wait: first to the client that has the fewest, among equals in
-    turn.
+    """Lends workers to waiting places, first to the client with the fewest workers, then in turn.
 
-    `capacity`: most requests in workers and waiting. `share`: most of one client.
+    `capacity` is the largest number of requests in workers and in the queue, `share` that of one
+    client.
 
-    Every worker is in `_loans` from `put` until its end is seen: with None while it is idle, with
-    its loan otherwise. So it is in one state at every time, and what depends on the states is
-    counted from them.
+    Every worker is a key of `_loans` from `put` until its end is noticed: its value is None while
+    it is idle, its loan otherwise. A worker therefore always has exactly one state, and all counts
+    are derived from these states.
     """
 
     def __init__(self, capacity: int, share: int) -> None:
@@ -118,7 +114,7 @@ class FairQueue:
 
     @asynccontextmanager
     async def spare(self) -> AsyncIterator[Worker]:
-        """A worker that nobody waits for, as soon as there is one."""
+        """A worker not needed by any waiting place, as soon as there is one."""
         while self._next() is not None or (worker := self._idle_worker()) is None:
             self._changed.clear()
             await self._changed.wait()
@@ -135,18 +131,18 @@ class FairQueue:
 
     @property
     def waiting(self) -> list[Place]:
-        """Places that wait for a worker."""
+        """Places waiting for a worker."""
         return [place for line in self._waiting.values() for place in line]
 
     @property
     def oldest(self) -> float:
-        """Time for which the oldest of them has waited; 0 if none waits [s]."""
+        """Waiting time of the oldest waiting place [s]; 0 without one."""
         now = time.monotonic()
         return max((now - place.since for place in self.waiting), default=0.0)
 
     @property
     def busy(self) -> int:
-        """Workers that are at a task."""
+        """Number of workers running a task."""
         return sum(loan is not None and loan.worker.alive for loan in self._loans.values())
 
     @property
@@ -157,22 +153,24 @@ class FairQueue:
         )
 
     def put(self, worker: Worker) -> None:
-        """Takes a new worker, which has nothing to do. One that has ended is left out."""
+        """Adds a new idle worker, unless it has ended."""
         if worker.alive:
             self._loans[worker] = None
         self._serve()
 
     def remove(self, worker: Worker) -> None:
-        """Forgets a worker that has ended."""
+        """Removes an ended worker."""
         self._loans.pop(worker, None)
 
     def mend(self, workers: set[Worker]) -> list[str]:
-        """Puts right what can only be wrong by a defect of the queue, and tells it: `workers` are
-        all that are alive.
+        """Repairs inconsistent states and returns a description of each; only a defect causes them.
 
-        A worker that the queue does not know is new to it; one that is lent to nobody is idle; one
-        that is idle while a place waits is lent. What was not so at the last call, too, may be
-        under way in this turn of the event loop.
+        An unknown worker is added, a worker with an abandoned loan becomes idle, and an idle worker
+        is lent if a place waits. An inconsistency counts from the second call on, because it may be
+        a transition within one turn of the event loop.
+
+        Args:
+            workers: all living workers.
         """
         before, self._suspects = self._suspects, self._wrong(workers)
         found = [fault for what, fault in self._suspects.items() if before.get(what) == fault]
@@ -186,7 +184,7 @@ class FairQueue:
         return found
 
     def _wrong(self, workers: set[Worker]) -> dict[Worker | Loan | Place, str]:
-        """What is not as it should be, unless it is under way."""
+        """Inconsistent workers, loans and places, each with a description."""
         wrong: dict[Worker | Loan | Place, str] = {}
         wrong |= dict.fromkeys(workers - self._loans.keys(), "a worker was neither idle nor lent")
         for loan in [each for each in self._loans.values() if each is not None]:
@@ -223,9 +221,7 @@ class FairQueue:
             claim.cancel()
 
     def _serve(self) -> None:
-        """Lends idle workers to those whose turn it is. It raises nothing: it runs within other
-        requests.
-        """
+        """Lends idle workers to places in turn. It never raises, since other requests call it."""
         while (place := self._next()) and (worker := self._idle_worker()):
             self._leave(place)
             if (
@@ -243,7 +239,7 @@ class FairQueue:
         return loan
 
     def _return(self, loan: Loan) -> None:
-        """The borrower is done with its worker, which may have to end its task first."""
+        """Returns a worker, which may have to end its task first."""
         loan.is_returned = True
         loan.worker.when_free(lambda: self._take_back(loan))
 
@@ -258,7 +254,7 @@ class FairQueue:
         )
 
     def _working(self) -> Counter[str]:
-        """Number of workers that each client has."""
+        """Number of workers of every client."""
         loans = [
             loan
             for loan in self._loans.values()
@@ -267,7 +263,7 @@ class FairQueue:
         return Counter(loan.place.client for loan in loans if loan.place is not None)
 
     def _next(self) -> Place | None:
-        """Whose turn it is. The order of `_waiting` is that of the turns."""
+        """The next place to be served. `_waiting` is ordered by turns."""
         working = self._working()
         heads = [
             next((place for place in line if place.waits), None) for line in self._waiting.values()
@@ -302,7 +298,7 @@ class FairQueue:
             for loan, holder in lent
             if holder.give_back and working[holder.client] > 1
         ]
-        # the last one of the client that has the most
+        # the most recent loan of the client with the most workers
         loan, holder = max(
             reversed(stoppable), key=lambda each: working[each[1].client], default=(None, None)
         )

@@ -1,8 +1,7 @@
-"""The process that workers are forked from. It imports the libraries once, so that a new worker
-starts at once.
+"""The process from which workers are forked, with all libraries imported.
 
-This module imports nothing of the service: `python -m joulepath.app` starts the process first, and
-both then import in parallel.
+This module does not import the service: `python -m joulepath.app` starts the process first, and
+both processes import in parallel.
 """
 
 from __future__ import annotations
@@ -16,8 +15,7 @@ CONTEXT = multiprocessing.get_context("forkserver")
 
 def start_forkserver() -> None:
     """Starts the process, unless it runs."""
-    # each worker uses one core: thread pools of linear algebra libraries would compete with the
-    # other workers
+    # A worker uses one core: thread pools of linear algebra libraries would compete with others.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     CONTEXT.set_forkserver_preload(["joulepath.app.tasks.preload"])

@@ -1,6 +1,6 @@
-"""Imports with the garbage collector off, and objects that it leaves alone.
+"""Imports without garbage collection, and objects excluded from it.
 
-Modules leave next to no garbage, and to look for it takes a fifth of the time of their import.
+Imports leave hardly any garbage, and collecting it takes a fifth of their time.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ def importing() -> Iterator[None]:
 
 
 def keep() -> None:
-    """Has the collector look at nothing that is there now until the process ends: forked ones so
-    share its memory.
-    """
+    """Excludes all present objects from garbage collection, so that forked processes share
+    memory."""
     gc.freeze()
-    # libraries warn of objects that nobody could free
+    # Libraries would warn about frozen objects at exit.
     atexit.register(gc.unfreeze)

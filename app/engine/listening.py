@@ -1,6 +1,4 @@
-"""Who listens to the task that this process runs: what the task finds goes there at once, before
-its result.
-"""
+"""The listener of the task in this process, which receives its events before its result."""
 
 from __future__ import annotations
 
@@ -8,14 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
-_tell: ContextVar[Tell] = ContextVar("tell", default=nobody)
+_tell: ContextVar[Tell] = ContextVar("tell", default=no_listener)
 
 
 @contextmanager
 def listening(tell: Tell) -> Iterator[None]:
-    """A context in which `tell` gets what tasks find."""
+    """A context in which `tell` receives the events of tasks."""
     before = _tell.set(tell)
     try:
         yield
@@ -24,5 +22,5 @@ def listening(tell: Tell) -> Iterator[None]:
 
 
 def listener() -> Tell:
-    """What gets the events of this task."""
+    """The listener of the running task."""
     return _tell.get()

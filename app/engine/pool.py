@@ -1,4 +1,4 @@
-"""The engine: warm worker processes behind a bounded, fair queue, each task with a deadline."""
+"""The engine: warm worker processes behind a bounded, fair queue, with a deadline per task."""
 
 from __future__ import annotations
 
@@ -20,18 +20,26 @@ from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 logger = logging.getLogger(__name__)
 
-_FIRST_RESTART_DELAY = 0.5
-_LONGEST_RESTART_DELAY = 30.0
-_CHECK_PERIOD = 1.0
-"""Time [s] between two checks that every worker is where it should be."""
-_MOST_DEATHS = 2
-"""Workers that may die of a request that somebody waits for: the first one may have been killed by
-chance.
-"""
+
+@dataclass(frozen=True)
+class PoolSettings:
+    """Settings of the pool of workers."""
+
+    first_restart_delay: float = 0.5
+    """Delay of the first replacement of a worker [s], doubled after every failure."""
+    longest_restart_delay: float = 30.0
+    """Longest delay of a replacement [s]."""
+    check_period: float = 1.0
+    """Time [s] between two checks of the queue's consistency."""
+    most_deaths: int = 2
+    """Dead workers after which a task is given up; the first one may have been killed by chance."""
+
+
+POOL = PoolSettings()
 
 
 class Engine:
@@ -42,9 +50,7 @@ class Engine:
 
     def __init__(self, settings: Settings, warm: Callable[[], None]) -> None:
         self.restarts = 0
-        """Workers that had to be replaced since the start: they were killed, or ended by
-        themselves.
-        """
+        """Number of workers replaced since the start."""
         self._settings = settings
         self._warm = warm
         self.queue: FairQueue = FairQueue(
@@ -62,7 +68,7 @@ class Engine:
 
     @property
     def warm_workers(self) -> int:
-        """Number of workers that run a task or could run one."""
+        """Number of workers running a task or ready for one."""
         return sum(worker.alive for worker in self._workers)
 
     @property
@@ -105,12 +111,12 @@ class Engine:
         atexit.unregister(self._kill_all)
 
     def drain(self) -> None:
-        """Refuses new tasks. Those in flight get `settings.shutdown_grace` seconds to finish."""
+        """Refuses new tasks and gives running tasks `settings.shutdown_grace` seconds to finish."""
         if self._draining.is_set():
             return
         self._draining.set()
         self._latest_end = asyncio.get_running_loop().time() + self._settings.shutdown_grace
-        # one that has just run out ends by itself
+        # An expired limit ends by itself.
         for limit in [each for each in self._in_flight if not each.expired()]:
             limit.reschedule(min(limit.when() or self._latest_end, self._latest_end))
 
@@ -119,16 +125,27 @@ class Engine:
         return ClientEngine(self, client)
 
     async def run(
-        self, task: Task, deadline: float, client: str = "", tell: Tell = nobody
+        self, task: Task, deadline: float, client: str = "", tell: Tell = no_listener
     ) -> TaskResult:
-        """The task's result, within `deadline` seconds and `settings.deadline_grace`. Time in the
-        queue counts.
+        """The task's result, within `deadline` seconds plus `settings.deadline_grace`.
 
-        Clients have their turns, see `FairQueue`. A task whose worker another client needs begins
-        again later, and once one whose worker died. `tell` gets what the task finds, after a new
-        begin from the first on. If cancelled, the task leaves the queue or is stopped. Raises what
-        the task raises (see `Task.run`), Busy, TooManyRequests, ShuttingDown, DeadlineExceeded, or
-        WorkerLost if two workers died of it.
+        The time in the queue counts. Clients take turns, see `FairQueue`. A task starts again if
+        another client needs its worker, and once if its worker dies. If cancelled, it leaves the
+        queue or is stopped.
+
+        Args:
+            task: the task.
+            deadline: time for queue and task [s].
+            client: the client.
+            tell: receives the events of the task, from the first one again after a restart.
+
+        Raises:
+            JoulepathError: the error of the task (see `Task.run`).
+            Busy: the queue is full.
+            TooManyRequests: the client's share of the queue is full.
+            ShuttingDown: the service is stopping.
+            DeadlineExceeded: the time is over.
+            WorkerLost: the task has ended two workers.
         """
         if self._draining.is_set():
             raise ShuttingDown
@@ -153,8 +170,7 @@ class Engine:
             async with AsyncExitStack() as turn:
                 with self.spare.someone_waits():
                     worker = await turn.enter_async_context(self.queue.worker(place))
-                # the optimiser watches the deadline and returns its best motion: the grace is for
-                # that
+                # The grace lets the optimiser return its best motion at the deadline.
                 limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
                 left = end - asyncio.get_running_loop().time()
                 if left <= 0:
@@ -169,7 +185,7 @@ class Engine:
                     deaths += 1
                     if self._draining.is_set():
                         raise ShuttingDown from None
-                    if deaths == _MOST_DEATHS:
+                    if deaths == POOL.most_deaths:
                         raise
                     reason = "its worker died"
             place.begins_again = True
@@ -181,9 +197,9 @@ class Engine:
     async def _keep(self, first: bool) -> None:
         """Keeps one worker alive: starts it, waits for its end, starts the next."""
         if not first:
-            # the first worker compiles the kernels, which the others then find in the cache
+            # The first worker compiles the kernels for the cache of all workers.
             await self._first_warm.wait()
-        delay = _FIRST_RESTART_DELAY
+        delay = POOL.first_restart_delay
         while True:
             try:
                 worker = Worker(
@@ -199,9 +215,9 @@ class Engine:
                     extra={"retry_in": delay},
                 )
                 await asyncio.sleep(delay)
-                delay = min(2 * delay, _LONGEST_RESTART_DELAY)
+                delay = min(2 * delay, POOL.longest_restart_delay)
                 continue
-            delay = _FIRST_RESTART_DELAY
+            delay = POOL.first_restart_delay
             self._has_warmed(worker)
             await worker.ended.wait()
             self._workers.discard(worker)
@@ -209,9 +225,9 @@ class Engine:
             self.restarts += 1
 
     async def _check(self) -> None:
-        """Mends what a defect of the queue has broken, so that it costs no worker."""
+        """Repairs the states of the queue periodically, so that a defect costs no worker."""
         while True:
-            await asyncio.sleep(_CHECK_PERIOD)
+            await asyncio.sleep(POOL.check_period)
             for fault in self.queue.mend({worker for worker in self._workers if worker.alive}):
                 logger.error("mended the queue", extra={"fault": fault})
 
@@ -236,6 +252,6 @@ class ClientEngine:
     engine: Engine
     client: str
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         """See `Engine.run`."""
         return await self.engine.run(task, deadline, self.client, tell)

@@ -1,6 +1,4 @@
-"""The result of a task: an encoded document. It knows nothing of HTTP, so that any caller of the
-engine can use it.
-"""
+"""The result of a task: an encoded document, independent of HTTP."""
 
 from __future__ import annotations
 
@@ -21,10 +19,10 @@ _HEAD = re.compile(rb'\{"request":"([^"]*)","id":(?:null|"([^"]*)")')
 
 @dataclass(frozen=True)
 class StoredAnswer:
-    """A complete answer (JSON), the id under which it is to be stored, and what lists show of it.
+    """A complete answer as JSON, its id in the database, and its figures in lists.
 
-    The task chooses the id, so that the document holds the final path from the first. Nothing is
-    ever searched and replaced in a document, which repeats texts of the caller.
+    The task chooses the id, so that the document contains its final path from the start. Documents
+    repeat texts of the caller and are never edited by search and replace.
     """
 
     id: str
@@ -41,12 +39,11 @@ class StoredAnswer:
 class TaskResult:
     """A document and its media type. A task that fails raises an exception instead.
 
-    `stored` are complete answers that belong into the database before the document is sent: it
-    refers to them. `kept_as` is the id under which the document itself is to be kept: its field
-    `id`, the second one, has it, and the path is in the last one, `answer`, if there is one.
-    `figures` are what lists show of it. `is_optimal`: no more time would make it better. `age` [s]
-    is that of a document that was computed before. `motions` are those that it used or found of a
-    cell, by their keys: later rounds may have them in common.
+    `stored` are complete answers to be stored before the document, which refers to them, is sent.
+    `kept_as` is the id under which the document itself is to be kept; it is in the second field,
+    `id`, and the path in the last field, `answer`. `figures` are its figures in lists. `is_optimal`
+    says that more time would not improve it. `age` [s] is the age of a repeated document. `motions`
+    are the motions of a cell used or found by the task, by their keys, for later cycles.
     """
 
     document: bytes
@@ -67,9 +64,7 @@ class TaskResult:
     def of_kept_json(
         cls, content: Any, figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()
     ) -> TaskResult:
-        """A JSON document that is to be kept. Its fields `request` and `id` come first, `answer`
-        comes last.
-        """
+        """A JSON document to be kept, with `request` and `id` first and `answer` last."""
         is_optimal = figures.status == "optimal"
         return cls(
             json_document(content), "application/json", stored, None, figures, is_optimal
@@ -80,13 +75,11 @@ class TaskResult:
         return self._under(str(uuid.uuid4()))
 
     def not_kept(self) -> TaskResult:
-        """The same document, which is not kept: its fields `id` and `answer` are null."""
+        """The same document without keeping it: `id` and `answer` are null."""
         return self._under(None)
 
     def for_request(self, request_id: str) -> TaskResult:
-        """The same document as the answer to another request: its field `request` is the id of
-        that.
-        """
+        """The same document with the id of another request in `request`."""
         head = _HEAD.match(self.document)
         assert head is not None
         start, end = head.span(1)
@@ -125,8 +118,7 @@ def _last_field(answer_id: str | None) -> bytes:
 
 
 def json_document(content: Any) -> bytes:
-    """An object of a declared class, or a dict, as JSON. A number that is not finite becomes
-    null."""
+    """An object of a declared class or a dict as JSON; non-finite numbers become null."""
     return orjson.dumps(
         content,
         default=as_json,

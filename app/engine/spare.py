@@ -1,6 +1,4 @@
-"""Work that can wait: it gets workers that no caller waits for, and gives one back to a caller that
-waits too long.
-"""
+"""Deferrable work on idle workers; a caller waiting too long gets a worker back."""
 
 from __future__ import annotations
 
@@ -18,8 +16,11 @@ from joulepath.optimizer.exceptions import DeadlineExceeded
 
 @dataclass(eq=False)
 class _Run:
-    """Work on a worker. `at`: what it is at work on, since `began` [s]. `preempted`: a caller took
-    the worker. `over`: nothing more is told of it."""
+    """Deferrable work on one worker.
+
+    `at` is the running work, since `began` [s]. `preempted`: a caller has taken the worker. `over`:
+    no more events are reported.
+    """
 
     worker: Worker
     at: Work | None
@@ -38,26 +39,24 @@ class _Run:
         self.worker.stop()
 
     def end(self, error: Exception) -> None:
-        """The work that it is at ends with this."""
+        """Ends the running work with an error."""
         if self.at is not None:
             self.at.ended(error)
 
 
 class SpareWorkers:
-    """Lends idle workers of an engine. `grace` [s] is the time after a deadline at which a work is
-    stopped.
-    """
+    """Lends idle workers of an engine; work is stopped `grace` [s] after its deadline."""
 
     def __init__(self, queue: FairQueue, workers: set[Worker], grace: float) -> None:
         self._queue, self._workers, self._grace = queue, workers, grace
         self._runs: dict[Worker, _Run] = {}
 
     async def run(self, take: Take) -> None:
-        """Runs works one after another on one worker, once it is idle and no caller waits for one.
+        """Runs works one after another on one worker, once it is idle and no caller waits.
 
-        It ends if there is no more work, a caller waits, or the worker is gone. The work that it
-        was at then has ended with DeadlineExceeded, WorkerLost, or, if it is `stoppable`,
-        Preempted: a caller took the worker. If cancelled, the work is stopped, and has not ended.
+        It returns when there is no more work, when a caller waits, or when the worker is lost. The
+        running work then ends with DeadlineExceeded, with WorkerLost, or, if `stoppable`, with
+        Preempted. If cancelled, the work is stopped without a result.
         """
         async with self._queue.spare() as worker:
             first = take()
@@ -94,7 +93,7 @@ class SpareWorkers:
 
     @contextmanager
     def someone_waits(self) -> Iterator[None]:
-        """A context in which a caller waits for an idle worker."""
+        """A context of a caller waiting for an idle worker."""
         patience = asyncio.get_running_loop().call_later(PATIENCE, self._make_room)
         try:
             yield
@@ -102,7 +101,7 @@ class SpareWorkers:
             patience.cancel()
 
     def _make_room(self) -> None:
-        """Stops the work that began last, if work that can wait has all workers."""
+        """Stops the latest deferrable work if such work has all workers."""
         if self._runs.keys() >= {worker for worker in self._workers if worker.alive}:
             stoppable = [run for run in self._runs.values() if run.is_stoppable]
             if stoppable:

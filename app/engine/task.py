@@ -1,4 +1,4 @@
-"""Tasks: what the engine runs, here or in another process."""
+"""Tasks of the engine, run in this process or in a worker."""
 
 from __future__ import annotations
 
@@ -18,20 +18,18 @@ class Task(Protocol):
 
     @property
     def request_id(self) -> str:
-        """Id of the request that the task belongs to; the worker's log names it."""
+        """Id of the request, for the worker's log."""
 
     def run(self, deadline: float) -> TaskResult:
-        """The result, within about `deadline` seconds. What it finds before goes to `listener()`.
+        """The result, within about `deadline` seconds; events go to `listener()`.
 
-        A JoulepathError or ServiceError reaches the caller of `Engine.run` as it is. Any other
-        exception is a defect: the worker logs it, and the caller gets InternalError.
+        The caller of `Engine.run` receives a JoulepathError or ServiceError unchanged. Any other
+        exception is a defect: the worker logs it, and the caller receives InternalError.
         """
 
 
 def outcome(task: Task, deadline: float) -> TaskResult | DeclaredError | Stopped:
-    """The task's result, the error that its caller gets, or that it was stopped; all can be
-    pickled.
-    """
+    """The task's result, the error for its caller, or Stopped; all of them can be pickled."""
     ended: TaskResult | DeclaredError
     try:
         checkpoint()
@@ -44,6 +42,5 @@ def outcome(task: Task, deadline: float) -> TaskResult | DeclaredError | Stopped
         if not is_stopped():
             logger.exception("unforeseen error", extra={"request_id": task.request_id})
         ended = InternalError()
-    # a task that is stopped may end as if its deadline had passed: that is no answer for whoever
-    # gave its worker back
+    # A stopped task may end as if its deadline had passed: this is not an answer.
     return Stopped() if is_stopped() else ended

@@ -8,6 +8,6 @@ from joulepath.optimizer.optimize import warm_up
 
 
 def warm(robots: Sequence[str]) -> None:
-    """Loads robots and their kernels, so that the first request for one of them need not wait."""
+    """Loads robots and their kernels, so that first requests need not wait."""
     for name in robots:
         warm_up(name)

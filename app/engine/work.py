@@ -1,6 +1,4 @@
-"""Work that can wait: tasks that one worker after another takes from a common heap, and what
-becomes of each.
-"""
+"""Deferrable work: tasks taken by workers from a common queue, and their outcomes."""
 
 from __future__ import annotations
 
@@ -9,36 +7,33 @@ from dataclasses import dataclass
 
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 SHORT = 0.05
-"""Most that short work takes [s]."""
+"""Longest expected time of short work [s]."""
 Ended = TaskResult | Exception
-"""How a task ends: its result, or the error that it raises."""
+"""Outcome of a task: its result or its error."""
 
 
 @dataclass(eq=False)
 class Work:
-    """A task, for which `deadline` [s] is left once work on it begins. `ended` gets what becomes of
-    it.
+    """A task with `deadline` [s] from its start, and a function `ended` for its outcome.
 
-    `stoppable`: a caller may take its worker. `tell` gets what the task finds. `expected` [s] is
-    what it may take. `is_small`: its pickled task has a few kilobytes at most.
+    `stoppable`: a caller may take its worker. `tell` receives the events of the task. `expected`
+    [s] is its likely time. `is_small`: the pickled task has a few kilobytes at most.
     """
 
     task: Task
     deadline: float
     ended: Callable[[Ended], object]
     stoppable: bool = True
-    tell: Tell = nobody
+    tell: Tell = no_listener
     expected: float = float("inf")
     is_small: bool = False
 
     @property
     def is_short(self) -> bool:
-        """Whether it may lie in the pipe of a worker that is at work: it holds up neither a caller
-        nor the pipe.
-        """
+        """Whether it may wait in the pipe of a busy worker without delaying callers."""
         return self.is_small and self.expected <= SHORT
 
 
@@ -57,11 +52,10 @@ async def result_of(
     task: Task,
     deadline: float,
     stoppable: bool = True,
-    tell: Tell = nobody,
+    tell: Tell = no_listener,
 ) -> TaskResult:
-    """The result of one task from what runs many. Raises what becomes of it otherwise, and what
-    `run` raises.
-    """
+    """The result of one task, run by a function for many. Raises the error of the task or of
+    `run`."""
     found: list[Ended] = []
     await run(taking(Work(task, deadline, found.append, stoppable, tell)))
     (ended,) = found

@@ -1,8 +1,8 @@
-"""One worker process: it is started, warms up, and runs one task at a time. It is told to end a
-task that nobody wants any more, and killed if it does not.
+"""A worker process: it starts, warms up, and runs one task at a time.
 
-Each worker has a pipe of its own and shares no lock with the others. It can therefore be killed at
-any moment, and its end, whatever the cause, shows as the end of its pipe.
+It is asked to end an unwanted task, and killed if it does not comply. Every worker has its own pipe
+and shares no lock with others. It can therefore be killed at any moment, and its end, whatever the
+cause, is noticed as the end of the pipe.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.app.logs import configure_logging
 from joulepath.optimizer.deadline import Stopped, stoppable
-from joulepath.optimizer.progress import Event, Tell, nobody
+from joulepath.optimizer.progress import Event, Tell, no_listener
 
 logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 Heard = Callable[[Event], object] | None
-"""What gets the events of a task in a thread; None if nobody listens."""
+"""Receiver of a task's events, called in a thread; None without a listener."""
 Turn = Callable[[Work, Ended, Work | None], object]
-"""Told of a work that has ended, of what became of it, and of the next one."""
+"""Function called with an ended work, its outcome, and the next work."""
 
 
 class Worker:
     """The parent's side of a worker process.
 
-    Its exchanges with the process are numbered. To stop one, it writes the number into memory that
-    both share, where the process looks at every `checkpoint` of its task: it ends exchanges up to
-    that number. A word that comes late therefore ends nothing but what it was meant for.
-    `stop_grace` [s] is the time that the process has to end it.
+    Exchanges with the process are numbered. To stop an exchange, its number is written into shared
+    memory. The process compares it with its own number at every `checkpoint`, and ends exchanges up
+    to this number, so that a late request to stop cannot end another task. `stop_grace` [s] is the
+    time for the process to end the task.
     """
 
     def __init__(
         self, warm: Callable[[], None], log_level: str, threads: Executor, stop_grace: float
     ) -> None:
         self._pipe, self._child_pipe = CONTEXT.Pipe()
-        # one aligned word, which is read and written at once: it needs no lock, which a killed
-        # process could hold
+        # One aligned word is read and written atomically, without a lock that a killed process
+        # could hold.
         self._stopped_up_to = CONTEXT.RawValue("Q", 0)
         self._process = CONTEXT.Process(
             target=_serve,
@@ -74,7 +74,7 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether it can run a task, now or once the one that it is at has ended."""
+        """Whether it can run a task, now or after the running one."""
         return not (self._killed or self._lost or self.ended.is_set())
 
     @property
@@ -103,11 +103,18 @@ class Worker:
                 raise WorkerLost from None
             raise
 
-    async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
-        """The task's result. If cancelled, it stops the task.
+    async def ask(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+        """The task's result. If cancelled, the task is stopped.
 
-        `tell` gets what the task finds, before the result. Raises what the task raises (see
-        `Task.run`), Preempted if the task was stopped, or WorkerLost.
+        Args:
+            task: the task.
+            deadline: its time [s].
+            tell: receives events before the result.
+
+        Raises:
+            JoulepathError: the error of the task (see `Task.run`).
+            Preempted: the task was stopped.
+            WorkerLost: the process has ended.
         """
         heard = _heard(tell, asyncio.get_running_loop())
         ended = await self._exchanged(lambda number: self._ask(number, task, deadline, heard))
@@ -116,19 +123,16 @@ class Worker:
         return ended
 
     async def ask_all(self, first: Work, take: Take, turn: Turn) -> None:
-        """Runs works one after another, until there is none. If cancelled, it stops. Raises
-        Preempted or WorkerLost.
+        """Runs works one after another until `take` returns none. Raises Preempted or WorkerLost.
 
-        Each gets to the process as soon as the last one has ended: the event loop, which calls
-        `turn`, may be late.
+        A thread sends the next work as soon as the previous one has ended, without waiting for the
+        event loop, which calls `turn`. If cancelled, the running work is stopped.
         """
         loop = asyncio.get_running_loop()
         await self._exchanged(lambda number: self._ask_all(number, first, take, turn, loop))
 
     def stop(self) -> None:
-        """Has the process end what it is at, and kills it if that takes longer than the grace.
-        Returns at once.
-        """
+        """Stops the running task, and kills the process after the grace. Returns at once."""
         exchange = self._exchange
         if exchange is None or exchange.done() or self._is_stopped(self._number):
             return
@@ -177,7 +181,7 @@ class Worker:
         except Preempted:
             raise
         except BaseException:
-            # it has ended, or it may still be at a task, whose answer nobody will read
+            # The process has ended, or it may still compute an unwanted answer.
             self._lost = True
             self._process.kill()
             raise
@@ -197,7 +201,7 @@ class Worker:
         return self._receive(number, heard)
 
     def _receive(self, number: int, heard: Heard) -> Ended:
-        """How the task ended that the process is at. Raises Preempted if it was stopped."""
+        """Outcome of the running task. Raises Preempted if it was stopped."""
         while isinstance(received := self._pipe.recv(), Event):
             if heard is not None and not self._is_stopped(number):
                 heard(received)
@@ -230,7 +234,7 @@ class Worker:
                 self._send(number, work)
 
     def _send(self, number: int, work: Work) -> None:
-        self._pipe.send((number, work.task, work.deadline, work.tell is not nobody))
+        self._pipe.send((number, work.task, work.deadline, work.tell is not no_listener))
 
     def _has_ended(self) -> None:
         asyncio.get_running_loop().remove_reader(self._process.sentinel)
@@ -244,7 +248,7 @@ class Worker:
 
 
 def _heard(tell: Tell, loop: asyncio.AbstractEventLoop) -> Heard:
-    return None if tell is nobody else lambda event: loop.call_soon_threadsafe(tell, event)
+    return None if tell is no_listener else lambda event: loop.call_soon_threadsafe(tell, event)
 
 
 def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_level: str) -> None:
@@ -252,7 +256,7 @@ def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_l
     checkpoint.
     """
     # Ctrl-C in a terminal and SIGTERM from a service manager reach the whole process group. Only
-    # the parent acts on them: it lets requests in flight finish, and then kills its workers
+    # the parent reacts: it lets running requests finish and then kills its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     configure_logging(log_level)
@@ -269,7 +273,7 @@ def _serve(pipe: Connection, stopped_up_to: Any, warm: Callable[[], None], log_l
         except EOFError:
             return
         with (
-            listening(pipe.send if is_heard else nobody),
+            listening(pipe.send if is_heard else no_listener),
             stoppable(partial(_is_stopped, stopped_up_to, number)),
         ):
             ended = outcome(task, deadline)

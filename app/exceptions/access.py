@@ -1,4 +1,4 @@
-"""Errors of who may do what."""
+"""Errors of access."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from typing import Literal
 from joulepath.app.exceptions.base import ServiceError
 
 Role = Literal["read", "compute", "admin"]
-"""What a client may do. Each role includes those before it."""
+"""Roles of clients; a role includes all previous ones."""
 
 
 class Unauthenticated(ServiceError):
-    """The service needs an API key, and the request has none, or one that is not valid."""
+    """The service needs an API key, and the request has none or an invalid one."""
 
     status = 401
     title = "API key needed"
     remedy = (
         "Send the key in the header `Authorization: Bearer KEY`. The operator of the service makes "
-        "keys with "
-        "`joulepath keys add`. A key that was removed is no longer valid."
+        "keys with `joulepath keys add`. A key that was removed is no longer valid."
     )
     detail = "This service needs an API key: send it in the header Authorization, as `Bearer KEY`."
 
@@ -35,7 +34,7 @@ class WrongKey(Unauthenticated):
 @dataclass(eq=False)
 class RoleTooLow(ServiceError):
     """The API key may not do this. A key of the role `read` may look at everything, `compute` may
-    also compute and create, and change what it created, and `admin` may change everything."""
+    also compute, create, and change its own objects, and `admin` may change everything."""
 
     status = 403
     title = "Role too low"
@@ -44,52 +43,50 @@ class RoleTooLow(ServiceError):
     role: Role
     """Role of the API key."""
     needed: Role
-    """Role that the request needs."""
+    """Role required by the request."""
 
     def __str__(self) -> str:
         return (
-            f"Your API key has the role {self.role}, and this needs {self.needed}: use a key "
-            "of that role."
+            f"Your API key has the role {self.role}, and this needs {self.needed}: use a key of "
+            "that role."
         )
 
 
 @dataclass(eq=False)
 class NotOwner(ServiceError):
-    """Another client created this study, robot or answer. Only the client that created it, or an
-    API key of the role `admin`, may change or delete it. What was created while the service had no
-    API keys has no owner."""
+    """Another client created this study, robot or answer. Only its creator, or an API key of the
+    role `admin`, may change or delete it. Objects created without API keys have no owner."""
 
     status = 403
     title = "Not the owner"
     remedy = "Use the key of its owner, or one of the role `admin`."
 
     owner: str | None
-    """Name of the API key that created it; null without one."""
+    """Name of the creator's API key; null without one."""
 
     def __str__(self) -> str:
         whose = "nobody with a key" if self.owner is None else f"another client, {self.owner},"
         return (
-            f"This was created by {whose} and only its owner or an admin may change it: use "
-            "such a key."
+            f"This was created by {whose} and only its owner or an admin may change it: use such a "
+            "key."
         )
 
 
 class CrossSite(ServiceError):
     """A browser sent this request for a web page of another site (headers `Origin` and
-    `Sec-Fetch-Site`). The service refuses this, because any page that a user opens could otherwise
+    `Sec-Fetch-Site`). The service refuses this, because any page opened by a user could otherwise
     post and delete."""
 
     status = 403
     title = "Cross-site request"
     remedy = (
         "Call the service from its own pages or without a browser. The operator can allow the "
-        "origin of another page "
-        "with `JOULEPATH_CORS_ORIGINS`. A reverse proxy must pass on the header `Host`."
+        "origin of another page with `JOULEPATH_CORS_ORIGINS`. A reverse proxy must pass on the "
+        "header `Host`."
     )
     detail = (
         "A web page of another site sent this request: call the service from its own pages or "
-        "without a browser, or "
-        "have the page's origin added to JOULEPATH_CORS_ORIGINS."
+        "without a browser, or have the page's origin added to JOULEPATH_CORS_ORIGINS."
     )
 
 
@@ -106,6 +103,5 @@ class WrongHost(ServiceError):
     )
     detail = (
         "The name in the header Host is none of this service: use its address, or have the name "
-        "added to "
-        "JOULEPATH_ALLOWED_HOSTS."
+        "added to JOULEPATH_ALLOWED_HOSTS."
     )

@@ -19,7 +19,7 @@ class FieldError(TypedDict):
     loc: list[str | int]
     """Path of the field."""
     msg: str
-    """What is wrong with the field."""
+    """The error of the field, and its remedy."""
 
 
 @dataclass(eq=False)
@@ -33,9 +33,9 @@ class InvalidRequest(ServiceError):
     remedy = "Correct the fields in `errors` and send the request again."
 
     errors: list[FieldError]
-    """One entry per error; of more than 20 errors, the first ones."""
+    """One entry per error, at most 20."""
     message: Annotated[str, Internal] = "Correct the fields listed under `errors`."
-    """What is wrong, where one sentence says it."""
+    """One sentence on the error, if there is one."""
 
     def __str__(self) -> str:
         return self.message

@@ -1,4 +1,4 @@
-"""Errors of workers, of the queue in front of them, and of what clients hold."""
+"""Errors of workers, of their queue, and of the shares of clients."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class TooManyBytes(Busy):
     """Bodies and answers in flight have as many bytes as the service may hold."""
 
     detail = (
-        "The service holds as many bytes of requests and answers as it may: try again after "
-        "a few seconds."
+        "The service holds as many bytes of requests and answers as it may: try again after a few "
+        "seconds."
     )
 
 
@@ -35,26 +35,24 @@ class TooManyWaiting(Busy):
     """Too many requests of jobs wait."""
 
     detail = (
-        "Too many requests of jobs wait: send this job again when others have ended, or send "
-        "a smaller one."
+        "Too many requests of jobs wait: send this job again when others have ended, or send a "
+        "smaller one."
     )
 
 
 class TooManyRequests(Busy):
-    """You have your share of the service: of requests in flight and waiting, of connections, or of
-    bytes of bodies and answers in flight; `detail` says of which. Others are served meanwhile."""
+    """You have used your share of the service: requests in flight and waiting, connections, or
+    bytes of bodies and answers in flight, as `detail` says. Other clients are served meanwhile."""
 
     status = 429
     title = "Too many requests"
     remedy = (
         "Wait for your answers, read them, and send fewer requests at a time. Try again after the "
-        "time [s] in the "
-        "header `Retry-After`."
+        "time [s] in the header `Retry-After`."
     )
     detail = (
         "You have as many requests in flight as one client may: wait for their answers before you "
-        "send more, or send "
-        "them one after another."
+        "send more, or send them one after another."
     )
 
 
@@ -63,8 +61,8 @@ class TooManyConnectionsOfClient(TooManyRequests):
 
     detail = (
         "You have as many connections, or as many requests ahead on one of them, as one client "
-        "may: close those that "
-        "you do not need, and use one for several requests, one after another."
+        "may: close those that you do not need, and use one for several requests, one after "
+        "another."
     )
 
 
@@ -73,15 +71,14 @@ class TooManyBytesOfClient(TooManyRequests):
 
     detail = (
         "The bodies and answers of your requests in flight have as many bytes as one client may: "
-        "wait for their "
-        "answers, read them, and send fewer at a time."
+        "wait for their answers, read them, and send fewer at a time."
     )
 
 
 class ClusterUnavailable(ServiceError):
-    """The scheduler of the cluster that works on jobs cannot be reached, or does not have the same
-    version of joulepath as the service, whose log says which. Jobs are accepted, and wait until it
-    can be used. Requests that are answered at once are computed by the service itself."""
+    """The scheduler of the cluster for jobs cannot be reached, or has another version of joulepath
+    than the service; the log of the service says more. Jobs are accepted and wait for the cluster.
+    The service itself computes the answers to other requests."""
 
     status = 503
     retry_after = 5
@@ -89,16 +86,14 @@ class ClusterUnavailable(ServiceError):
     remedy = "Try again after the time [s] in the header `Retry-After`."
     detail = (
         "The scheduler of the cluster does not answer, or does not have the same version of "
-        "joulepath as this service, "
-        "whose log says which: jobs wait until it does. Requests that are answered at once are "
-        "computed by this "
-        "service meanwhile."
+        "joulepath as this service, whose log says which: jobs wait until it does. Requests that "
+        "are answered at once are computed by this service meanwhile."
     )
 
 
 class NotReady(ServiceError):
     """The workers are still starting, or all of them have ended and are being replaced: requests
-    wait, and none is at work."""
+    wait, and none is running."""
 
     status = 503
     retry_after = 2
@@ -114,53 +109,49 @@ class ShuttingDown(ServiceError):
     retry_after = 5
     title = "Shutting down"
     remedy = (
-        "Send it again after the time [s] in the header `Retry-After`: another instance, or "
-        "the restarted one, answers."
+        "Send it again after the time [s] in the header `Retry-After`: another instance, or the "
+        "restarted one, answers."
     )
     detail = "The service is stopping: send the request again."
 
 
 class WorkerLost(ServiceError):
-    """Two processes that worked on this request died, one after the other, most often because the
-    machine ran out of memory. The service does not try it a third time by itself."""
+    """Two worker processes died during this request, one after the other, most often because the
+    machine ran out of memory. The service does not try a third time."""
 
     status = 503
     retry_after = 5
     title = "Worker lost"
     remedy = (
         "Try again after the time [s] in the header `Retry-After`; if that does not help, make the "
-        "request smaller, or "
-        "report it with the value of `instance`."
+        "request smaller, or report it with the value of `instance`."
     )
     detail = (
         "Two processes that worked on this request died, for example because the machine ran out "
-        "of memory: try again "
-        "after some seconds, make the request smaller if that does not help, or report it with the "
-        "id in `instance`."
+        "of memory: try again after some seconds, make the request smaller if that does not help, "
+        "or report it with the id in `instance`."
     )
 
 
 class WorkerDied(ServiceError):
-    """Each of the three processes that worked on this request of a job died, for example because it
-    ran out of memory. The service does not try it again by itself."""
+    """Three worker processes died during this request of a job, for example because of a lack of
+    memory. The service does not try again."""
 
     status = 500
     title = "Worker died"
     remedy = (
         "Make the request smaller, and send it again; if that does not help, please report it with "
-        "the value of "
-        "`instance`."
+        "the value of `instance`."
     )
     detail = (
         "Each process that worked on this request died: make the request smaller, or report it "
-        "with the id in "
-        "`instance`."
+        "with the id in `instance`."
     )
 
 
 class ClientDisconnected(Exception):
-    """The client closed the connection: nobody is left to answer."""
+    """The client closed the connection."""
 
 
 class Preempted(Exception):
-    """Work that can wait had to give its worker to a caller that waits: it is to be run again."""
+    """Deferrable work had to give its worker to a waiting caller, and must run again."""

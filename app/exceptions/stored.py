@@ -1,4 +1,4 @@
-"""Errors of the database and of what is stored in it."""
+"""Errors of the database and of its objects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from joulepath.app.exceptions.base import ServiceError
 from joulepath.optimizer.declared import Internal, Unit
 
 StoreFault = Literal["full", "read-only", "locked", "deleted", "unreachable"]
-"""What is wrong with the database."""
+"""Faults of the database."""
 _FAULTS: dict[StoreFault, str] = {
     "full": "The disk of the database is full: delete studies that are not needed, or enlarge the "
     "disk. Deleting "
@@ -30,9 +30,8 @@ _FAULTS: dict[StoreFault, str] = {
 @dataclass(eq=False)
 class StoreUnavailable(ServiceError):
     """The database of studies and answers cannot be reached, read or written; `cause` says why, and
-    the service's log has more. Nothing of the request was stored. Requests that need no database,
-    for example `POST /optimize`, still work. On a full disk, `DELETE` works, so that space can be
-    freed."""
+    the service's log has more. Nothing of the request was stored. Requests without a database, for
+    example `POST /optimize`, still work. On a full disk, `DELETE` works to free space."""
 
     status = 503
     retry_after = 5
@@ -60,11 +59,11 @@ class UnknownAnswer(ServiceError):
 
 @dataclass(eq=False)
 class PartsNeeded(UnknownAnswer):
-    """An export refers to kept answers that are not at hand."""
+    """An export refers to missing kept answers."""
 
     detail = (
-        "The answer refers to kept answers that are not at hand: export it where the service "
-        "keeps them."
+        "The answer refers to kept answers that are not at hand: export it where the service keeps "
+        "them."
     )
 
     names: Annotated[list[str], Internal]
@@ -72,7 +71,7 @@ class PartsNeeded(UnknownAnswer):
 
 
 class AnswerInUse(ServiceError):
-    """The answer belongs to a study or a job, which refers to it."""
+    """A study or a job refers to the answer."""
 
     status = 409
     title = "Answer in use"
@@ -91,7 +90,7 @@ class UnknownStudy(ServiceError):
 
 
 class UnknownIteration(UnknownStudy):
-    """The study has no iteration of that number."""
+    """The study has no iteration with this number."""
 
     detail = "The study has no iteration of this number: GET /studies/{id} lists its iterations."
 
@@ -117,14 +116,14 @@ class UnknownJob(ServiceError):
 
 
 class JobNotCancellable(ServiceError):
-    """The job has ended, so that there is nothing left to cancel."""
+    """The job has ended: there is nothing left to cancel."""
 
     status = 409
     title = "Job not cancellable"
     remedy = "Its answers stay until it is deleted with `DELETE /jobs/{id}`."
     detail = (
-        "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it "
-        "with its answers."
+        "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it with its "
+        "answers."
     )
 
 
@@ -135,22 +134,20 @@ class RobotExists(ServiceError):
     title = "Robot exists"
     remedy = (
         "Use another name, or `PUT /robots/{name}` to replace a robot that was added. The robots "
-        "that come with the "
-        "service can be neither replaced nor deleted."
+        "that come with the service can be neither replaced nor deleted."
     )
     detail = (
-        "A robot has this name: use another name, or replace the robot (`PUT`, on the "
-        "command line `--replace`)."
+        "A robot has this name: use another name, or replace the robot (`PUT`, on the command line "
+        "`--replace`)."
     )
 
 
 class BundledRobot(RobotExists):
-    """The robot comes with the service: nobody adds, replaces or deletes it."""
+    """The robot comes with the service and cannot be changed."""
 
     detail = (
         "This robot comes with the service and can be neither replaced nor deleted: only robots "
-        "that were added can. "
-        "Give a robot of your own another name."
+        "that were added can. Give a robot of your own another name."
     )
 
 
@@ -170,8 +167,7 @@ class NoMeshes(ServiceError):
     title = "No meshes"
     remedy = (
         "Those of ur3e and ur5e come with `pip install 'joulepath[meshes]'`. The capsules of `GET "
-        "/robots/{name}` show "
-        "every robot."
+        "/robots/{name}` show every robot."
     )
     detail = "No meshes of this robot are installed: the extra `meshes` has those of ur3e and ur5e."
 
@@ -186,7 +182,7 @@ class UnknownLog(ServiceError):
     detail = "No log has this id: GET /logs lists all logs."
 
     id: Annotated[str, Internal] = ""
-    """The id that the request names."""
+    """The id in the request."""
 
 
 @dataclass(eq=False)
@@ -196,8 +192,8 @@ class TooManyLogs(ServiceError):
     status = 409
     title = "Too many logs"
     remedy = (
-        "Delete logs that are not needed with `DELETE /logs/{id}`; what was identified from "
-        "them stays."
+        "Delete logs that are not needed with `DELETE /logs/{id}`; what was identified from them "
+        "stays."
     )
 
     limit: Annotated[int, Unit("byte")]
@@ -205,14 +201,14 @@ class TooManyLogs(ServiceError):
 
     def __str__(self) -> str:
         return (
-            f"The stored logs would exceed {self.limit} bytes, compressed: delete some that "
-            "are not needed."
+            f"The stored logs would exceed {self.limit} bytes, compressed: delete some that are "
+            "not needed."
         )
 
 
 class UnknownIdentification(ServiceError):
     """No identification has this id. It never existed, or it was deleted: an identification is a
-    job, which is kept as long as `JOULEPATH_ANSWERS_MAX_AGE` says."""
+    job, kept for the time `JOULEPATH_ANSWERS_MAX_AGE`."""
 
     status = 404
     title = "Unknown identification"
@@ -234,7 +230,7 @@ class UnknownFigures(ServiceError):
     detail = "No figures have this id: GET /figures lists all figures."
 
     id: Annotated[str, Internal] = ""
-    """The id that the request names."""
+    """The id in the request."""
 
 
 class FiguresInUse(ServiceError):
@@ -262,6 +258,6 @@ class KeyReused(ServiceError):
     title = "Idempotency-Key reused"
     remedy = "Use a new key for each new request."
     detail = (
-        "This Idempotency-Key was already used for a different request: use a new key for "
-        "each new request."
+        "This Idempotency-Key was already used for a different request: use a new key for each new "
+        "request."
     )

@@ -45,8 +45,8 @@ class HeadTooLarge(ServiceError):
     status = 431
     title = "Request head too large"
     remedy = (
-        "Requests to this service need few headers: leave out cookies and headers that it "
-        "does not use."
+        "Requests to this service need few headers: leave out cookies and headers that it does not "
+        "use."
     )
 
     limit: Annotated[int, Unit("byte"), Internal]
@@ -69,41 +69,35 @@ class RequestTimeout(ServiceError):
     remedy = "Send it again, over a faster connection or with a smaller body."
 
     limit: Annotated[Seconds, Internal]
-    """Time in which the request had to arrive."""
+    """Longest time until the arrival of the request."""
 
     def __str__(self) -> str:
         return (
             f"The request did not arrive whole within {self.limit:g} s: send it again, over a "
-            "faster connection or "
-            "with a smaller body."
+            "faster connection or with a smaller body."
         )
 
 
 class UnsupportedMediaType(ServiceError):
-    """The header `Content-Type` declares a body that this path does not take."""
+    """The header `Content-Type` declares a body not accepted by this path."""
 
     status = 415
     title = "Unsupported media type"
     remedy = (
         "JSON is `application/json`; the CSV of `POST /evaluate` and `POST /logs` is `text/csv`. "
-        "`text/plain`, a form, "
-        "and no header at all are read as JSON, too, where a path takes JSON. The body is the "
-        "document itself: "
-        "`curl --data-binary @file`, not `curl -F file=@file`."
+        "`text/plain`, a form, and no header at all are read as JSON, too, where a path takes "
+        "JSON. The body is the document itself: `curl --data-binary @file`, not `curl -F "
+        "file=@file`."
     )
     detail = (
         "The header Content-Type declares something else than this path takes: send JSON as "
-        "application/json, and to "
-        "POST /evaluate also CSV as text/csv, to POST /logs CSV only. The body is the document "
-        "itself, not a form with "
-        "a file."
+        "application/json, and to POST /evaluate also CSV as text/csv, to POST /logs CSV only. The "
+        "body is the document itself, not a form with a file."
     )
 
 
 class UnsupportedCoding(ServiceError):
-    """The header `Content-Encoding` names a coding that the service cannot unpack, or several at
-    once.
-    """
+    """The header `Content-Encoding` names an unsupported coding, or several at once."""
 
     status = 415
     title = "Unsupported content coding"
@@ -111,29 +105,28 @@ class UnsupportedCoding(ServiceError):
         "Pack the body with `gzip`, `deflate` or `zstd`, or send it as it is, without this header."
     )
     detail = (
-        "The header Content-Encoding names something else than gzip, deflate or zstd: use "
-        "one of them, or none."
+        "The header Content-Encoding names something else than gzip, deflate or zstd: use one of "
+        "them, or none."
     )
 
 
 class MalformedHttp(ServiceError):
-    """What arrived at the port is no HTTP/1.1 request, or contradicts itself: a TLS handshake, a
-    request line or header with other characters, two lengths of the body, or a chunk without a
-    length. The service closes the connection."""
+    """The received bytes are no valid HTTP/1.1 request: a TLS handshake, a request line or header
+    with invalid characters, two lengths of the body, or a chunk without a length. The service
+    closes the connection."""
 
     status = 400
     title = "Malformed HTTP"
     remedy = "Speak HTTP to this port, or HTTPS to the proxy before it."
     detail = (
         "What arrived is no HTTP/1.1 request: check the address and that the client speaks HTTP, "
-        "not HTTPS, to this "
-        "port, and the request line, the headers and the chunks of the body."
+        "not HTTPS, to this port, and the request line, the headers and the chunks of the body."
     )
 
 
 class NotAcceptable(ServiceError):
-    """The header `Accept-Encoding` allows no coding in which the service could answer: it has
-    `zstd`, `gzip` and `identity`, which is no coding. Nothing was computed."""
+    """The header `Accept-Encoding` allows none of the codings of the service: `zstd`, `gzip` and
+    `identity` (no compression). Nothing was computed."""
 
     status = 406
     title = "No acceptable coding"

@@ -6,9 +6,7 @@ from typing import Any
 
 
 def add_examples(schemas: dict[str, Any], node: dict[str, Any], example: Any) -> None:
-    """Gives every field of a node's schemas that has no example its value in an example of the
-    whole node.
-    """
+    """Gives fields without an example their value in an example of the whole node."""
     if isinstance(example, list):
         example = next(iter(example), None)
     if example is None:
@@ -24,8 +22,6 @@ def add_examples(schemas: dict[str, Any], node: dict[str, Any], example: Any) ->
 
 
 def references(node: dict[str, Any]) -> list[str]:
-    """Names of the schemas that a node refers to: itself, as the entries of a list, or as an
-    alternative.
-    """
+    """Names of the schemas of a node: its own, of list entries, and of alternatives."""
     parts = [node, node.get("items", {}), *node.get("anyOf", ())]
     return [part["$ref"].rpartition("/")[2] for part in parts if "$ref" in part]

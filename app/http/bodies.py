@@ -23,34 +23,32 @@ from joulepath.app.http.bytes_in_flight import Held
 from joulepath.app.settings import Settings
 
 _DAMAGED = (
-    "The body is not complete or not what its `Content-Encoding` says: send it again, or "
-    "leave the header out"
+    "The body is not complete or not what its `Content-Encoding` says: send it again, or leave the "
+    "header out"
 )
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """The bodies that are being read, and their limits.
+    """Bodies in transfer, and their limits.
 
-    `slice`, `piece`: bytes that are unpacked at a time, and that are passed on at a time. A zstd
-    block of 4 bytes unpacks to 128 KiB, so that one slice may become some 4 MiB.
+    `slice` bytes are unpacked at a time, and `piece` bytes passed on. A zstd block of 4 bytes
+    unpacks to 128 KiB, so that one slice may become some 4 MiB.
     """
 
     settings: Settings
     small: int = 1 << 16
-    """Largest body without turns: of larger ones, one part in all is read in one turn of the event
-    loop [byte].
-    """
+    """Largest body read at once [byte]; larger bodies share one part per turn of the event loop."""
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
     slice: int = 128
     piece: int = 1 << 16
     window: int = 1 << 23
-    """Memory that a zstd frame may ask for [byte]: RFC 8878 asks decoders to support so much."""
+    """Largest window of a zstd frame [byte], as RFC 8878 requires of decoders."""
     reading: set[asyncio.Timeout] = field(default_factory=set)
-    """Times that run out when the next part of a body has not arrived."""
+    """Time-outs of bodies waiting for their next part."""
 
     def drain(self) -> None:
-        """Refuses bodies that are still being sent."""
+        """Refuses incomplete bodies."""
         for limit in [
             each for each in self.reading if not each.expired()
         ]:  # one that has just run out ends by itself
@@ -70,8 +68,9 @@ class Bodies:
         )
 
     def stream(self, coding: str) -> Any:
-        """What unpacks one member of a body, with the interface of `zlib.decompressobj`. Raises
-        UnsupportedCoding.
+        """A decompressor of one member of a body, like `zlib.decompressobj`.
+
+        Raises UnsupportedCoding.
         """
         if coding in ("gzip", "x-gzip", "deflate"):
             return zlib.decompressobj(zlib.MAX_WBITS | 32)
@@ -102,7 +101,7 @@ class Body:
         self._is_whole = False
 
     async def receive(self) -> Message:
-        """The next message: a part of the body, its end, or what comes after it."""
+        """The next message: a part of the body, its end, or a later message."""
         part = None if self._is_whole else await anext(self._parts, None)
         if part is not None:
             return {"type": "http.request", "body": part, "more_body": True}

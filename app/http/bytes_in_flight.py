@@ -1,4 +1,4 @@
-"""Bytes that the bodies and answers of the requests in flight hold, in all and by client."""
+"""Bytes of bodies and answers in flight, in total and by client."""
 
 from __future__ import annotations
 
@@ -10,28 +10,24 @@ from joulepath.app.exceptions.queue import TooManyBytes, TooManyBytesOfClient
 
 @dataclass(frozen=True)
 class BytesInFlight:
-    """What all requests hold."""
+    """Bytes held by all requests."""
 
     most: int
     most_of_client: int
     small: int = 1 << 16
-    """Largest body or answer that does not count: small requests find room whatever others hold
-    [byte].
-    """
+    """Largest body or answer without a limit [byte]: small requests always find room."""
     held: Counter[str] = field(default_factory=Counter)
     """Bytes by client."""
 
 
 class Held:
-    """What one request of a client holds, until the end of the context."""
+    """Bytes held by one request of a client until the end of the context."""
 
     def __init__(self, in_flight: BytesInFlight, client: str) -> None:
         self._in_flight, self._client, self._size = in_flight, client, 0
 
     def hold(self, size: int) -> None:
-        """Holds `size` bytes from now on, if that is more. Raises TooManyBytes or
-        TooManyBytesOfClient.
-        """
+        """Holds at least `size` bytes. Raises TooManyBytes or TooManyBytesOfClient."""
         limits, further = self._in_flight, size - self._size
         if size <= max(self._size, limits.small):
             return

@@ -1,4 +1,4 @@
-"""The client of a request, in the one place that reads proxies' headers."""
+"""The client of a request; only this module reads the headers of proxies."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from joulepath.app.access.client import Address, Client, address_of
 ProxyHeader = Literal["X-Forwarded-For", "Forwarded"]
 
 _NOBODY = "unknown"
-"""Address of a client whose transport has none."""
+"""Address of a client without one in its transport."""
 
 
 def client_of(request: HTTPConnection) -> Client:
-    """Who sent the request: `RequestContext` has put it into the request's state."""
+    """The sender of the request, from the request's state set by `RequestContext`."""
     client: Client = request.state.client
     return client
 
@@ -29,8 +29,8 @@ def sender(
 ) -> Client:
     """The client of a request by its address, without its key.
 
-    Each proxy appends the address that it was called from. From the right, the first address that
-    is no trusted proxy is the client's: everything to the left of it is the client's own word.
+    A proxy appends the address of its caller. The rightmost address without trust is the client's
+    address; everything to its left is an unverified claim of the client.
     """
     peer = scope["client"][0] if scope.get("client") else _NOBODY
     address = _address(peer)
@@ -47,7 +47,7 @@ def sender(
 
 
 def _reported(lines: Sequence[str], header: ProxyHeader) -> Iterator[str]:
-    """The addresses that proxies report, the nearest first."""
+    """The addresses reported by proxies, nearest first."""
     for element in reversed(",".join(lines).split(",")):
         if header == "X-Forwarded-For":
             yield element

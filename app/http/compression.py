@@ -24,19 +24,19 @@ Coding = Literal["zstd", "gzip", "identity"]
 
 @dataclass(frozen=True)
 class Compression:
-    """What is compressed, and how."""
+    """Settings of compression."""
 
     offered: tuple[Coding, ...] = ("zstd", "gzip")
-    """In the order in which equal weights are decided."""
+    """Codings by preference for equal weights."""
     zstd_level: int = 3
     gzip_level: int = 5
     file_zstd_level: int = 12
-    """For files, which have an entity tag: they are compressed once and sent often."""
+    """Level for files with an entity tag, which are compressed once and sent often."""
     file_gzip_level: int = 9
     least: int = 1024
     """Smaller bodies fit into one packet anyway [byte]."""
     instant: int = 1 << 15
-    """Smaller bodies are compressed in less time than it takes to pass them to a thread [byte]."""
+    """Largest body compressed in the event loop [byte], faster than a thread could start."""
     kinds: tuple[str, ...] = (
         "text/",
         "application/json",
@@ -44,13 +44,13 @@ class Compression:
         "application/javascript",
         "model/",
     )
-    """Beginnings of the media types that are compressed."""
+    """Prefixes of compressed media types."""
 
     def preferred(self, header: str) -> Coding:
-        """The coding of greatest weight, `identity` for none. A malformed member of the header is
-        passed over.
+        """The coding of greatest weight; `identity` stands for none.
 
-        Raises NotAcceptable if the header allows no coding that is offered.
+        Malformed members of the header are ignored. Raises NotAcceptable without an acceptable
+        coding.
         """
         given = {
             {"x-gzip": "gzip"}.get(name, name): weight for name, weight in weights(header).items()
@@ -67,9 +67,8 @@ class Compression:
         return "identity"
 
     async def encoded(self, start: Message, first: Message, coding: Coding) -> Message:
-        """The first message of a body, compressed if it is the whole body, and in `start` the
-        headers that fit it.
-        """
+        """The first message of a body, compressed if it is complete; adapts the headers in
+        `start`."""
         headers = MutableHeaders(scope=start)
         if (
             not headers.get("content-type", "").startswith(self.kinds)

@@ -1,9 +1,8 @@
-"""Connections below HTTP: how many there may be, and how long each may take to send a head and to
-read an answer.
+"""Connections below HTTP: their number, and time limits of heads and of reading answers.
 
-uvicorn's protocol on h11 bounds the size of a head and takes one request of a connection at a time,
-but it waits for ever for a head, and for a client that does not read its answer. `Connection`
-stands between it and the socket.
+uvicorn's protocol on h11 bounds the size of a head and handles one request of a connection at a
+time, but it waits without limit for a head and for a client which does not read its answer.
+`Connection` stands between the protocol and the socket.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from joulepath.app.settings import Settings
 logger = logging.getLogger("app.connection")
 
 _RESET = struct.pack("ii", 1, 0)
-"""The socket option that throws away what the client has not read."""
+"""Socket option to discard unread data at the close."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +42,13 @@ class Connections:
 
     settings: Settings
     linger: float = 1.0
-    """Time for which the connection of a refused client stays open, so that it can read the reason
-    [s].
+    """Time a refused client has to read the reason [s].
 
-    What it still sends is thrown away. If the connection were closed at once, these bytes would
-    reset it.
+    Further bytes of the client are discarded; after an immediate close they would reset the
+    connection.
     """
     most_discarded: int = 1 << 23
-    """Bytes received from a refused client after which its connection is reset at once."""
+    """Bytes received from a refused client after which its connection is reset."""
     open: set[Connection] = field(default_factory=set)
 
     def refusal(self, connection: Connection) -> ServiceError | None:
@@ -81,9 +79,8 @@ class Connection(asyncio.Protocol):
 
     Args:
         connections: all connections of the service.
-        app_state: state of the application, as uvicorn gives it to its protocols. The state of
-            every request is a copy
-            of it, with the connection added.
+        app_state: state of the application given by uvicorn; the state of a request is a copy of it
+            with the connection.
         given: further arguments for uvicorn's protocol.
     """
 
@@ -148,8 +145,7 @@ class Connection(asyncio.Protocol):
     def __exit__(self, *_: object) -> None:
         self._in_hand -= 1
         if not self._in_hand:
-            # uvicorn closes an idle connection earlier, but keeps one on which part of a head has
-            # arrived.
+            # uvicorn closes idle connections earlier, but not after a part of a head.
             self._end_after(max(self._settings.head_timeout, self._settings.write_timeout))
 
     def refuse(self, error: ServiceError) -> None:
@@ -165,15 +161,13 @@ class Connection(asyncio.Protocol):
         self._end_after(self._connections.linger)
 
     def close(self) -> None:
-        """Closes the connection as soon as the client has read everything, within its time for
-        that.
-        """
+        """Closes the connection after the client has read everything, or after its time."""
         if not (self.is_refused or self.transport.is_closing()):
             self.transport.close()
             self._end_after(self._settings.write_timeout)
 
     def reset(self) -> None:
-        """Ends the connection at once. The kernel, too, throws away what was not read."""
+        """Ends the connection at once; the kernel discards unread data."""
         with contextlib.suppress(OSError):  # it has just ended by itself
             self.transport.get_extra_info("socket").setsockopt(
                 socket.SOL_SOCKET, socket.SO_LINGER, _RESET
@@ -211,7 +205,7 @@ class _Wire:
 
 
 def _response(error: ServiceError) -> bytes:
-    """A whole response with a problem, after which the connection is closed."""
+    """A complete response with a problem, followed by the close of the connection."""
     request_id, status = str(uuid.uuid4()), HTTPStatus(error.status)
     body = json_document(problem_of(error, request_id))
     lines = [

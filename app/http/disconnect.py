@@ -1,4 +1,4 @@
-"""Cancels the work for a client that closed its connection."""
+"""Cancellation of the work for a client after it has closed its connection."""
 
 from __future__ import annotations
 

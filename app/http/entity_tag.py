@@ -6,8 +6,7 @@ from fastapi import Request
 
 
 def is_known(tag: str, request: Request) -> bool:
-    """Whether `If-None-Match` names a tag. Weak tags count: an answer that was compressed has
-    one."""
+    """Whether `If-None-Match` names a tag, weak tags of compressed answers included."""
     return tag in {
         each.strip().removeprefix("W/")
         for each in request.headers.get("if-none-match", "").split(",")

@@ -1,6 +1,4 @@
-"""Answers one request by server-sent events: what its work tells while it runs, and at the end what
-it answers.
-"""
+"""Answers by server-sent events: events of the work, and finally its answer."""
 
 from __future__ import annotations
 
@@ -9,6 +7,7 @@ import contextlib
 import logging
 from collections import deque
 from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
 from typing import Any
 
 from fastapi import Request
@@ -20,7 +19,7 @@ from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import problem_response
 from joulepath.optimizer.exceptions import DeclaredError
-from joulepath.optimizer.progress import Event, Tell, forward
+from joulepath.optimizer.progress import Event, Tell, only_news
 
 logger = logging.getLogger(__name__)
 
@@ -31,20 +30,29 @@ EVENT_SCHEMA = {
 }
 """One event, in the OpenAPI document."""
 Work = Callable[[Tell], Coroutine[Any, Any, TaskResult]]
-_PAUSE = 15.0
-"""Time [s] without an event after which a comment tells proxies that the stream lives."""
-_MOST_WAITING = 1000
-"""Events that wait for a client who does not read them; then the oldest are left out."""
+
+
+@dataclass(frozen=True)
+class StreamSettings:
+    """Settings of event streams."""
+
+    pause: float = 15.0
+    """Time [s] without an event after which a comment keeps the stream alive in proxies."""
+    most_waiting: int = 1000
+    """Most unread events of a client; the oldest ones are dropped beyond it."""
+
+
+STREAM = StreamSettings()
+
 EVENT_STREAM_HEADERS = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 _COMMENT = b": working\n\n"
 
 
 class EventStream(StreamingResponse):
-    """The events of `work`, which gets whom to tell, then `answer` with its result or `problem`
-    with its error.
+    """The events of `work`, then `answer` with its result or `problem` with its error.
 
-    The stream begins with the first event. Work that fails before raises here, so that its problem
-    is answered as to any request. If the client closes the connection, the work is cancelled.
+    The stream begins with the first event. An earlier error is raised here and answered as an
+    ordinary problem. If the client closes the connection, the work is cancelled.
     """
 
     def __init__(self, request: Request, work: Work) -> None:
@@ -53,21 +61,21 @@ class EventStream(StreamingResponse):
         self._begun = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Sends the events. Raises ClientDisconnected, and what the work raises before the first
+        """Sends the events. Raises ClientDisconnected, and errors of the work before the first
         event.
         """
         await unless_disconnected(self._request, self._answer(send))
 
     async def _answer(self, send: Send) -> None:
-        waiting: deque[Event] = deque(maxlen=_MOST_WAITING)
+        waiting: deque[Event] = deque(maxlen=STREAM.most_waiting)
         bell = asyncio.Event()
 
         def told(event: Event) -> None:
             waiting.append(event)
             bell.set()
 
-        # a request that gave its worker back begins again: its client need not know
-        working = asyncio.create_task(self._work(forward(told)))
+        # A preempted request starts again: its client need not know.
+        working = asyncio.create_task(self._work(only_news(told)))
         working.add_done_callback(lambda _: bell.set())
         try:
             while not working.done() or waiting:
@@ -84,7 +92,7 @@ class EventStream(StreamingResponse):
         """Waits until the bell rings, and silences it."""
         while not bell.is_set():
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(_PAUSE):
+                async with asyncio.timeout(STREAM.pause):
                     await bell.wait()
             if not bell.is_set() and self._begun:
                 await send(_body(_COMMENT))

@@ -20,15 +20,13 @@ PROBLEM_MEDIA_TYPE = "application/problem+json"
 
 
 def install_handlers(app: FastAPI) -> None:
-    """Answers every exception of the routes with a problem. `RequestContext` handles those that no
-    route expects.
-    """
+    """Answers expected exceptions of routes by problems; `RequestContext` handles all others."""
     for kind in (DeclaredError, RequestValidationError, HTTPException):
         app.add_exception_handler(kind, problem_response)
 
 
 async def problem_response(request: Request, error: Exception) -> Response:
-    """The response to a request that failed with `error`: a problem (RFC 9457)."""
+    """The response to a failed request: a problem (RFC 9457)."""
     headers: dict[str, str] = {}
     if isinstance(error, RequestValidationError):
         error = UnsupportedMediaType() if _is_not_json(request, error) else invalid_request(error)
@@ -63,9 +61,7 @@ def _is_not_json(request: Request, error: RequestValidationError) -> bool:
 
 
 def _allowed(request: Request) -> list[str]:
-    """Every method that the path accepts. Starlette's own list is that of the first route with this
-    path only.
-    """
+    """All methods of the path; Starlette only lists those of the first route with this path."""
     return [
         method
         for method in ("GET", "POST", "PUT", "PATCH", "DELETE")

@@ -1,5 +1,4 @@
-"""Routes whose JSON bodies are read strictly: no name twice, and errors that say line and
-column."""
+"""Routes with strict JSON bodies: no duplicate names, and errors with line and column."""
 
 from __future__ import annotations
 
@@ -14,19 +13,17 @@ from joulepath.app.convert.json_text import parsed_json
 from joulepath.app.http.weights import JSON
 
 UNDECLARED = ("", "application/x-www-form-urlencoded", "text/plain")
-"""Media types of clients that were told nothing: curl's `-d @file` declares a form, some clients
-plain text.
-"""
+"""Default media types of clients: curl's `-d @file` declares a form, some clients plain text."""
 
 
 class JsonRequest(Request):
-    """A request that reads JSON strictly."""
+    """A request with a strict reader of JSON."""
 
     _parts: list[bytes] | None = None
     _whole: bytes | None = None
 
     async def parts(self) -> list[bytes]:
-        """The body as it was received: to put a large one together would hold up others."""
+        """The received parts of the body; joining a large one would delay other requests."""
         if self._parts is None:
             self._parts = [part async for part in self.stream()]
         return self._parts
@@ -43,9 +40,9 @@ class JsonRequest(Request):
 
 
 def strictly(request: Request) -> JsonRequest:
-    """The same request, read strictly. Its body must not have been read, unless it is one already.
+    """The same request with a strict reader; its body must be unread.
 
-    A body of one of the types `UNDECLARED` becomes JSON: no JSON route takes forms or plain text.
+    A body of a type in `UNDECLARED` counts as JSON, since JSON routes take neither forms nor text.
     """
     if isinstance(request, JsonRequest):
         return request
@@ -61,14 +58,14 @@ def media_type(headers: Headers) -> str:
 
 
 class JsonRoute(APIRoute):
-    """The class of every route that takes JSON: `APIRouter(route_class=JsonRoute)`."""
+    """The class of routes with JSON bodies: `APIRouter(route_class=JsonRoute)`."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """FastAPI's handler, for a request that reads JSON strictly."""
+        """FastAPI's handler for a strict request."""
         handler = super().get_route_handler()
 
         async def strict(request: Request) -> Response:
-            # one that has read its body may not be replaced
+            # Only a request with an unread body may be replaced.
             return await handler(strictly(request))
 
         return strict

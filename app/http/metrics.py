@@ -17,7 +17,7 @@ from joulepath.app.engine.pool import Engine
 _NO_ROUTE = "none"
 _OTHER = "other"
 _METHODS = frozenset(HTTPMethod)
-# from what the service process itself answers up to the longest deadline [s]
+# from requests without a worker up to the longest deadline [s]
 _BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 600.0)
 
 
@@ -59,7 +59,7 @@ class Metrics:
             self._problems.labels(problem).inc()
 
     def document(self, accept: str, engine: Engine, store_up: bool) -> tuple[bytes, str]:
-        """All measurements, in the format that the header Accept prefers, and its media type."""
+        """All measurements in the format preferred by the header Accept, and its media type."""
         now = _Now(engine, store_up)
         self._registry.register(now)
         try:
@@ -70,13 +70,13 @@ class Metrics:
 
 
 class _Now(Collector):
-    """What is the case while the measurements are read."""
+    """Current values at the time of the request."""
 
     def __init__(self, engine: Engine, store_up: bool) -> None:
         self._engine, self._store_up = engine, store_up
 
     def collect(self) -> Iterator[Metric]:
-        """One sample each."""
+        """One sample per value."""
         queue = self._engine.queue
         gauges = {
             "joulepath_queue_length": ("Requests that wait for a worker.", len(queue.waiting)),

@@ -38,7 +38,7 @@ _REF = "#/components/schemas/{model}"
 
 
 def problem_responses(*problems: type[DeclaredError]) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route for its problems. Those of every request are always among them."""
+    """The `responses` of a route for its own problems and for the problems of all requests."""
     by_status: defaultdict[int | str, list[type[DeclaredError]]] = defaultdict(list)
     every: tuple[type[DeclaredError], ...] = (
         *problems,
@@ -107,7 +107,7 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     schemas = document["components"]["schemas"]
     _, others = models_json_schema(
         [(model_of_problem(kind), "serialization") for kind in types_of_error()]
-        # the routes read these bodies themselves, so that FastAPI does not know their schemas
+        # FastAPI does not know the schemas of bodies read by the routes themselves.
         + [
             (model, "validation")
             for model in (EvaluateRequest, EvaluateCsvSettings, LogSettings, NewJob)
@@ -127,7 +127,7 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     ):
         if "HTTPValidationError" in str(operation["responses"].get("422", "")):
             del operation["responses"]["422"]
-    # put in here, because FastAPI leaves out what is null in the examples of a route
+    # FastAPI drops null values in examples of routes, so they are added here.
     for path, by_media_type in BODY_EXAMPLES.items():
         for media_type, examples in by_media_type.items():
             operation = document["paths"][path].get("post") or document["paths"][path]["put"]
@@ -147,7 +147,7 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
 
 
 def _add_access(document: dict[str, Any], with_keys: bool) -> None:
-    """What gates answer before a route does, and the API keys."""
+    """Adds the answers of outer layers, and the API keys."""
     if with_keys:
         scheme = {
             "type": "http",
@@ -162,7 +162,7 @@ def _add_access(document: dict[str, Any], with_keys: bool) -> None:
             if needed not in (None, "read"):
                 refusals.append(CrossSite)
             if with_keys and needed is not None:
-                # OpenAPI 3.1: for a scheme without scopes, the role that is needed
+                # OpenAPI 3.1: a scheme without scopes lists the required role.
                 operation["security"] = [{_SECURITY: [needed]}]
                 refusals += [Unauthenticated] if needed == "read" else [Unauthenticated, RoleTooLow]
             for problem in refusals:
@@ -180,7 +180,7 @@ def _add_problem(responses: dict[str, Any], problem: type[DeclaredError]) -> Non
 
 
 def _deadlines(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The number schema of every `deadline` that a request may have, in bodies and queries."""
+    """The number schemas of all `deadline` fields in bodies and queries."""
     fields = [
         schema.get("properties", {}).get("deadline")
         for schema in document["components"]["schemas"].values()

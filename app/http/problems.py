@@ -1,6 +1,4 @@
-"""Problem details (RFC 9457): documents and schemas, made from what the classes of the errors
-declare.
-"""
+"""Problem details (RFC 9457): documents and schemas from the declarations of error classes."""
 
 from __future__ import annotations
 
@@ -13,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationError, create_model
 
 from joulepath.app.answers.declared import model_of, shown_fields
 from joulepath.app.convert.fields import location
-from joulepath.app.exceptions import access, base, queue, stored, transport
+from joulepath.app.exceptions import access, base, queue, report, stored, transport
 from joulepath.app.exceptions.base import FieldError, InternalError, InvalidRequest
 from joulepath.app.http.validation_messages import told
 from joulepath.app.schemas.problem_details import ProblemDetails
@@ -29,32 +27,30 @@ from joulepath.optimizer.search import errors as search
 
 PREFIX = "/problems/"
 MOST_ERRORS = 20
-"""Errors that an `invalid-request` problem lists at most: a body can have thousands, and the first
-ones suffice.
-"""
+"""Most errors listed by an `invalid-request` problem; a body can have thousands."""
 
 _MODULES = (
     *(base, library, search, sequence, given_motions, exports, logs, identification, excitation),
-    *(stored, queue, access, transport),
+    *(stored, queue, access, transport, report),
 )
-"""Where errors are declared, in the order of the reference."""
+"""Modules with declared errors, in the order of the reference."""
 
 
 @cache
 def types_of_error() -> tuple[type[DeclaredError], ...]:
-    """Every type of error that the service answers with."""
+    """All types of errors in answers of the service."""
     classes = (
         each for module in _MODULES for each in vars(module).values() if isinstance(each, type)
     )
     declared = (
         each for each in classes if issubclass(each, DeclaredError) and "title" in vars(each)
     )
-    # a module has the classes that it imports, too
+    # Modules also contain imported classes.
     return tuple(dict.fromkeys(declared))
 
 
 def reported(error: Exception) -> DeclaredError:
-    """The error that the client is told of."""
+    """The error reported to the client."""
     if isinstance(error, InvalidProblem):
         return InvalidRequest([FieldError(loc=location(error, "body"), msg=str(error))], str(error))
     # the message of an unforeseen exception is for the log, not for the client
@@ -77,7 +73,7 @@ def path_of(kind: type[DeclaredError]) -> str:
 def invalid_request(error: ValidationError | RequestValidationError, *where: str) -> InvalidRequest:
     """The InvalidRequest for errors of pydantic or FastAPI; their locations start with `where`.
 
-    What each says is in `validation_messages`.
+    `validation_messages` has the messages.
     """
     entries = (entry for each in error.errors()[:MOST_ERRORS] for entry in told(each, where))
     return InvalidRequest(list(islice(entries, MOST_ERRORS)))
@@ -98,14 +94,13 @@ def model_of_problem(kind: type[DeclaredError]) -> type[ProblemDetails]:
 
 
 def own_fields(kind: type[DeclaredError]) -> dict[str, str]:
-    """The fields that the documents of a type have beside those of every type, with their
-    meaning."""
+    """Fields of the documents of a type beyond the common ones, with their meaning."""
     fields = model_of_problem(kind).model_fields
     return {name: fields[name].description or "" for name in _names(kind)}
 
 
 def explanation(kind: type[DeclaredError]) -> str:
-    """When an error of this type occurs, and what to do about it."""
+    """Cause and remedy of an error of this type."""
     return f"{occasion(kind)} {kind.remedy}"
 
 
@@ -114,7 +109,7 @@ def occasion(kind: type[DeclaredError]) -> str:
     return " ".join((kind.__doc__ or "").split())
 
 
-# mypy takes the class of an exception that is a dataclass for unhashable, as its instances may be
+# mypy considers classes of dataclass exceptions unhashable, like their instances.
 def _names(kind: type) -> tuple[str, ...]:
     return shown_fields(kind)
 

@@ -1,6 +1,4 @@
-"""The outermost layer: gives each request an id and its client, logs it, and answers every
-exception.
-"""
+"""The outermost layer: request ids, clients, logs, and answers to all exceptions."""
 
 from __future__ import annotations
 
@@ -31,18 +29,15 @@ METRICS = "/metrics"
 REQUEST_ID_HEADER = "X-Request-ID"
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _CLIENT_CLOSED_REQUEST = 499
-"""Status in the log, never sent, of a request whose client closed the connection: nginx's
-convention.
-"""
+"""Logged status of a request with a closed connection, by nginx's convention; never sent."""
 
 
 class RequestContext:
     """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log.
     Requests are counted.
 
-    The client goes to `request.state.client` and the log; a layer inside adds its key. `HEAD` is
-    answered as `GET`, and the server leaves out the body. Requests that no page of another site may
-    send are refused.
+    The client goes to `request.state.client` and the log; an inner layer adds its key. `HEAD` is
+    answered as `GET`, and the server omits the body. Forbidden cross-site requests are refused.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings, metrics: Metrics) -> None:
@@ -81,8 +76,7 @@ class RequestContext:
                 if not isinstance(error, ServiceError):
                     logger.exception("unforeseen error", extra={"request_id": state["id"]})
                 if exchange.status:
-                    # the server closes the connection, so that the client sees that the response is
-                    # incomplete
+                    # The server closes the connection, which shows an incomplete response.
                     raise
                 response = await problem_response(Request(exchange.scope), error)
                 await response(exchange.scope, receive, exchange.send)
@@ -90,9 +84,7 @@ class RequestContext:
                 self._note(exchange)
 
     def _check_head(self, request: Request) -> None:
-        """Raises HeadTooLarge for a head that arrived at once: the server bounds those that it
-        waits for.
-        """
+        """Raises HeadTooLarge for a head received at once; the server bounds incomplete heads."""
         headers = sum(
             len(name) + len(value) + len(b": \r\n") for name, value in request.scope["headers"]
         )
@@ -121,7 +113,7 @@ class RequestContext:
 
 
 class _HeadSent(Exception):
-    """The head of a stream was sent, which is the whole answer to `HEAD`."""
+    """The head of a stream was sent, the complete answer to `HEAD`."""
 
 
 class _Exchange:

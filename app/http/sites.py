@@ -1,4 +1,4 @@
-"""What keeps web pages out: the names of this service, and the pages that may call it."""
+"""Protection against foreign web pages: names of this service, and allowed origins."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ PROBES = ("/healthz", "/readyz")
 
 
 def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
-    """A check of the header Host, which raises WrongHost. `own`: what the service listens on.
+    """A check of the header Host, which raises WrongHost. `own` is the address of the service.
 
-    A web page can give its own name the address of this service; the browser then takes the service
-    for the page's own (DNS rebinding). The header keeps the page's name. An address has no name to
-    be given, so that any is allowed.
+    A web page can map its own name to the address of this service; the browser then takes the
+    service for the page's server (DNS rebinding). The header still has the page's name. Addresses
+    cannot be mapped, so that all of them are allowed.
     """
     known = {*names, own.lower(), "localhost", socket.gethostname().lower()}
 
@@ -44,8 +44,8 @@ def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
 def same_site(origins: Collection[str]) -> Callable[[Request], None]:
     """A check of Sec-Fetch-Site and Origin, which raises CrossSite; pages of `origins` pass.
 
-    Browsers set both, and pages cannot change them. What is not sent by a browser has neither, and
-    passes. Requests that only read pass, too: a page of another site cannot see the answer.
+    Browsers set both headers, and pages cannot change them. Requests of other programs have neither
+    and pass. Read-only requests pass as well, since a foreign page cannot see the answer.
     """
 
     def check(request: Request) -> None:
@@ -74,9 +74,7 @@ def same_site(origins: Collection[str]) -> Callable[[Request], None]:
 
 
 def _is_own(origin: str, request: Request) -> bool:
-    """Whether an origin is this service, under the name and port that the request came for. A proxy
-    may add TLS.
-    """
+    """Whether an origin is this service under the requested name and port. A proxy may add TLS."""
     try:
         return urlsplit(origin).netloc.lower() == request.headers.get("host", "").lower() != ""
     except ValueError:

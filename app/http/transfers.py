@@ -1,4 +1,4 @@
-"""What a request carries in both directions: its key, its body and its answer."""
+"""Keys, bodies and answers of requests in transfer."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from joulepath.app.http.handlers import problem_response
 
 
 class Transfers:
-    """ASGI middleware: bodies within their limits, and answers compressed and sent piece by piece.
+    """ASGI middleware: bodies within limits, and answers compressed and sent in pieces.
 
-    A request without a valid key among `keys`, or whose answer could not be encoded, is refused
-    before its body is read.
+    A request without a valid key in `keys`, or without an acceptable coding, is refused before its
+    body is read.
     """
 
     def __init__(self, app: ASGIApp, bodies: Bodies, keys: KeyRing | None) -> None:
@@ -58,16 +58,13 @@ class Transfers:
 
 
 class _Answer:
-    """The answer to one request. One for which there is no room becomes a problem.
+    """The answer to one request; without room for it, a problem is sent instead.
 
-    To send an event of a stream for which there is no room raises TooManyBytes or
-    TooManyBytesOfClient.
+    Without room for an event of a stream, TooManyBytes or TooManyBytesOfClient is raised.
     """
 
     piece: int = 1 << 18
-    """Bytes that are handed to the connection at a time: the next ones wait until the client has
-    read.
-    """
+    """Bytes passed to the connection at a time; the next piece waits for the client."""
 
     def __init__(
         self,

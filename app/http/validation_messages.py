@@ -1,7 +1,7 @@
-"""What a client is told of an error of pydantic: where it is, and what to do.
+"""Messages of validation errors: location and remedy.
 
-A location keeps only names that the contract knows, or that are plain; pydantic's `input` is left
-out. Both may repeat what the client sent.
+Locations contain only known or plain names, and pydantic's `input` is left out: both could repeat
+arbitrary data of the client.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from pydantic.fields import FieldInfo
 from joulepath.app.api.robots.request import NAME_PATTERN
 from joulepath.app.convert.json_text import EMPTY, PLAIN_NAME
 from joulepath.app.exceptions.base import FieldError
-from joulepath.app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD, nearest
+from joulepath.app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD
 from joulepath.app.schemas.common import Request as RequestModel
+from joulepath.app.schemas.names import nearest
 from joulepath.app.schemas.queries import PAGE_PATTERN
-from joulepath.app.schemas.scene import BASE64
+from joulepath.app.schemas.shapes import BASE64
 
 _OBJECT = "Give a JSON object: names and values in braces"
 _MESSAGES = {
@@ -35,7 +36,7 @@ _MESSAGES = {
     "int_parsing": "Give a whole number",
     "float_parsing": "Give a number",
 }
-"""In place of pydantic's messages, which name Python's types."""
+"""Messages replacing those of pydantic, which name Python types."""
 _PATTERNS = {
     BASE64: "Give base64 in the standard alphabet, without line breaks and blanks",
     NO_CONTROLS: "Leave out line breaks, tabs and other control characters",
@@ -45,7 +46,7 @@ _PATTERNS = {
 
 
 def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[FieldError]:
-    """What is told of one error of pydantic: one entry, or one for each unknown field."""
+    """Entries for one error of pydantic: one, or one per unknown field."""
     loc: list[str | int] = [*where]
     for part in error["loc"]:
         keyed = (
@@ -84,7 +85,7 @@ def _message(error: Mapping[str, Any]) -> str:
 
 @cache
 def _keyed_fields() -> set[str]:
-    """Fields whose value is an object with names of the caller's."""
+    """Fields with an object whose keys are names chosen by the caller."""
     return {
         name
         for model in _models(RequestModel)

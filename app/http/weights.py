@@ -1,4 +1,4 @@
-"""Headers that list what a client accepts, with weights (RFC 9110, section 12.4.2)."""
+"""Headers with weighted preferences of a client (RFC 9110, section 12.4.2)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ JSON = "application/json"
 
 
 def weights(header: str) -> dict[str, float]:
-    """The weight of each member, in small letters; a member that is malformed is passed over."""
+    """The weights of all well-formed members, in lower case."""
     found = {}
     for member in header.split(","):
         name, *parameters = (part.strip().lower() for part in member.split(";"))

@@ -1,1 +1,1 @@
-"""Work on jobs: takes their requests from the database, runs them, and stores what came of it."""
+"""Work on jobs: requests are leased from the database, run, and their outcomes stored."""

@@ -1,10 +1,11 @@
-"""What is shown of a job: its state, its requests, their results line by line."""
+"""Answers about a job: its state, its requests, their results line by line."""
 
 from __future__ import annotations
 
 import asyncio
 import csv
 from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from io import StringIO
 from typing import Any
@@ -19,10 +20,19 @@ from joulepath.app.store.jobs import JobView
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import JobRequest, now
 
-_BATCH = 20
-"""Results that are read at a time: an answer may have a hundred kilobytes."""
-_ROWS = 1000
-"""Rows of a table that are read at a time."""
+
+@dataclass(frozen=True)
+class PageSettings:
+    """Sizes of reads."""
+
+    results: int = 20
+    """Results read at a time: an answer may have a hundred kilobytes."""
+    rows: int = 1000
+    """Rows of a table read at a time."""
+
+
+PAGES = PageSettings()
+
 _COLUMNS = (
     "index",
     "kind",
@@ -65,21 +75,22 @@ def detail(view: JobView, requests: Sequence[JobRequest], limit: int) -> dict[st
 
 
 async def as_lines(store: Store, job_id: str) -> AsyncIterator[bytes]:
-    """The requests of a job that have ended, in order of their index: one line of JSON each, with
-    the whole answer.
-    """
+    """The ended requests of a job by index: one line of JSON per request, with its answer."""
     last = -1
-    while found := await store.read(partial(jobs.results, job_id=job_id, limit=_BATCH, after=last)):
+    while found := await store.read(
+        partial(jobs.results, job_id=job_id, limit=PAGES.results, after=last)
+    ):
         last = found[-1][0].number
         yield await asyncio.to_thread(_lines, found)
 
 
 async def as_csv(store: Store, job_id: str) -> AsyncIterator[bytes]:
-    """The requests of a job that have ended, in order of their index, as a table of their
-    figures."""
+    """The ended requests of a job by index, as a table of their figures."""
     yield _rows([_COLUMNS])
     last = -1
-    while found := await store.read(partial(jobs.ended, job_id=job_id, limit=_ROWS, after=last)):
+    while found := await store.read(
+        partial(jobs.ended, job_id=job_id, limit=PAGES.rows, after=last)
+    ):
         last = found[-1].number
         yield _rows([_row(request) for request in found])
 

@@ -1,4 +1,4 @@
-"""Wakes those who wait for something to happen to a job in this process."""
+"""Wake-up of coroutines waiting for changes of a job in this process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class Changes:
-    """Bells, one for each job that somebody waits for."""
+    """Events of the jobs with waiting coroutines."""
 
     def __init__(self) -> None:
         self._waiting: defaultdict[str, set[asyncio.Event]] = defaultdict(set)
@@ -51,9 +51,7 @@ class Changes:
             del self._waiting[job_id]
 
     async def shared(self, what: Hashable, read: Callable[[], Coroutine[Any, Any, T]]) -> T:
-        """What `read` returns. Those who ask for the same while it is read, and before more
-        happens, share one read.
-        """
+        """The result of `read`, shared by concurrent callers with equal `what` until a change."""
         key = (what, self._rung)
         reading = self._reads.get(key)
         if reading is None:

@@ -1,6 +1,4 @@
-"""The dispatcher: leases requests of jobs from the database, has them run, and stores their
-outcomes.
-"""
+"""The dispatcher: it leases requests of jobs, has them run, and stores their outcomes."""
 
 from __future__ import annotations
 
@@ -30,31 +28,35 @@ from joulepath.app.store.tables import now as present_time
 logger = logging.getLogger(__name__)
 
 LEASE = timedelta(seconds=30)
-"""Time for which a request is leased; leases are renewed after a third of it."""
-LOOK = 0.5
-"""Time [s] between two looks into the database: for new requests, and for those that were cancelled
-elsewhere.
-"""
-AHEAD = 0.25
-"""Work [s] for each worker that is leased ahead of time, so that small requests share the cost of a
-transaction.
-"""
-MOST_AHEAD = 32
-"""Requests for each worker that are leased ahead of time at most."""
-GATHER = 0.05
-"""Time [s] in which outcomes are gathered, to be stored together, while the workers have more to
-do.
-"""
-MOST_EQUAL = 500
-"""Requests that are leased beyond that, because they wait for equal ones."""
-MOST_KNOWN = 64
-"""The same, because those before them were all known."""
+"""Length of a lease; leases are renewed after a third of it."""
+
+
+@dataclass(frozen=True)
+class DispatcherSettings:
+    """Settings of the dispatcher."""
+
+    look: float = 0.5
+    """Time [s] between two queries of the database for new requests and cancelled ones."""
+    ahead: float = 0.25
+    """Work [s] leased ahead per worker, so that small requests share the cost of a transaction."""
+    most_ahead: int = 32
+    """Most requests leased ahead per worker."""
+    gather: float = 0.05
+    """Time [s] of collecting outcomes for one transaction while workers have more to do."""
+    most_equal: int = 500
+    """Most requests leased beyond `most_ahead` while they wait for equal requests."""
+    most_known: int = 64
+    """Most requests leased beyond `most_ahead` if all earlier ones had known answers."""
+    stop: float = 3.0
+    """Longest time [s] of the last exchange with the database when the service stops."""
+    longest_pause: float = 30.0
+    """Longest time [s] until an unreachable database is tried again."""
+
+
+DISPATCHER = DispatcherSettings()
+
 PRUNING = timedelta(hours=1)
 """Time between two deletions of old jobs."""
-_STOP = 3.0
-"""Longest time [s] that the last exchange with the database may take when the service stops."""
-_LONGEST_PAUSE = 30.0
-"""Longest time [s] until an unreachable database is tried again."""
 
 
 @dataclass
@@ -68,10 +70,10 @@ class _Times:
 
 
 class Dispatcher:
-    """Works on jobs with as many requests at a time as its executor has slots.
+    """Works on as many requests of jobs at a time as its executor has slots.
 
-    It leases some requests ahead of time, so that no worker waits for the database. Its loop alone
-    reads and writes the queue. `now` is the clock of the leases.
+    Some requests are leased ahead, so that no worker waits for the database. Only its loop reads
+    and writes the queue. `now` is the clock of the leases.
     """
 
     def __init__(
@@ -90,7 +92,7 @@ class Dispatcher:
         self._outcomes: list[Outcome] = []
         self._bell = asyncio.Event()
         self._times = _Times(now())
-        self._mean_work = AHEAD
+        self._mean_work = DISPATCHER.ahead
         self._mean_of: dict[str, float] = {}
         self._more = True
         self._more_known = 0
@@ -107,7 +109,7 @@ class Dispatcher:
         self._tasks = [asyncio.create_task(self._dispatch())]
 
     def drain(self) -> None:
-        """Stops all work. What was begun waits again."""
+        """Stops all work; running requests wait again."""
         self._draining = True
         for held in self._held.values():
             held.drop()
@@ -118,8 +120,8 @@ class Dispatcher:
         """Gives all leases back and ends."""
         self.drain()
         if self._tasks:
-            # what it has just leased is given back, too
-            await asyncio.wait(self._tasks[:1], timeout=_STOP)
+            # Requests leased just now are returned as well.
+            await asyncio.wait(self._tasks[:1], timeout=DISPATCHER.stop)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -144,7 +146,9 @@ class Dispatcher:
         """Has leased requests run."""
         while True:
             await self._heap.filled()
-            taker = Taker(self._heap, self._ended, lambda kind: self._mean_of.get(kind, AHEAD))
+            taker = Taker(
+                self._heap, self._ended, lambda kind: self._mean_of.get(kind, DISPATCHER.ahead)
+            )
             taker.working = working = asyncio.create_task(self._executor.run(taker.take))
             try:
                 await asyncio.wait({working})
@@ -173,9 +177,7 @@ class Dispatcher:
         self._has_outcome(held, outcome)
 
     def _give_back(self, held: Held) -> None:
-        """A request that nobody wants here waits again, unless its job was cancelled: `settle`
-        knows.
-        """
+        """Returns an unwanted request to the queue, unless `settle` knows its job as cancelled."""
         self._has_outcome(held, Outcome(held.lease, "waiting"))
 
     def _has_outcome(self, held: Held, outcome: Outcome) -> None:
@@ -188,21 +190,21 @@ class Dispatcher:
 
     async def _dispatch(self) -> None:
         """Exchanges leases and outcomes with the database."""
-        fresh, pause = True, LOOK
+        fresh, pause = True, DISPATCHER.look
         while not self._draining:
             try:
                 if fresh:
                     await self._store.write(partial(leases.take_back_from, is_gone=is_gone))
                     fresh = False
                 await self._exchange()
-                pause = LOOK
+                pause = DISPATCHER.look
             except Exception as error:
                 if not isinstance(error, StoreUnavailable):
                     logger.exception("unforeseen error")
-                pause = min(2 * pause, _LONGEST_PAUSE)
+                pause = min(2 * pause, DISPATCHER.longest_pause)
             await self._rung(pause)
             if len(self._heap) >= self._executor.slots and not self._draining:
-                await asyncio.sleep(GATHER)
+                await asyncio.sleep(DISPATCHER.gather)
 
     async def _rung(self, longest: float) -> None:
         """Waits until there is something to do, at most for a time [s]."""
@@ -217,13 +219,13 @@ class Dispatcher:
         await self._store_outcomes()
         await self._watch()
         await self._report()
-        # one of them dispatches; those beyond the slots find nothing to do
+        # One task dispatches; tasks beyond the slots find nothing to do.
         more = self._executor.slots + 1 - len(self._tasks)
         self._tasks += [asyncio.create_task(self._run()) for _ in range(more)]
         await self._begin(self._equals.released())
         want = (
             self._most_held
-            + min(self._equals.waiting, MOST_EQUAL)
+            + min(self._equals.waiting, DISPATCHER.most_equal)
             + self._more_known
             - len(self._held)
         )
@@ -242,10 +244,10 @@ class Dispatcher:
             if await self._begin(fresh) or not fresh:
                 self._more_known = 0
             else:  # where all were known, more may be
-                self._more_known = min(max(1, 2 * self._more_known), MOST_KNOWN)
+                self._more_known = min(max(1, 2 * self._more_known), DISPATCHER.most_known)
 
     async def _begin(self, held: list[Held]) -> int:
-        """Has requests computed that are equal to no others; returns their number."""
+        """Starts requests without equal ones, and returns their number."""
         wanted = [each for each in held if not each.dropped]
         for each in held:
             if each.dropped:
@@ -263,8 +265,13 @@ class Dispatcher:
 
     @property
     def _most_held(self) -> int:
-        """Requests that it may have leased: one for each worker, and some ahead."""
-        ahead = max(1, round(AHEAD / max(self._mean_work, AHEAD / MOST_AHEAD)))
+        """Most leased requests: one per worker, and some ahead."""
+        ahead = max(
+            1,
+            round(
+                DISPATCHER.ahead / max(self._mean_work, DISPATCHER.ahead / DISPATCHER.most_ahead)
+            ),
+        )
         return self._executor.slots * (1 + ahead)
 
     @staticmethod
@@ -281,18 +288,18 @@ class Dispatcher:
             self._outcomes = outcomes + self._outcomes
             raise
         except Exception:
-            # nobody waits for these answers for ever
+            # Clients must not wait forever for these answers.
             self._outcomes = [defect(each.lease) for each in outcomes] + self._outcomes
             raise
         self.changes.ring(changed)
 
     async def _watch(self) -> None:
-        """Renews leases, stops what was cancelled elsewhere, and deletes old jobs."""
+        """Renews leases, stops cancelled requests, and deletes old jobs."""
         now, clock = self._now(), self._clock()
         if self._held and now - self._times.renewed >= LEASE / 3:
             await self._store.write(partial(leases.renew, holder=self.holder, until=now + LEASE))
             self._times.renewed = now
-        if self._held and clock - self._times.looked >= LOOK:
+        if self._held and clock - self._times.looked >= DISPATCHER.look:
             held = list(self._held.values())
             kept = await self._store.read(partial(leases.kept, holder=self.holder))
             self._times.looked = clock
@@ -305,9 +312,9 @@ class Dispatcher:
             self._times.pruned = now
 
     async def _report(self) -> None:
-        """Records progress within requests, where there is some."""
+        """Records progress within requests."""
         fresh = {held.lease.key: held.found for held in self._held.values() if held.found.is_news}
-        if fresh and self._clock() - self._times.reported >= LOOK:
+        if fresh and self._clock() - self._times.reported >= DISPATCHER.look:
             self._times.reported = self._clock()
             reports = {key: found.report for key, found in fresh.items()}
             report = partial(leases.report, holder=self.holder, reports=reports, now=self._now())

@@ -1,4 +1,4 @@
-"""Requests of jobs that are equal to others: they are answered by copies, and computed once."""
+"""Equal requests of jobs: computed once, and answered by copies."""
 
 from __future__ import annotations
 
@@ -24,23 +24,19 @@ from joulepath.app.store.tables import Answer
 from joulepath.app.tasks.answer_cache import asked_for
 
 ALONE = ("optimize", "compare", "evaluate")
-"""Endpoints whose answers refer to no other answer. The others refer to answers that are kept as
-long as their job.
-"""
+"""Endpoints with self-contained answers; others refer to answers kept as long as their job."""
 
 
 @dataclass(frozen=True)
 class Sorted:
-    """Leased requests: those that must be computed, and the outcomes of those that are known."""
+    """Leased requests to be computed, and known outcomes of others."""
 
     to_compute: Sequence[Held]
     known: Mapping[Held, Outcome]
 
 
 class Equals:
-    """Those that wait until an equal one has been computed here: `released` gives them once its
-    answer is stored.
-    """
+    """Requests waiting for an equal one; `released` returns them once its answer is stored."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -49,13 +45,11 @@ class Equals:
 
     @property
     def waiting(self) -> int:
-        """How many wait."""
+        """Number of waiting requests."""
         return sum(map(len, self._followers.values())) + len(self._released)
 
     async def sort(self, held: Sequence[Held]) -> Sorted:
-        """Finds out which requests must be computed; others are known, or wait. Raises
-        StoreUnavailable.
-        """
+        """Divides requests into new, known and waiting ones. Raises StoreUnavailable."""
         began = time.perf_counter()
         for each in held:
             each.asked = await self._asked(each)
@@ -73,7 +67,7 @@ class Equals:
         return Sorted(to_compute, known)
 
     async def _recall(self, held: Held) -> None:
-        """Gives a cycle the motions that it may have in common with others."""
+        """Gives a cycle the known motions of its cell."""
         meaning = held.lease.meaning
         if meaning is not None and "cell" in meaning:
             with suppress(StoreUnavailable):
@@ -82,8 +76,7 @@ class Equals:
                 )
 
     def ended(self, held: Held, outcome: Outcome) -> list[tuple[Held, Outcome]]:
-        """A request has been computed; the outcomes of those that wait for it and fail as it
-        did."""
+        """Outcomes of waiting requests failing in the same way as a request which has ended."""
         if held.asked is None or not held.leads:
             return []
         held.leads = False
@@ -92,7 +85,7 @@ class Equals:
         if outcome.state != "failed" or problem is None or problem["status"] >= 500:
             self._released += followers
             return []
-        # the request itself is at fault
+        # The error is in the request itself.
         return [
             (
                 each,
@@ -106,9 +99,7 @@ class Equals:
         ]
 
     def released(self) -> list[Held]:
-        """Those that wait no longer: for an answer that is there, or because nobody wants them any
-        more.
-        """
+        """Requests which no longer wait: their answer is stored, or they were dropped."""
         for key, followers in self._followers.items():
             self._released += [each for each in followers if each.dropped]
             self._followers[key] = [each for each in followers if not each.dropped]
@@ -116,7 +107,7 @@ class Equals:
         return released
 
     def _follows(self, held: Held) -> bool:
-        """Whether it waits for another one. If not, others may wait for it."""
+        """Whether the request waits for an equal one; otherwise equal ones may wait for it."""
         if held.asked is None:
             return False
         followers = self._followers.get(held.asked.key)
@@ -129,7 +120,7 @@ class Equals:
 
     async def _asked(self, held: Held) -> Asked | None:
         lease = held.lease
-        # another version may have understood it in another way
+        # Another version may have interpreted the request differently.
         if lease.meaning is None or lease.meaning["version"] != __version__:
             return None
         job_id = None if lease.kind in ALONE else lease.job_id

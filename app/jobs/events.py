@@ -15,13 +15,23 @@ from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.store import job_events
 from joulepath.app.store.store import Store
 
-_BATCH = 500
-LOOK = 1.0
-"""Time [s] after which events of other services are looked for."""
-GATHER = 0.2
-"""Least time [s] between two reads for one reader: what happens within it is sent together."""
-QUIET = 15.0
-"""Time [s] without an event after which a comment tells proxies that the stream lives."""
+
+@dataclass(frozen=True)
+class EventSettings:
+    """Settings of event streams."""
+
+    batch: int = 500
+    """Most events of one read."""
+    look: float = 1.0
+    """Time [s] between two queries for events of other services."""
+    gather: float = 0.2
+    """Least time [s] between two reads for one reader; events in between are sent together."""
+    quiet: float = 15.0
+    """Time [s] without an event after which a comment keeps the stream alive in proxies."""
+
+
+EVENTS = EventSettings()
+
 _COMMENT = b": working\n\n"
 
 
@@ -38,17 +48,16 @@ class _Batch:
 async def events_after(
     store: Store, dispatcher: Dispatcher, job_id: str, number: int
 ) -> AsyncIterator[bytes]:
-    """The events after that of `number`, until the end of the job or of the service, in the form of
-    server-sent events.
+    """Server-sent events after `number`, until the end of the job or of the service.
 
-    Readers of one job that are equally far share what is read and written for them.
+    Readers at the same position of one job share the reads and the encoded events.
     """
     changes = dispatcher.changes
     bell = changes.listen(job_id)
     quiet = 0.0
     try:
         while True:
-            # what happened before the service stops is still told
+            # Events before the stop of the service are still sent.
             is_last = dispatcher.draining
             read = partial(_batch, job_id=job_id, number=number)
             batch = await changes.shared((job_id, number), partial(store.read, read))
@@ -56,24 +65,24 @@ async def events_after(
             if batch.text:
                 quiet = 0.0
                 yield batch.text
-            elif quiet >= QUIET:
+            elif quiet >= EVENTS.quiet:
                 quiet = 0.0
                 yield _COMMENT
             if batch.over or is_last:
                 return
-            # a batch that is not full has all that there is
-            if batch.count < _BATCH:
-                await asyncio.sleep(GATHER)
-                quiet += GATHER
+            # An incomplete batch is the last one.
+            if batch.count < EVENTS.batch:
+                await asyncio.sleep(EVENTS.gather)
+                quiet += EVENTS.gather
             if not batch.count:
-                await changes.wait(bell, LOOK)
-                quiet += LOOK
+                await changes.wait(bell, EVENTS.look)
+                quiet += EVENTS.look
     finally:
         changes.leave(job_id, bell)
 
 
 def _batch(session: Session, job_id: str, number: int) -> _Batch:
-    found, over = job_events.after(session, job_id, number, _BATCH)
+    found, over = job_events.after(session, job_id, number, EVENTS.batch)
     texts = [
         format_sse_event(data_str=json.dumps(each.data), event=each.name, id=str(each.number))
         for each in found

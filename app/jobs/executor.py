@@ -1,4 +1,4 @@
-"""What runs the requests of jobs."""
+"""Executors of the requests of jobs."""
 
 from __future__ import annotations
 
@@ -20,32 +20,30 @@ from joulepath.app.store.store import Store
 from joulepath.app.tasks.arm_engine import ArmEngine, given_log
 from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
 from joulepath.optimizer.exceptions import DeclaredError, UnknownRobot
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 
 class Executor(Protocol):
-    """Runs works one after another for each of its callers."""
+    """Runs works one after another for every caller."""
 
     @property
     def slots(self) -> int:
-        """Callers that keep it busy at present."""
+        """Number of callers needed for full use."""
         ...
 
     async def run(self, take: Take) -> None:
         """Runs works until there is none, or a caller of the service needs the worker.
 
-        Each ends with its result, what its task raises, DeadlineExceeded, WorkerLost, or, if it is
+        A work ends with its result, the error of its task, DeadlineExceeded, WorkerLost, or, if
         `stoppable`, Preempted. If cancelled, the work is stopped at once. Raises
-        ClusterUnavailable; what has not ended then is to be run again.
+        ClusterUnavailable; works without an outcome must then run again.
         """
         ...
 
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Runs works in workers of this service that no caller waits for. Users' own robots come from
-    the database.
-    """
+    """Runs works in idle workers of this service. Users' own robots come from the database."""
 
     engine: Engine
     store: Store
@@ -58,7 +56,7 @@ class LocalExecutor:
 
 @dataclass(frozen=True)
 class ClusterExecutor:
-    """Runs works on a cluster. No caller waits for its workers, so that none is taken away."""
+    """Runs works on a cluster, whose workers are not needed by callers."""
 
     cluster: Cluster
     store: Store
@@ -74,7 +72,7 @@ class ClusterExecutor:
 
 
 async def _run(run: Callable[[Take], Awaitable[None]], store: Store, take: Take) -> None:
-    """Runs works; those that need something of the database come after the others, one by one."""
+    """Runs works; works with items of the database follow the others, one by one."""
     waiting: list[Work] = []
 
     def ended(work: Work, how: Ended) -> None:
@@ -103,8 +101,7 @@ def _needs_logs(task: Task) -> TypeGuard[JobRequestTask]:
 
 
 async def _with_logs(task: Task, store: Store) -> Task:
-    """The task with the logs that an identification names. Raises UnknownLog or
-    StoreUnavailable."""
+    """The task with the logs of an identification. Raises UnknownLog or StoreUnavailable."""
     if not _needs_logs(task):
         return task
     asked = IdentifyRequest.model_validate_json(unpacked(task.body))
@@ -113,10 +110,10 @@ async def _with_logs(task: Task, store: Store) -> Task:
 
 @dataclass(frozen=True)
 class _Alone:
-    """Runs one task at a time on what runs many."""
+    """Runs one task at a time by a function for many."""
 
     many: Callable[[Take], Awaitable[None]]
     stoppable: bool
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         return await result_of(self.many, task, deadline, self.stoppable, tell)

@@ -1,4 +1,4 @@
-"""Leased requests that wait to be worked on, and who takes them."""
+"""The queue of leased requests, and its consumers."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 
 from joulepath.app.engine.work import Ended, Work
 from joulepath.app.jobs.progress import HEARD, Found
-from joulepath.app.jobs.work import MOST_PREEMPTIONS, task_of
+from joulepath.app.jobs.work import RETRY, task_of
 from joulepath.app.store.cache import Asked
 from joulepath.app.store.leases import Lease
-from joulepath.optimizer.progress import nobody
+from joulepath.optimizer.progress import no_listener
 
 SMALL = 1 << 12
 """Size of a small request [byte], compressed."""
@@ -22,10 +22,10 @@ SMALL = 1 << 12
 
 @dataclass(eq=False)
 class Held:
-    """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody
-    wants it any more.
+    """A lease and the work on it.
 
-    `leads`: equal requests may wait for it. `motions` are known ones of the cell of a cycle.
+    `began` [s] is its start by `perf_counter`. `dropped`: the request is no longer wanted. `leads`:
+    equal requests may wait for it. `motions` are known motions of the cell of a cycle.
     """
 
     lease: Lease
@@ -40,15 +40,13 @@ class Held:
     def drop(self) -> None:
         """Stops the work on it."""
         self.dropped = True
-        # who takes it says so first, and then looks whether it is dropped
+        # A taker registers before it checks `dropped`.
         if self.taker is not None:
             self.taker.stop()
 
 
 class Heap:
-    """Leased requests, in the order in which they are to be worked on. Takers take from it in
-    threads.
-    """
+    """Leased requests in the order of work. Takers consume it in threads."""
 
     def __init__(self) -> None:
         self.ready: deque[Held] = deque()
@@ -63,7 +61,7 @@ class Heap:
         self._filled.set()
 
     def put_back(self, held: Iterable[Held]) -> None:
-        """Adds requests that were taken, but not worked on, at the beginning."""
+        """Adds taken but unprocessed requests at the beginning."""
         self.ready.extendleft(reversed(list(held)))
         self._filled.set()
 
@@ -75,17 +73,17 @@ class Heap:
 
 
 class Taker:
-    """Takes requests for one run of an executor. `ended` gets what becomes of each while it is
-    `left`.
+    """Takes requests for one run of an executor.
 
-    `expected` [s] is the time that a request of a kind may take.
+    `ended` receives the outcome of a request as long as it is in `left`. `expected` returns the
+    likely time [s] of a kind of request.
     """
 
     def __init__(
         self, heap: Heap, ended: Callable[[Held, Ended], object], expected: Callable[[str], float]
     ) -> None:
         self.left: dict[Held, None] = {}
-        """What it took that has not ended, in order."""
+        """Taken requests without an outcome, in order."""
         self.working: asyncio.Task[None] | None = None
         self._heap, self._ended, self._expected = heap, ended, expected
         self._lock = threading.Lock()
@@ -120,13 +118,13 @@ class Taker:
         held.began = time.perf_counter()
 
         def ended(how: Ended) -> None:
-            # a result that comes after the run was stopped is late: the request has gone elsewhere
+            # After a stop, the request belongs to another run.
             if self._is_open and held in self.left:
                 del self.left[held]
                 self._ended(held, how)
 
-        tell = held.found.tell if lease.kind in HEARD else nobody
-        stoppable = lease.preempted < MOST_PREEMPTIONS
+        tell = held.found.tell if lease.kind in HEARD else no_listener
+        stoppable = lease.preempted < RETRY.preemptions
         is_small = len(lease.body) + sum(map(len, held.motions.values())) <= SMALL
         task, expected = task_of(lease, held.motions), self._expected(lease.kind)
         return Work(task, lease.deadline, ended, stoppable, tell, expected, is_small)

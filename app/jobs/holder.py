@@ -1,6 +1,4 @@
-"""Names of the processes that hold leases. A name tells whether its process has ended, if it ran on
-this machine.
-"""
+"""Names of processes holding leases, from which this machine can tell ended processes."""
 
 from __future__ import annotations
 

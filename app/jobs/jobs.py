@@ -1,4 +1,4 @@
-"""What clients do with jobs: create, cancel, retry and delete them, and wait for one."""
+"""Operations on jobs: create, cancel, retry, delete and wait."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from joulepath.app.store.jobs import JobView, NewJob
 from joulepath.app.store.store import Store
 
 LOOK = 1.0
-"""Time [s] after which work of other services is looked for."""
+"""Time [s] between two queries for the work of other services."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,9 @@ class Jobs:
         self._has_changed(job_id)
 
     async def delete(self, job_id: str, client: Client) -> None:
-        """Deletes a job with its answers; what runs is stopped. Raises UnknownJob, NotOwner or
-        StoreUnavailable.
+        """Stops and deletes a job with its answers.
+
+        Raises UnknownJob, NotOwner or StoreUnavailable.
         """
         await self.store.write(partial(jobs.delete, job_id=job_id, client=client), frees=True)
         self._has_changed(job_id, stop=True)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 
 from joulepath.app.store.job_events import Report
-from joulepath.optimizer.progress import CandidateTried, Event, Improved, forward
+from joulepath.optimizer.progress import CandidateTried, Event, Improved, only_news
 
 HEARD = ("cycle", "pareto")
-"""Endpoints whose requests take long, so that their progress is worth an event."""
+"""Endpoints with long requests, whose progress is reported by events."""
 
 
 class Found:
-    """What the work on a request has found so far. `is_news`: since it was last stored."""
+    """Progress of a request. `is_news`: not stored yet."""
 
     def __init__(self, attempt: int) -> None:
         self.report = Report(attempt)
         self.is_news = False
-        self.tell = forward(self._note)
+        self.tell = only_news(self._note)
 
     def _note(self, event: Event) -> None:
         if isinstance(event, CandidateTried):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import orjson
@@ -27,26 +28,34 @@ from joulepath.optimizer.exceptions import DeclaredError
 
 logger = logging.getLogger(__name__)
 
-MOST_DEATHS = 3
-"""Workers that may die of a request."""
-MOST_PREEMPTIONS = 2
-"""Times that a caller may take the worker of a request; then it is left to end."""
+
+@dataclass(frozen=True)
+class RetrySettings:
+    """Retries of a request."""
+
+    deaths: int = 3
+    """Dead workers after which a request fails."""
+    preemptions: int = 2
+    """Preemptions of a request, after which it may run to its end."""
+
+
+RETRY = RetrySettings()
 
 
 def task_of(lease: Lease, motions: Mapping[str, bytes]) -> JobRequestTask:
-    """The task of a lease; `motions` are known ones of the cell of a cycle."""
+    """The task of a lease; `motions` are known motions of the cell of a cycle."""
     return JobRequestTask(lease.kind, lease.body, request_id_of(lease), motions=motions)
 
 
 def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
-    """The outcome of work that began at a time [s] by `perf_counter` and ended like this."""
+    """The outcome of work started at `began` [s] by `perf_counter`."""
     if not isinstance(ended, Exception):
         return _done(lease, ended)
     if isinstance(ended, Preempted):
         return Outcome(lease, "waiting", preempted=True)
     if isinstance(ended, ShuttingDown | StoreUnavailable | ClusterUnavailable):
         return Outcome(lease, "waiting")
-    if isinstance(ended, WorkerLost) and lease.deaths + 1 < MOST_DEATHS:
+    if isinstance(ended, WorkerLost) and lease.deaths + 1 < RETRY.deaths:
         return Outcome(lease, "waiting", died=True)
     error = WorkerDied() if isinstance(ended, WorkerLost) else ended
     if isinstance(error, DeclaredError):
@@ -73,7 +82,7 @@ def _done(lease: Lease, result: TaskResult) -> Outcome:
 
 
 def defect(lease: Lease) -> Outcome:
-    """The outcome of a request that a defect of the service ends; the log has it."""
+    """The outcome of a request ended by a logged defect of the service."""
     return Outcome(lease, "failed", problem=_content(InternalError(), request_id_of(lease)))
 
 
@@ -89,6 +98,6 @@ def _failed(lease: Lease, error: Exception, began: float) -> Outcome:
 
 
 def _content(error: Exception, request_id: str) -> dict[str, Any]:
-    # as it is sent: without arrays, and null for what is not finite
+    # as sent: without arrays, and null for non-finite numbers
     content: dict[str, Any] = orjson.loads(json_document(problem_of(error, request_id)))
     return content

@@ -57,8 +57,7 @@ class Payload(Request):
     )
     inertia: list[float] | None = described(
         "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, "
-        "iyz, izz]. Null: a "
-        "point mass.",
+        "iyz, izz]. Null: a point mass.",
         "kg·m²",
         [0.004, 0.0, 0.0, 0.004, 0.0, 0.003],
         default=None,
@@ -109,8 +108,7 @@ class MoveLimits(Request):
     )
     torque: RatePerJoint | None = described(
         "Largest absolute torque at the joint: of the motor, with rotor and friction, or of the "
-        "link, without, as the "
-        "robot's `limits.torque_side` says.",
+        "link, without, as the robot's `limits.torque_side` says.",
         "N·m",
         [120.0, 120.0, 120.0, 20.0, 20.0, 20.0],
         default=None,
@@ -304,25 +302,22 @@ class ArmRequest(CellRequest):
     )
     link_mass_scale: ScalePerJoint = described(
         "Factor on mass and inertia of the link that a joint moves: one number, or one per joint. "
-        "Payload and rotors "
-        "do not change.",
+        "Payload and rotors do not change.",
         "1",
         0.8,
         default=1.0,
     )
     collisions: bool = described(
         "Whether collisions are checked. If false, `tool`, `payload.shape` and `scene` have no "
-        "effect. Use false for "
-        "motions that are known to be collision-free but that the capsules of the links are too "
-        "coarse to allow.",
+        "effect. Use false for motions that are known to be collision-free but that the capsules "
+        "of the links are too coarse to allow.",
         None,
         True,
         default=True,
     )
     tool_cone: ToolCone | None = described(
         "Limits the angle between an axis of the tool and a direction during the whole motion, for "
-        "example for an open "
-        "glass. Null: no limit.",
+        "example for an open glass. Null: no limit.",
         None,
         {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.2},
         default=None,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from difflib import get_close_matches
 from itertools import islice
 from typing import Annotated, Any, Literal
 
@@ -20,43 +18,16 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.declared import with_unit
 from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID
-from joulepath.app.schemas.lengths import ROBOT_LENGTH
+from joulepath.app.schemas.lengths import LENGTHS
+from joulepath.app.schemas.names import TYPOS, nearest
 from joulepath.optimizer.problem.names import is_plain
 from joulepath.optimizer.problem.pose import QUATERNION_TOLERANCE
 
-_LONGEST_TYPO = 64
-_SHORTEST = 3
-_ALIKE, _NEARLY_SAME = 0.6, 0.8
 KEY_HEADER = "Idempotency-Key"
-_MOST_MEANT = 4
-"""Names of an object that are compared with the right ones: no such object has more."""
-
-
 UNKNOWN_FIELD = "unknown_field"
 """Type of the error about fields that a model does not have; its context has the names of those
 that it has, `known`, and the first that it has not, `unknown`."""
 MOST_UNKNOWN = 20
-
-
-def nearest(name: str, known: Iterable[str], alike: float = _ALIKE) -> str | None:
-    """The one of the known names that `name` was meant to be; None if none is like it.
-
-    `alike` is the least share of letters in common, see difflib.
-    """
-    by_form = {_form(each): each for each in known}
-    begun = [
-        each
-        for form, each in by_form.items()
-        if len(name) >= _SHORTEST and form.startswith(_form(name))
-    ]
-    if len(begun) == 1:
-        return begun[0]
-    found = get_close_matches(_form(name[:_LONGEST_TYPO]), by_form, n=1, cutoff=alike)
-    return by_form[found[0]] if found else None
-
-
-def _form(name: str) -> str:
-    return name.lower().replace("-", "_")
 
 
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:
@@ -117,8 +88,7 @@ class Answer(Response):
     )
     id: str | None = described(
         "Id of this answer: `GET /answers/{id}` returns it again, and exports and replays take it. "
-        "Null if it is not "
-        "kept.",
+        "Null if it is not kept.",
         None,
         ANSWER_ID,
     )
@@ -130,8 +100,7 @@ class MotionAnswer(Answer):
 
     arm: dict[str, Any] | None = described(
         "What the request says of the arm beside its robot: payload, limits, scene, ... as it was "
-        "sent. Null if that "
-        "is larger than 64 KiB of JSON.",
+        "sent. Null if that is larger than 64 KiB of JSON.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
     )
@@ -153,7 +122,8 @@ def by_field(*names: str, beside: str | None = None) -> Discriminator:
         if not present and isinstance(value, dict):
             # a name that is nearly one of them: the member that has the right name says so
             meant = (
-                nearest(str(given), names, _NEARLY_SAME) for given in islice(value, _MOST_MEANT)
+                nearest(str(given), names, TYPOS.nearly_same)
+                for given in islice(value, TYPOS.compared)
             )
             present = list(islice((name for name in meant if name is not None), 1))
         return f"by {present[0]}" if len(present) == 1 else None
@@ -284,11 +254,9 @@ def frame_of(what: str) -> Any:
     """The field `frame` of what is given in one of the two frames at the robot's base."""
     return described(
         f"Frame of {what}. `base`: the robot's base frame, as on the teach pendant and in every "
-        "answer. `base_link`: "
-        "the frame of this name in ROS. For Universal Robots it is `base` after half a turn about "
-        "z, so x and y have "
-        "the opposite sign. For a robot whose figures have no `base_link_origin`, the two are the "
-        "same.",
+        "answer. `base_link`: the frame of this name in ROS. For Universal Robots it is `base` "
+        "after half a turn about z, so x and y have the opposite sign. For a robot whose figures "
+        "have no `base_link_origin`, the two are the same.",
         None,
         "base",
         default="base",
@@ -325,7 +293,7 @@ BasePose = Annotated[
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])
 
 FiguresId = Annotated[str, Field(pattern=r"^[0-9a-f-]{36}$")]
-RobotName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH)]
+RobotName = Annotated[str, Field(min_length=1, max_length=LENGTHS.robot)]
 
 
 class RobotWithTcp(Request):
@@ -334,9 +302,10 @@ class RobotWithTcp(Request):
     robot: RobotName = described(
         "Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e"
     )
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
+    tcp: Pose | None = described(
+        "Pose of the TCP in the flange frame. Null: that of a tool that is given by name, or the "
+        "flange.",
         None,
         {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
+        default=None,
     )

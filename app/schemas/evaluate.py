@@ -12,11 +12,11 @@ from joulepath.app.schemas.common import JointPositions, Request, described
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.app.schemas.examples.values import PAPER_HOME as _HOME
 from joulepath.app.schemas.examples.values import PAPER_POSE as _THERE
-from joulepath.app.schemas.lengths import ID_LENGTH
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.log_file import LogFile
 from joulepath.app.schemas.request import Seconds
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
+from joulepath.optimizer.problem.problem import DURATIONS
 
 MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""
@@ -59,8 +59,8 @@ class LoggedTrajectory(Request):
     )
     a: RateRows | None = described(
         "Joint accelerations. Null: the derivative of the cubic spline through the velocities. "
-        "Noise is not smoothed: "
-        "an error e in `q` at a period h becomes an error of up to 12 e / h² here.",
+        "Noise is not smoothed: an error e in `q` at a period h becomes an error of up to 12 e / "
+        "h² here.",
         "rad/s²",
         [[0.0] * 6] * 3,
         default=None,
@@ -96,20 +96,17 @@ class EvaluateSettings(ArmRequest):
     )
     interpolation: Literal["linear", "trapezoid", "quintic", "spline"] = described(
         "Motion through `configurations`. `linear`: constant joint velocity within each segment; "
-        "the velocity has a "
-        "step where segments meet. `trapezoid`: trapezoidal velocity with standstill at both ends "
-        "of every segment. "
-        "`quintic`: polynomial of degree 5 with standstill at both ends of every segment. "
-        "`spline`: one smooth curve "
-        "through all configurations, with standstill at the start and at the end.",
+        "the velocity has a step where segments meet. `trapezoid`: trapezoidal velocity with "
+        "standstill at both ends of every segment. `quintic`: polynomial of degree 5 with "
+        "standstill at both ends of every segment. `spline`: one smooth curve through all "
+        "configurations, with standstill at the start and at the end.",
         None,
         "linear",
         default="quintic",
     )
     sample_period: float | None = described(
         "Time between the returned samples; the last sample is at the end. Null: no samples. At "
-        "most "
-        f"{MOST_SAMPLES} samples.",
+        f"most {MOTION_LIMITS.max_samples} samples.",
         "s",
         0.05,
         default=None,
@@ -118,13 +115,12 @@ class EvaluateSettings(ArmRequest):
     )
     deadline: float | None = described(
         "Wall time from the end of the upload, including the wait for a worker. Null: the longest "
-        "that the service "
-        "allows.",
+        "that the service allows.",
         "s",
         10.0,
         default=None,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
 
 
@@ -140,10 +136,9 @@ class EvaluateRequest(EvaluateSettings):
         {"t": [0.0, 1.5, 3.0], "q": [_HOME, _THERE, _HOME]},
         default=None,
     )
-    log: Annotated[str, Field(max_length=ID_LENGTH)] | None = described(
+    log: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
         "Id of a stored log, from `POST /logs`: the motion that the arm has made. `robot`, "
-        "`payload` and `gravity` are "
-        "those of the log where they are left out.",
+        "`payload` and `gravity` are those of the log where they are left out.",
         None,
         LOG_ID,
         default=None,

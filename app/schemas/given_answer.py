@@ -17,16 +17,15 @@ class AnswerRequest(Request):
 
     answer: str | dict[str, Any] = described(
         "A motion: the id (or the path) of a kept answer, or a whole answer, of `POST /optimize`, "
-        "`POST /cycle` or "
-        "`POST /evaluate` with `sample_period`; a point of a front and a study's iteration by "
-        "their `answer`.",
+        "`POST /cycle` or `POST /evaluate` with `sample_period`; a point of a front and a study's "
+        "iteration by their `answer`.",
         None,
         ANSWER_ID,
     )
     arm: ArmRequest | None = described(
         "The arm of the answer: payload, limits, scene, ... as in its request. Null: what the "
-        "answer says in `arm`. "
-        "Needed if that is null. Its `robot` is that of the answer. Not for a cycle.",
+        "answer says in `arm`. Needed if that is null. Its `robot` is that of the answer. Not for "
+        "a cycle.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
         default=None,

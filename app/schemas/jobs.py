@@ -78,8 +78,8 @@ class NewJob(Request):
 
     requests: list[RequestOfJob] = described(
         "The requests, in any mixture. `deadline` counts from the begin of the work on a request. "
-        "It may be longer "
-        "than that of a request that is answered at once: up to `JOULEPATH_MAX_JOB_DEADLINE`.",
+        "It may be longer than that of a request that is answered at once: up to "
+        "`JOULEPATH_MAX_JOB_DEADLINE`.",
         None,
         [{"optimize": OPTIMIZE}, {"evaluate": EVALUATE}],
         min_length=1,
@@ -151,8 +151,7 @@ class RequestStatus(Response):
     )
     energy: float | None = described(
         "Energy of the motion or cycle that answers it, of its objective (electrical for "
-        "`evaluate`). Null for other "
-        "kinds, and without an answer.",
+        "`evaluate`). Null for other kinds, and without an answer.",
         "J",
         57.5,
     )

@@ -1,16 +1,28 @@
-"""Lengths of texts that requests and the database share."""
+"""Lengths of texts in requests and in the database."""
 
 from __future__ import annotations
 
-ID_LENGTH = 36
-"""Of a UUID in writing."""
-KEY_LENGTH = 128
-"""Of an `Idempotency-Key`."""
-NAME_LENGTH = 200
-"""Of a study's name."""
-OWNER_LENGTH = 64
-"""Of the name of an API key."""
-ROBOT_LENGTH = 64
-"""Of a robot's name."""
-HOLDER_LENGTH = 128
-"""Of the name of a process that works on jobs."""
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Largest lengths [characters]."""
+
+    id: int = 36
+    """Text of a UUID."""
+    key: int = 128
+    """`Idempotency-Key`."""
+    name: int = 200
+    """Name of a study."""
+    owner: int = 64
+    """Name of an API key."""
+    robot: int = 64
+    """Name of a robot."""
+    tool: int = 64
+    """Name of a tool."""
+    holder: int = 128
+    """Name of a process working on jobs."""
+
+
+LENGTHS = Lengths()

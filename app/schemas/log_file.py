@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from joulepath.app.schemas.common import NO_CONTROLS, Request, described
-from joulepath.app.schemas.lengths import NAME_LENGTH
+from joulepath.app.schemas.lengths import LENGTHS
 
 EffortMeaning = Literal["current", "torque", "external"]
-_Column = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS)]
+_Column = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS)]
 _Columns = Annotated[list[_Column], Field(min_length=1, max_length=16)]
 
 
@@ -65,8 +65,7 @@ class LogFile(Request):
     current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
     effort: Literal["auto", "current", "torque", "external"] = described(
         "What the efforts are: motor currents, motor torques at the joints, or torques from "
-        "outside, without gravity. "
-        "`auto` finds it out.",
+        "outside, without gravity. `auto` finds it out.",
         None,
         "auto",
         default="auto",

@@ -10,18 +10,8 @@ from pydantic_core import PydanticCustomError
 from joulepath.app.schemas.arm import Speed
 from joulepath.app.schemas.common import BasePose, Request, described, number_or_object
 from joulepath.app.schemas.orientation import Axis, ConeOrientedPose, TargetPose
-from joulepath.optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
-from joulepath.optimizer.problem.tool_path import (
-    LEAST_RAMP,
-    LEAST_TOLERANCE,
-    MOST_POINTS,
-    POSITION_TOLERANCE,
-    RAMP,
-    ROTATION_TOLERANCE,
-    SPEED_RANGE,
-    SPEED_TOLERANCE,
-    PathShape,
-)
+from joulepath.optimizer.problem.line import LINE_RANGES
+from joulepath.optimizer.problem.tool_path import MOST_POINTS, TOOL_PATH, PathShape
 
 SPEED = "Largest speed of the TCP on the way. Null: as fast as the limits allow."
 
@@ -38,8 +28,8 @@ class SpeedRange(Request):
     )
     max: Speed | None = described(
         "Largest speed, at least 1.05 times `min`; or equal to it: the speed is fixed then, and "
-        "held within "
-        f"{SPEED_TOLERANCE:.1%} between the ramps. Null: as fast as the limits allow.",
+        f"held within {TOOL_PATH.speed_tolerance:.1%} between the ramps. Null: as fast as the "
+        "limits allow.",
         "m/s",
         0.2,
         default=None,
@@ -48,19 +38,19 @@ class SpeedRange(Request):
         "Length of the path at either end on which the speed may be below `min`.",
         "m",
         0.02,
-        default=RAMP,
-        ge=LEAST_RAMP,
+        default=TOOL_PATH.ramp,
+        ge=TOOL_PATH.least_ramp,
         le=1,
     )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         between = self.min is not None and self.max is not None and self.fixed is None
-        if between and (self.max or 0.0) < SPEED_RANGE * (self.min or 0.0):
+        if between and (self.max or 0.0) < TOOL_PATH.speed_range * (self.min or 0.0):
             raise PydanticCustomError(
                 "range",
-                f"`max` must be at least {SPEED_RANGE:g} times `min`, or equal to it: then the "
-                "speed is fixed",
+                f"`max` must be at least {TOOL_PATH.speed_range:g} times `min`, or equal to it: "
+                "then the speed is fixed",
             )
         return self
 
@@ -92,26 +82,23 @@ class PathTolerance(Request):
         "Largest distance of the TCP.",
         "m",
         1e-4,
-        default=POSITION_TOLERANCE,
-        ge=LEAST_TOLERANCE,
+        default=TOOL_PATH.position_tolerance,
+        ge=TOOL_PATH.least_tolerance,
         le=0.1,
     )
     rotation: float = described(
         "Largest angle of the tool.",
         "rad",
         2e-3,
-        default=ROTATION_TOLERANCE,
-        ge=LEAST_TOLERANCE,
+        default=TOOL_PATH.rotation_tolerance,
+        ge=TOOL_PATH.least_tolerance,
         le=0.5,
     )
     about: Axis | None = described(
         "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must "
-        "to follow the path, "
-        "and as needs least energy. `rotation` is for the direction of this axis then. At both "
-        "ends "
-        "the tool has its full orientation, unless that is `free_about` the same axis. Null: the "
-        "orientation is that "
-        "of the path.",
+        "to follow the path, and as needs least energy. `rotation` is for the direction of this "
+        "axis then. At both ends the tool has its full orientation, unless that is `free_about` "
+        "the same axis. Null: the orientation is that of the path.",
         "1",
         [0.0, 0.0, 1.0],
         default=None,
@@ -121,18 +108,16 @@ class PathTolerance(Request):
 class _OnPath(Request):
     shape: PathShape = described(
         "`lines`: straight from pose to pose, with rounded corners. `curve`: smoothly through "
-        "every pose, as through "
-        "those of a recorded curve. `arc`: on the circle through the start, the one pose between "
-        "and the end.",
+        "every pose, as through those of a recorded curve. `arc`: on the circle through the start, "
+        "the one pose between and the end.",
         None,
         "lines",
         default="lines",
     )
     blend: float = described(
         "Length of path before and after each pose between start and end on which a smooth curve "
-        "replaces the corner "
-        "of two lines. Needed where there are such poses, as the arm cannot turn a sharp corner "
-        "without a stop.",
+        "replaces the corner of two lines. Needed where there are such poses, as the arm cannot "
+        "turn a sharp corner without a stop.",
         "m",
         0.02,
         default=0.0,
@@ -167,8 +152,7 @@ class Path(_OnPath):
 
     via: Annotated[list[BasePose], Field(max_length=max(MOST_POINTS.values()))] = described(
         f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, "
-        f"{MOST_POINTS['curve']} of "
-        "a curve, exactly one of an arc.",
+        f"{MOST_POINTS['curve']} of a curve, exactly one of an arc.",
         None,
         [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
         default=[],
@@ -183,10 +167,9 @@ class StopPath(_OnPath):
         list[TargetPose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)
     ] = described(
         f"Poses of the TCP: 2 to {MOST_POINTS['lines'] + 2} of lines, to "
-        f"{MOST_POINTS['curve'] + 2} of a curve, "
-        "exactly three of an arc. The first and the last may be `free_about` the axis "
-        "`tolerance.about`: then the "
-        "angles of the tool there are chosen for the whole cycle.",
+        f"{MOST_POINTS['curve'] + 2} of a curve, exactly three of an arc. The first and the last "
+        "may be `free_about` the axis `tolerance.about`: then the angles of the tool there are "
+        "chosen for the whole cycle.",
         None,
         [
             {"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
@@ -195,10 +178,9 @@ class StopPath(_OnPath):
     )
     split: bool = described(
         "Whether a path that no arm configuration follows whole is divided: into as few parts as "
-        "possible, with moves "
-        "from one configuration to another between them. Each part is a stop of its own: `NAME/1`, "
-        "`NAME/2` and so on, "
-        "the last one `NAME`; each has the lines of the stop.",
+        "possible, with moves from one configuration to another between them. Each part is a stop "
+        "of its own: `NAME/1`, `NAME/2` and so on, the last one `NAME`; each has the lines of the "
+        "stop.",
         None,
         True,
         default=False,
@@ -212,8 +194,7 @@ class StopPath(_OnPath):
                 raise PydanticCustomError(
                     "full_orientation",
                     "Only the first and the last pose may leave the orientation free: give pose "
-                    "{number} a "
-                    "quaternion, rpy or rotvec",
+                    "{number} a quaternion, rpy or rotvec",
                     {"number": k},
                 )
         return points
@@ -236,6 +217,10 @@ class Line(Request):
         default="tcp",
     )
     distance: float = described(
-        "Length of the line.", "m", 0.08, ge=LEAST_DISTANCE, le=MOST_DISTANCE
+        "Length of the line.",
+        "m",
+        0.08,
+        ge=LINE_RANGES.least_distance,
+        le=LINE_RANGES.greatest_distance,
     )
     speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)

@@ -19,11 +19,11 @@ from joulepath.app.schemas.common import (
 from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
-from joulepath.optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
+from joulepath.optimizer.problem.problem import DURATIONS, BoundEffort, MethodName
 from joulepath.optimizer.result.energy import Objective
 
-Seconds = Annotated[float, Field(ge=1e-3, le=LONGEST_DURATION)]
+Seconds = Annotated[float, Field(ge=1e-3, le=DURATIONS.longest)]
 
 
 WhichCandidates = Literal["all", "computed", "none"]
@@ -33,10 +33,9 @@ def which_candidates() -> Any:
     """The field `candidates` of a request."""
     return described(
         "Candidates that the answer lists. `computed`: those for which a motion was computed, "
-        "found or not (`solved`, "
-        "`failed`, and `pruned` on the way). `all`: also those that were ruled out or not reached, "
-        "thousands for two "
-        "poses. `none`: no candidates. `candidate_counts` counts all of them in any case.",
+        "found or not (`solved`, `failed`, and `pruned` on the way). `all`: also those that were "
+        "ruled out or not reached, thousands for two poses. `none`: no candidates. "
+        "`candidate_counts` counts all of them in any case.",
         None,
         "all",
         default="computed",
@@ -56,8 +55,7 @@ class PoseTarget(Request):
 
     pose: TargetPose = described(
         "Pose of the TCP in the robot's base frame, or in its `frame`. The orientation of a goal "
-        "may be free in part, "
-        "and that of a start with a `path`.",
+        "may be free in part, and that of a start with a `path`.",
         None,
         {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
     )
@@ -143,8 +141,7 @@ class Holding(Request):
 
     hold: Literal["motors", "brakes"] = described(
         "`motors`: the motors hold the arm during the wait. `brakes`: the motors hold it for "
-        "`brake_delay`, then the "
-        "brakes.",
+        "`brake_delay`, then the brakes.",
         None,
         "brakes",
         default="motors",
@@ -155,7 +152,7 @@ class Holding(Request):
         0.5,
         default=0.0,
         ge=0,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
     brake_power: Annotated[float, Field(ge=0, le=1e4)] | None = described(
         "Power drawn while the brakes hold, electronics included. Null: the power of the "
@@ -192,18 +189,16 @@ class MotionRequest(ArmRequest):
     )
     objective: Objective = described(
         "Energy that is minimised. `electrical`: energy drawn from the supply. `mechanical`: work "
-        "of the joints "
-        "without friction, ∫ Σ_j |tau_j v_j| dt.",
+        "of the joints without friction, ∫ Σ_j |tau_j v_j| dt.",
         None,
         "electrical",
         default="electrical",
     )
     duration: Duration | None = described(
         "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective "
-        "`mechanical` needs a "
-        "number, a `max` or a `dwell`, because a slower motion needs less work. The duration is at "
-        "most "
-        f"{LONGEST_DURATION:g} s and at most {MOST_SAMPLES} times `sample_period`.",
+        "`mechanical` needs a number, a `max` or a `dwell`, because a slower motion needs less "
+        f"work. The duration is at most {DURATIONS.longest:g} s and at most "
+        f"{MOTION_LIMITS.max_samples} times `sample_period`.",
         "s",
         {"max": 3.0},
         default=None,
@@ -241,8 +236,7 @@ class MotionRequest(ArmRequest):
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
-        "passes, the service "
-        "returns the best certified motion found so far.",
+        "passes, the service returns the best certified motion found so far.",
         "s",
         10.0,
         default=10.0,
@@ -255,14 +249,13 @@ class MotionRequest(ArmRequest):
     def _few_enough_samples(cls, period: float, info: ValidationInfo) -> float:
         duration = info.data.get("duration")
         longest = duration.max or duration.min if isinstance(duration, DurationRange) else duration
-        if longest is not None and longest > period * MOST_SAMPLES:
-            least = math.ceil(longest / MOST_SAMPLES * 1e4) / 1e4
+        if longest is not None and longest > period * MOTION_LIMITS.max_samples:
+            least = math.ceil(longest / MOTION_LIMITS.max_samples * 1e4) / 1e4
             raise PydanticCustomError(
                 "too_many_samples",
                 "An answer has at most {most} samples: for a `duration` of up to {longest} s, "
-                "`sample_period` must be "
-                "at least {least} s",
-                {"most": MOST_SAMPLES, "longest": longest, "least": least},
+                "`sample_period` must be at least {least} s",
+                {"most": MOTION_LIMITS.max_samples, "longest": longest, "least": least},
             )
         return period
 
@@ -272,40 +265,31 @@ class OptimizeRequest(MotionRequest):
 
     method: MethodName = described(
         "How the motion is parametrised. `bspline`: one B-spline per joint. `time_scaling`: the "
-        "straight line in joint "
-        "space with an optimised time scaling. `lagrange`: one polynomial per joint, given by its "
-        "values at Chebyshev "
-        "nodes. `uniform_scaling`: the time-optimal motion, uniformly slowed down. "
-        "`polynomial_ga`: one polynomial per "
-        "joint, found by a genetic algorithm for at most three candidates; it takes seconds, and "
-        "its `status` is never "
-        "`optimal`. Every method goes around obstacles; where their own path collides, "
-        "`time_scaling` and "
-        "`uniform_scaling` follow a planned path.",
+        "straight line in joint space with an optimised time scaling. `lagrange`: one polynomial "
+        "per joint, given by its values at Chebyshev nodes. `uniform_scaling`: the time-optimal "
+        "motion, uniformly slowed down. `polynomial_ga`: one polynomial per joint, found by a "
+        "genetic algorithm for at most three candidates; it takes seconds, and its `status` is "
+        "never `optimal`. Every method goes around obstacles; where their own path collides, "
+        "`time_scaling` and `uniform_scaling` follow a planned path.",
         None,
         "bspline",
         default="bspline",
     )
     path: Path | None = described(
         "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. "
-        "The orientation of "
-        "either may be `free_about` the axis `tolerance.about`. `method` and `windings` do not "
-        "matter. Null: the "
-        "motion is free.",
+        "The orientation of either may be `free_about` the axis `tolerance.about`. `method` and "
+        "`windings` do not matter. Null: the motion is free.",
         None,
         {"tolerance": {"position": 1e-4}},
         default=None,
     )
     bound: BoundEffort = described(
         "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the "
-        "answer get a second, "
-        "greater one, which takes the copper loss of holding against gravity into account. It "
-        "takes about a second per "
-        "candidate, lowest bound first, and ends before the `deadline`. For the objective "
-        "`electrical`. The bound of a "
-        "free orientation gets more effort, too. For the objective `mechanical`, candidates that "
-        "differ by full "
-        "turns of the outer joints are all solved, unless their bounds rule them out.",
+        "answer get a second, greater one, which takes the copper loss of holding against gravity "
+        "into account. It takes about a second per candidate, lowest bound first, and ends before "
+        "the `deadline`. For the objective `electrical`. The bound of a free orientation gets more "
+        "effort, too. For the objective `mechanical`, candidates that differ by full turns of the "
+        "outer joints are all solved, unless their bounds rule them out.",
         None,
         "normal",
         default="normal",

@@ -21,13 +21,13 @@ from joulepath.app.schemas.common import (
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.figures import FIGURES_ID
 from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
-from joulepath.app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.result.energy import Objective
 
-Name = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
-IdempotencyKey = Annotated[str, Field(min_length=1, max_length=KEY_LENGTH, pattern=r"^[!-~]+$")]
+Name = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS), PLAIN]
+IdempotencyKey = Annotated[str, Field(min_length=1, max_length=LENGTHS.key, pattern=r"^[!-~]+$")]
 
 
 class StudyRequest(Request):
@@ -110,15 +110,13 @@ class Iteration(Response):
     duration: float = described("Duration of the motion.", "s", 1.33)
     change_from_last: float | None = described(
         "Energy minus the energy of the previous iteration; a negative value is a saving. Null for "
-        "the first "
-        "iteration.",
+        "the first iteration.",
         "J",
         -38.6,
     )
     change_from_best: float | None = described(
         "Energy minus the least energy of all previous iterations; negative if this iteration is "
-        "the best so far. Null "
-        "for the first iteration.",
+        "the best so far. Null for the first iteration.",
         "J",
         -4.1,
     )

@@ -1,4 +1,4 @@
-"""Stored answers. Each function works on a session: `await store.write(partial(put, …))`."""
+"""Stored answers. All functions take a session: `await store.write(partial(put, …))`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def put(
 
 
 def put_of_job(session: Session, kind: str, compressed: StoredAnswer, job: Job) -> None:
-    """Stores an answer that is compressed already. It stays until its job is deleted."""
+    """Stores a compressed answer until the deletion of its job."""
     session.add(_row(kind, compressed, job_id=job.id, owner=job.owner))
 
 
@@ -56,7 +56,7 @@ def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
 
 
 def of_job(session: Session, job_id: str, kind: str) -> bytes | None:
-    """The compressed answer of this kind that a job has, if it has one."""
+    """The compressed answer of this kind of a job; None without one."""
     return session.scalar(select(Answer.body).where(Answer.job_id == job_id, Answer.kind == kind))
 
 
@@ -88,8 +88,9 @@ def delete(session: Session, answer_id: str, client: Client) -> None:
 
 
 def prune(session: Session, max_bytes: int, max_age: timedelta) -> None:
-    """Deletes answers of no study and no job: those older than `max_age`, then the oldest until the
-    rest fit `max_bytes`."""
+    """Deletes answers without study or job: older than `max_age`, then the oldest above
+    `max_bytes`.
+    """
     free = and_(Answer.study_id.is_(None), Answer.job_id.is_(None))
     session.execute(delete_from(Answer).where(free, Answer.created < now() - max_age))
     newest_first = func.sum(Answer.size).over(order_by=(Answer.created.desc(), Answer.id))

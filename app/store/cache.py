@@ -1,4 +1,4 @@
-"""Stored answers by the requests that they answer. Each function works on a session."""
+"""Stored answers by their requests. All functions take a session."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from joulepath.app.store.tables import Answer, CachedAnswer
 
 
 class Meaning(TypedDict):
-    """What a request means to a version of the service: the hash of its canonical form, and the
-    name of its robot.
+    """The meaning of a request in a version of the service: hash of its canonical form, robot.
 
-    Of a cycle also its cell, see `KnownMotion`.
+    A cycle also has the key of its cell, see `KnownMotion`.
     """
 
     version: str
@@ -28,7 +27,7 @@ class Meaning(TypedDict):
 
 @dataclass(frozen=True)
 class Asked:
-    """A request as the cache knows it: what tells it from others, and its deadline [s]."""
+    """Key of a request in the cache, and its deadline [s]."""
 
     key: str
     deadline: float
@@ -36,7 +35,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Answered:
-    """A request, the id of the answer to it, and whether no more time would make that better."""
+    """A request, the id of its answer, and whether more time could not improve the answer."""
 
     asked: Asked
     answer_id: str
@@ -44,9 +43,9 @@ class Answered:
 
 
 def find(session: Session, asked: Sequence[Asked]) -> dict[Asked, Answer]:
-    """The stored answers to some of these requests.
+    """Stored answers to these requests, as far as there are any.
 
-    An answer that is not optimal does for requests with the same deadline or a shorter one.
+    A suboptimal answer suffices for requests with the same or a shorter deadline.
     """
     query = select(CachedAnswer, Answer).join(Answer, Answer.id == CachedAnswer.answer_id)
     query = query.where(CachedAnswer.key.in_({each.key for each in asked}))
@@ -60,10 +59,9 @@ def find(session: Session, asked: Sequence[Asked]) -> dict[Asked, Answer]:
 
 
 def remember(session: Session, answered: Iterable[Answered]) -> None:
-    """Has stored answers answer these requests from now on. Nothing takes the place of an optimal
-    one but another.
+    """Links requests to stored answers. Only an optimal answer may replace an optimal one.
 
-    It never waits for a request that somebody else is remembering, and fails for none.
+    Requests locked by another writer are skipped without waiting.
     """
     new = {each.asked.key: each for each in answered}
     if not new:
@@ -85,5 +83,5 @@ def remember(session: Session, answered: Iterable[Answered]) -> None:
 
 
 def _longest(own: Answered) -> float | None:
-    """Longest deadline [s] of a request that it answers; None if that does not matter."""
+    """Longest deadline [s] of a request with this answer; None for any deadline."""
     return None if own.is_optimal else own.asked.deadline

@@ -7,6 +7,7 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from alembic import command
@@ -25,30 +26,37 @@ logger = logging.getLogger(__name__)
 OPENED = "opened"
 """Key of the identity of a connection's files, in the connection's `info`; empty for PostgreSQL."""
 _MIGRATIONS = Path(__file__).parent / "migrations"
-_LOCK_TIMEOUT = 2.0
-"""Longest wait [s] of a statement for another process's transaction."""
-_RETRY = 0.02
-"""Time [s] between two attempts to get a lock for which SQLite does not wait by itself."""
-_MIGRATION_TIMEOUT = 30.0
-"""The same, while another process may be migrating the tables."""
-_SERVER_TIMEOUT = 5.0
-"""Longest wait [s] for an answer of PostgreSQL."""
+
+
+@dataclass(frozen=True)
+class DatabaseSettings:
+    """Time-outs of the database."""
+
+    lock_timeout: float = 2.0
+    """Longest wait [s] of a statement for another process's transaction."""
+    retry: float = 0.02
+    """Time [s] between two attempts for a lock if SQLite does not wait for it."""
+    migration_timeout: float = 30.0
+    """The same, while another process may be migrating the tables."""
+    server_timeout: float = 5.0
+    """Longest wait [s] for an answer of PostgreSQL."""
+
+
+DATABASE = DatabaseSettings()
+
 _PAGES = ("freelist_count", "page_size")
 _MIGRATION_LOCK = 0x6A6F756C65
-"""Key of the advisory lock in PostgreSQL: any number that no other program uses in this
-database."""
+"""Key of the advisory lock in PostgreSQL, different from the keys of other programs."""
 
 
 class OtherVersion(CommandError):
-    """Another version of the service made the database; `revision` is that of its tables."""
+    """The database belongs to another version of the service; `revision` of its tables."""
 
     def __init__(self, revision: str, url: URL) -> None:
         super().__init__(
             f"Another version of the service made the tables of {url.render_as_string()} (revision "
-            f"{revision}), and "
-            "this one cannot migrate them: start that version, or move the database away (or set "
-            "another "
-            "JOULEPATH_DATABASE_URL), and a new one is made."
+            f"{revision}), and this one cannot migrate them: start that version, or move the "
+            "database away (or set another JOULEPATH_DATABASE_URL), and a new one is made."
         )
 
 
@@ -61,18 +69,18 @@ def create_database_engine(url: str) -> Engine:
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite":
         return _sqlite(parsed)
-    return _postgresql(parsed, _SERVER_TIMEOUT)
+    return _postgresql(parsed, DATABASE.server_timeout)
 
 
 def _postgresql(url: URL, timeout: float) -> Engine:
-    """An engine that waits `timeout` [s] for each answer of the server."""
+    """An engine with a `timeout` [s] for every answer of the server."""
     # pg8000: its licence permits redistribution, and it needs no C library
     engine = create_engine(
         url.set(drivername="postgresql+pg8000"),
         connect_args={"timeout": timeout},
         # after a restart of the server, the connections of the pool are closed
         pool_pre_ping=True,
-        pool_timeout=_SERVER_TIMEOUT,
+        pool_timeout=DATABASE.server_timeout,
     )
 
     @event.listens_for(engine, "begin")
@@ -91,19 +99,18 @@ def sqlite_file(url: URL) -> Path | None:
 def _lock_timeout(connection: Connection) -> int:
     """Longest wait for a lock in this transaction [ms]."""
     migrates = connection.get_execution_options().get("migrates", False)
-    return int(1000 * (_MIGRATION_TIMEOUT if migrates else _LOCK_TIMEOUT))
+    return int(1000 * (DATABASE.migration_timeout if migrates else DATABASE.lock_timeout))
 
 
 def _sqlite(url: URL) -> Engine:
-    engine = create_engine(url, pool_timeout=_LOCK_TIMEOUT)
+    engine = create_engine(url, pool_timeout=DATABASE.lock_timeout)
     file = sqlite_file(url)
 
     @event.listens_for(engine, "connect")
     def configure(connection: sqlite3.Connection, record: ConnectionPoolEntry) -> None:
         connection.isolation_level = None  # `begin` below starts each transaction, also around DDL
-        # FULL: a committed transaction survives a killed process and a power failure
-        # secure_delete=FAST: with ON, the default of some builds, deleting needs as much space as
-        # what is deleted
+        # FULL: a committed transaction survives a killed process and a power failure.
+        # secure_delete=FAST: ON, the default of some builds, needs space for deletions.
         _keep_log(connection)
         for pragma in ("synchronous=FULL", "foreign_keys=ON", "secure_delete=FAST"):
             connection.execute(f"PRAGMA {pragma}")
@@ -112,8 +119,7 @@ def _sqlite(url: URL) -> Engine:
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
-        # without IMMEDIATE, a transaction that reads and then writes fails if another one writes in
-        # between
+        # Without IMMEDIATE, a transaction fails if another one writes between its read and write.
         check(connection.info[OPENED])
         writes = connection.get_execution_options().get("writes", False)
         connection.exec_driver_sql(f"PRAGMA busy_timeout = {_lock_timeout(connection)}")
@@ -123,9 +129,11 @@ def _sqlite(url: URL) -> Engine:
 
 
 def _keep_log(connection: sqlite3.Connection) -> None:
-    """Has the file keep a write-ahead log. Where two processes do so to a new file at once, SQLite
-    fails one of them instead of waiting."""
-    end = time.monotonic() + _LOCK_TIMEOUT
+    """Switches the file to a write-ahead log.
+
+    SQLite fails instead of waiting if two processes do so to a new file at once.
+    """
+    end = time.monotonic() + DATABASE.lock_timeout
     while True:
         try:
             connection.execute("PRAGMA journal_mode=WAL")
@@ -133,14 +141,13 @@ def _keep_log(connection: sqlite3.Connection) -> None:
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > end:
                 raise
-        time.sleep(_RETRY)
+        time.sleep(DATABASE.retry)
 
 
 def migrate(engine: Engine) -> None:
-    """Migrates the tables to this version. Several processes may call it at the same time: one
-    works, the others wait.
+    """Migrates the tables to this version; concurrent processes wait for the first one.
 
-    Raises OtherVersion if the database has tables of which this version has no migration.
+    Raises OtherVersion if this version has no migration for the tables.
     """
     file = sqlite_file(engine.url)
     if file is not None:
@@ -148,7 +155,7 @@ def migrate(engine: Engine) -> None:
     config = Config()
     config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
     with engine.connect() as connection:
-        # without a lock, so that a database that cannot be written can be read
+        # Read without a lock, in case the database is read-only.
         present = MigrationContext.configure(connection).get_current_revision()
     scripts = ScriptDirectory.from_config(config)
     if present == scripts.get_current_head():
@@ -164,14 +171,14 @@ def migrate(engine: Engine) -> None:
 
 @contextmanager
 def _migrating(engine: Engine) -> Iterator[Connection]:
-    """A transaction in which no other process changes the tables."""
+    """A transaction with exclusive access to the tables."""
     if engine.dialect.name == "sqlite":
         with engine.execution_options(writes=True, migrates=True).begin() as connection:
             yield connection
         return
     # a connection of the pool would give up on the lock, or on a long change of a table, after
     # `_SERVER_TIMEOUT`
-    patient = _postgresql(engine.url, _MIGRATION_TIMEOUT + _SERVER_TIMEOUT)
+    patient = _postgresql(engine.url, DATABASE.migration_timeout + DATABASE.server_timeout)
     try:
         with patient.execution_options(migrates=True).begin() as connection:
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _MIGRATION_LOCK})
@@ -181,7 +188,7 @@ def _migrating(engine: Engine) -> Iterator[Connection]:
 
 
 def room_inside(session: Session) -> int:
-    """Bytes of an SQLite database that hold nothing and are used before its file grows."""
+    """Free bytes within the file of an SQLite database."""
     pages, size = (
         session.connection().exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in _PAGES
     )
@@ -195,7 +202,7 @@ def is_writable(session: Session) -> bool:
     connection = session.connection()
     if connection.dialect.name == "postgresql":
         return str(connection.exec_driver_sql("SHOW transaction_read_only").scalar_one()) == "off"
-    # SQLite begins a transaction that writes on a read-only database, too
+    # SQLite allows the start of a write transaction on a read-only database.
     connection.exec_driver_sql("UPDATE alembic_version SET version_num = version_num")
     session.rollback()
     return True

@@ -1,4 +1,4 @@
-"""What can be wrong with the database, by what its driver says."""
+"""Faults of the database, by the errors of its driver."""
 
 from __future__ import annotations
 
@@ -21,19 +21,18 @@ _POSTGRESQL: dict[str, StoreFault] = {"53100": "full", "25006": "read-only", "55
 
 
 class DatabaseMoved(OSError):
-    """The file of the database is not the one that was opened."""
+    """The file of the database was replaced after it was opened."""
 
 
 def fault_of(error: Exception, file: Path | None) -> StoreFault:
-    """The fault that an error of the driver shows; `file` is that of an SQLite database."""
+    """The fault behind an error of the driver; `file` is the file of an SQLite database."""
     if isinstance(error, DatabaseMoved):
         return "deleted"
     if not isinstance(error, DBAPIError):
         return "unreachable"
     code = getattr(error.orig, "sqlite_errorcode", None)
     if code is not None:
-        # the memory map beside the file grows by an I/O error where the file itself reports a full
-        # disk
+        # On a full disk, the memory map beside the file reports an I/O error.
         full = code & 0xFF == _SQLITE_IO_ERROR and file is not None and room(file) < LEAST_ROOM
         return "full" if full else _SQLITE.get(code & 0xFF, "unreachable")
     told: Any = error.orig.args[0] if error.orig is not None and error.orig.args else None
@@ -45,6 +44,6 @@ def fault_of(error: Exception, file: Path | None) -> StoreFault:
 
 
 def room(file: Path) -> int:
-    """Free bytes of the file system that holds `file`. Raises OSError."""
+    """Free bytes of the file system of `file`. Raises OSError."""
     free = os.statvfs(file.parent)
     return free.f_bavail * free.f_frsize

@@ -1,6 +1,4 @@
-"""Figures identified on one arm. Each function works on a session: `await store.write(partial(put,
-…))`.
-"""
+"""Figures identified on one arm. All functions take a session."""
 
 from __future__ import annotations
 
@@ -20,8 +18,10 @@ _SPACE = uuid.UUID("6d0c5a0e-7b0e-5d5f-9a53-1d1f5b1c4a9e")
 
 
 def new_figures(robot: str, content: dict[str, Any], owner: str | None) -> Figures:
-    """Figures that take the place of the robot's own, as
-    `joulepath.models.uncertainty.document.replaced_in` gives them; not yet in the database."""
+    """Figures replacing the robot's own, not yet in the database.
+
+    `content` is the result of `joulepath.models.uncertainty.document.replaced_in`.
+    """
     text = json.dumps([robot, content], sort_keys=True)
     return Figures(
         id=str(uuid.uuid5(_SPACE, text)), robot=robot, created=now(), owner=owner, content=content
@@ -29,9 +29,9 @@ def new_figures(robot: str, content: dict[str, Any], owner: str | None) -> Figur
 
 
 def put(session: Session, figures: Figures, most: int) -> tuple[Figures, bool]:
-    """Adds figures; returns those of this id, and whether they are new.
+    """Adds figures; returns the figures of this id, and whether they are new.
 
-    Raises TooManyFigures if they are one more than `most`.
+    Raises TooManyFigures above `most`.
     """
     known = session.get(Figures, figures.id)
     if known is not None:
@@ -56,7 +56,7 @@ def get(session: Session, id: str) -> Figures:
 
 
 def delete(session: Session, id: str, client: Client) -> None:
-    """Deletes figures. Raises UnknownFigures, NotOwner, or FiguresInUse while a study uses them."""
+    """Deletes figures. Raises UnknownFigures, NotOwner, or FiguresInUse by a study."""
     figures = get(session, id)
     check_owner(client, figures.owner)
     if session.scalar(select(Study.id).where(Study.figures == id).limit(1)) is not None:

@@ -1,4 +1,4 @@
-"""Events of a job, numbered in the job: whoever missed some can ask for those after a number."""
+"""Events of a job, with consecutive numbers: a client can ask for all events after a number."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from joulepath.app.store.tables import Job, JobEvent, JobRequest
 PROGRESS_PERIOD = timedelta(seconds=0.5)
 """Least time between two events `progress`."""
 STATES = ("waiting", "running", "done", "failed", "cancelled")
-"""States of a request, in the order in which counts have them."""
+"""States of a request, in the order of counts."""
 ENDED = ("done", "failed", "cancelled")
 
 Counts = dict[str, int]
@@ -42,7 +42,7 @@ class Report:
 
 
 def counts_of(session: Session, job_ids: list[str]) -> dict[str, Counts]:
-    """Number of requests in each state, by job."""
+    """Number of requests by job and state."""
     counts = {job_id: dict.fromkeys(STATES, 0) for job_id in job_ids}
     query = select(JobRequest.job_id, JobRequest.state, func.count()).where(
         JobRequest.job_id.in_(job_ids)
@@ -55,20 +55,20 @@ def counts_of(session: Session, job_ids: list[str]) -> dict[str, Counts]:
 
 
 def record(session: Session, job: Job, name: str, data: Mapping[str, Any]) -> None:
-    """Adds the next event of a job, whose row must be locked."""
+    """Adds the next event of a job; its row must be locked."""
     job.events += 1
     session.add(JobEvent(job_id=job.id, number=job.events, name=name, data=dict(data)))
 
 
 def set_state(session: Session, job: Job, state: str) -> None:
-    """Changes the state of a job, whose row must be locked."""
+    """Changes the state of a job; its row must be locked."""
     if job.state != state:
         job.state = state
         record(session, job, "state", {"state": state})
 
 
 def request_ended(session: Session, job: Job, request: JobRequest) -> None:
-    """Records that a request of the job has ended."""
+    """Records the end of a request of the job."""
     record(
         session,
         job,
@@ -115,7 +115,7 @@ def record_progress(
 
 
 def progress(job: Job, counts: Counts) -> float:
-    """Share of the requests that have ended."""
+    """Share of ended requests."""
     return sum(counts[state] for state in ENDED) / job.total
 
 
@@ -129,10 +129,8 @@ def eta(job: Job, counts: Counts, now: datetime) -> float | None:
 
 
 def after(session: Session, job_id: str, number: int, limit: int) -> tuple[list[JobEvent], bool]:
-    """Up to `limit` events after that of `number`, and whether nothing can follow them until the
-    job is retried.
-    """
-    # the job first: events that are recorded in between only make the second value False
+    """Up to `limit` events after `number`, and whether they are the last ones before a retry."""
+    # The job is read first: events in between only make the second value False.
     job = session.get(Job, job_id)
     query = select(JobEvent).where(JobEvent.job_id == job_id, JobEvent.number > number)
     found = list(session.scalars(query.order_by(JobEvent.number).limit(limit)))

@@ -1,6 +1,4 @@
-"""Jobs as clients see them. Each function works on a session: `await store.write(partial(create,
-…))`.
-"""
+"""Jobs from the view of clients. All functions take a session."""
 
 from __future__ import annotations
 
@@ -35,8 +33,11 @@ Ts = TypeVarTuple("Ts")
 
 @dataclass(frozen=True)
 class NewRequest:
-    """A validated request to the endpoint `kind`: its `body`, compressed JSON, its deadline [s],
-    and what it means, if an equal one may answer it."""
+    """A validated request to the endpoint `kind`.
+
+    It has a `body` of compressed JSON, a deadline [s], and its meaning, if the answer to an equal
+    request may be used.
+    """
 
     kind: str
     body: bytes
@@ -46,7 +47,7 @@ class NewRequest:
 
 @dataclass(frozen=True)
 class NewJob:
-    """A job to create; `fingerprint` tells it from any other that may come with the same key."""
+    """A job to create; `fingerprint` distinguishes it from other jobs with the same key."""
 
     requests: Sequence[NewRequest]
     fingerprint: str
@@ -56,7 +57,7 @@ class NewJob:
 
 @dataclass(frozen=True)
 class JobView:
-    """A job and the number of its requests in each state."""
+    """A job and the numbers of its requests by state."""
 
     job: Job
     counts: Counts
@@ -65,10 +66,9 @@ class JobView:
 def create(
     session: Session, new: NewJob, key: str | None, most_waiting: int, owner: str | None = None
 ) -> tuple[str, bool]:
-    """Adds a job and returns its id with False; if its key is known, the id of that job with True.
+    """Adds a job; returns its id, and whether a job with this key existed already.
 
-    Raises KeyReused if that job differs, or TooManyWaiting if more than `most_waiting` requests
-    would wait.
+    Raises KeyReused if the existing job differs, or TooManyWaiting above `most_waiting` requests.
     """
     if key is not None:
         known = session.scalar(select(Job).where(Job.idempotency_key == key))
@@ -124,8 +124,11 @@ def page(
 def page_of_kind(
     session: Session, kind: str, limit: int, after: str | None
 ) -> tuple[list[tuple[Job, JobRequest, str | None]], str | None]:
-    """Up to `limit` jobs of one request to the endpoint `kind`, newest first, each with it and the
-    robot of its answer; and the `after` of the next page, None on the last page."""
+    """Up to `limit` jobs of one request to the endpoint `kind`, newest first.
+
+    Returns jobs, requests and robots of the answers, and the `after` of the next page; None on the
+    last page.
+    """
     query = select(Job, JobRequest, Answer.robot).join(JobRequest, JobRequest.job_id == Job.id)
     query = query.outerjoin(Answer, Answer.id == JobRequest.answer_id)
     query = query.where(Job.total == 1, JobRequest.kind == kind).options(
@@ -154,14 +157,14 @@ def requests(session: Session, job_id: str, limit: int, after: int) -> list[JobR
 
 
 def ended(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:
-    """As `requests`, of those that have ended."""
+    """Ended requests, otherwise as `requests`."""
     return _page(session, job_id, limit, after, JobRequest.state.in_(ENDED))
 
 
 def results(
     session: Session, job_id: str, limit: int, after: int
 ) -> list[tuple[JobRequest, bytes | None]]:
-    """As `ended`, each with the compressed body of its answer; None if it has none."""
+    """Ended requests with the compressed bodies of their answers; None without an answer."""
     found = ended(session, job_id, limit, after)
     query = select(Answer.id, Answer.body).where(
         Answer.id.in_([request.answer_id for request in found])
@@ -171,8 +174,9 @@ def results(
 
 
 def cancel(session: Session, job_id: str, client: Client) -> None:
-    """Cancels what waits, and asks for the end of what runs. Raises UnknownJob, NotOwner or
-    JobNotCancellable.
+    """Cancels waiting requests, and asks for the end of running ones.
+
+    Raises UnknownJob, NotOwner or JobNotCancellable.
     """
     job = _job(session, job_id, lock=True)
     check_owner(client, job.owner)
@@ -183,11 +187,9 @@ def cancel(session: Session, job_id: str, client: Client) -> None:
 
 
 def stop(session: Session, job: Job, at: datetime) -> None:
-    """Cancels what waits of a job, whose row must be locked. What runs is for those who run it to
-    stop.
-    """
+    """Cancels waiting requests of a job with a locked row; holders stop running ones."""
     set_state(session, job, "cancelling")
-    # a row that is locked is about to be leased: whoever leases it sees the state of the job
+    # A locked row is about to be leased: the holder will see the state of the job.
     query = select(JobRequest).where(JobRequest.job_id == job.id, JobRequest.state == "waiting")
     for request in session.scalars(
         query.options(defer(JobRequest.body)).with_for_update(skip_locked=True)
@@ -221,7 +223,7 @@ def delete(session: Session, job_id: str, client: Client) -> None:
     """Deletes a job, its requests, their answers and its events. Raises UnknownJob or NotOwner."""
     job = _job(session, job_id)
     check_owner(client, job.owner)
-    # in the order in which those who work on the job lock its rows
+    # in the order in which holders lock the rows of a job
     session.execute(
         select(JobRequest.number).where(JobRequest.job_id == job.id).with_for_update()
     ).all()
@@ -229,7 +231,7 @@ def delete(session: Session, job_id: str, client: Client) -> None:
 
 
 def prune(session: Session, max_age: timedelta) -> None:
-    """Deletes jobs that ended longer ago than `max_age`, with their answers."""
+    """Deletes jobs and their answers `max_age` after their end."""
     _delete(session, list(session.scalars(select(Job.id).where(Job.ended < now() - max_age))))
 
 

@@ -1,9 +1,12 @@
-"""Motions of moves of cycles, by what was asked: cycles of the same arm in the same cell have moves
-in common. Each function works on a session."""
+"""Motions of cycles by their requests: cycles of one arm in one cell may share moves.
+
+All functions take a session.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from sqlalchemy import delete, select
 from sqlalchemy.dialects import postgresql, sqlite
@@ -11,26 +14,35 @@ from sqlalchemy.orm import Session
 
 from joulepath.app.store.tables import KnownMotion, now
 
-MOST_OF_A_CELL = 400
-"""Motions that a cycle is given: those of its cell that were used last, some 1 kB each."""
-MOST = 20_000
-"""Motions that are kept in all."""
+
+@dataclass(frozen=True)
+class KnownMotionSettings:
+    """Ceilings of known motions."""
+
+    of_a_cell: int = 400
+    """Most motions given to a cycle: the latest of its cell, some 1 kB each."""
+    total: int = 20_000
+    """Most motions in the database."""
+
+
+KNOWN_MOTIONS = KnownMotionSettings()
 
 
 def find(session: Session, cell: str) -> dict[str, bytes]:
-    """The motions of a cell that were used last, by their keys."""
+    """The latest motions of a cell by their keys."""
     query = select(KnownMotion.key, KnownMotion.body).where(KnownMotion.cell == cell)
     found = session.execute(
-        query.order_by(KnownMotion.used.desc(), KnownMotion.key).limit(MOST_OF_A_CELL)
+        query.order_by(KnownMotion.used.desc(), KnownMotion.key).limit(KNOWN_MOTIONS.of_a_cell)
     )
     return {row.key: row.body for row in found}
 
 
-def keep(session: Session, cell: str, motions: Mapping[str, bytes], most: int = MOST) -> None:
-    """Keeps motions of a cell that were found or used now; those that were not used for longest go,
-    above `most`.
+def keep(
+    session: Session, cell: str, motions: Mapping[str, bytes], most: int = KNOWN_MOTIONS.total
+) -> None:
+    """Keeps found or used motions of a cell; the least recently used are dropped above `most`.
 
-    It never waits for motions that somebody else is keeping, and fails for none.
+    Motions locked by another writer are skipped without waiting.
     """
     if not motions:
         return

@@ -1,9 +1,9 @@
-"""The queue of jobs as those see it who work on it. A lease that ran out is leased again; a late
-result is dropped.
+"""The queue of jobs from the view of holders. Expired leases are leased again, late results
+dropped.
 
-A transaction that holds rows of `job_requests` may wait for rows of `jobs`, in order of their ids.
-One that holds a row of `jobs` never waits for rows of `job_requests`. So no two transactions wait
-for each other.
+A transaction with locked rows of `job_requests` may wait for rows of `jobs`, in order of their ids.
+A transaction with a locked row of `jobs` never waits for rows of `job_requests`. This excludes
+deadlocks.
 """
 
 from __future__ import annotations
@@ -38,9 +38,7 @@ Key = tuple[str, int]
 
 @dataclass(frozen=True)
 class Lease:
-    """A request of `owner` that is to be worked on: compressed JSON `body` of the endpoint `kind`,
-    a deadline [s].
-    """
+    """A leased request of `owner`: compressed JSON `body` of the endpoint `kind`, deadline [s]."""
 
     job_id: str
     number: int
@@ -61,7 +59,7 @@ class Lease:
 
 @dataclass(frozen=True)
 class FoundFigures:
-    """What takes the place of a robot's own figures, see `figures.new_figures`."""
+    """Identified figures of a robot, see `figures.new_figures`."""
 
     robot: str
     content: dict[str, Any]
@@ -69,13 +67,12 @@ class FoundFigures:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the work on a lease ended. `waiting`: it is to be done again.
+    """Outcome of the work on a lease. `waiting`: the request must run again.
 
-    `wall_time` [s] is that of the work. `answer` is the compressed document, and `answer_id` its
-    id, if it says so itself. `parts` are the answers that it refers to, compressed, of the endpoint
-    `parts_kind`. `identified` are the figures of an arm that were found, if any. `is_optimal`: no
-    more time would make the answer better. It answers what was `asked`, too. `motions` are those
-    that a cycle used or found in its cell.
+    `wall_time` [s] is the time of the work. `answer` is the compressed document, `answer_id` the id
+    in it, if any. `parts` are compressed answers of the endpoint `parts_kind` to which it refers.
+    `identified` are figures found for an arm. `is_optimal`: more time could not improve the answer.
+    `asked` is the cache key of the request. `motions` are used or found motions of a cell.
     """
 
     lease: Lease
@@ -98,8 +95,7 @@ class Outcome:
 def lease(
     session: Session, holder: str, count: int, now: datetime, until: datetime
 ) -> tuple[list[Lease], set[str]]:
-    """Up to `count` requests that wait, leased by `holder` until a time; and the jobs that
-    changed."""
+    """Leases up to `count` waiting requests to `holder`; returns them and the changed jobs."""
     _take_back(session, JobRequest.leased_until < now)
     waiting = (
         select(JobRequest)
@@ -145,10 +141,9 @@ def lease(
 def settle(
     session: Session, holder: str, outcomes: Sequence[Outcome], now: datetime, most: int
 ) -> set[str]:
-    """Stores outcomes of the leases that `holder` still has, and drops the others; returns the jobs
-    that changed.
+    """Stores outcomes of valid leases of `holder`, drops others, and returns the changed jobs.
 
-    Of identified figures, the database takes `most`; further ones stay in their answers alone.
+    The database takes at most `most` identified figures; further ones stay in their answers.
     """
     found = _held(session, holder, outcomes)
     held = [
@@ -182,9 +177,7 @@ def settle(
 
 
 def report(session: Session, holder: str, reports: Mapping[Key, Report], now: datetime) -> set[str]:
-    """Records progress within requests that `holder` has leased; returns the jobs whose progress
-    was due.
-    """
+    """Records progress within requests leased by `holder`; returns the jobs with new events."""
     keys = tuple_(JobRequest.job_id, JobRequest.number).in_(list(reports))
     query = select(JobRequest.job_id, JobRequest.number, JobRequest.attempt)
     held = session.execute(
@@ -212,7 +205,7 @@ def renew(session: Session, holder: str, until: datetime) -> None:
 
 
 def kept(session: Session, holder: str) -> set[tuple[Key, int]]:
-    """Requests and attempts that `holder` has leased and nobody has cancelled."""
+    """Requests and attempts leased by `holder` and not cancelled."""
     query = select(JobRequest.job_id, JobRequest.number, JobRequest.attempt).join(
         Job, Job.id == JobRequest.job_id
     )
@@ -234,7 +227,7 @@ def is_due(session: Session, now: datetime) -> bool:
 
 
 def take_back_from(session: Session, is_gone: Callable[[str], bool]) -> None:
-    """Ends the leases of holders that are known to have ended."""
+    """Ends the leases of ended holders."""
     holders = session.scalars(
         select(JobRequest.leased_by).where(JobRequest.state == "running").distinct()
     )
@@ -257,7 +250,7 @@ def _take_back(session: Session, which: Any) -> None:
 def _held(
     session: Session, holder: str, outcomes: Iterable[Outcome]
 ) -> dict[tuple[Key, int], JobRequest]:
-    """The rows of the leases that `holder` still has, by request and attempt."""
+    """The rows of valid leases of `holder`, by request and attempt."""
     query = select(JobRequest).where(
         tuple_(JobRequest.job_id, JobRequest.number).in_(
             [outcome.lease.key for outcome in outcomes]

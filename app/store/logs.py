@@ -1,4 +1,4 @@
-"""Logs of arms. Each function works on a session: `await store.write(partial(add, …))`."""
+"""Logs of arms. All functions take a session."""
 
 from __future__ import annotations
 

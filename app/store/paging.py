@@ -1,4 +1,4 @@
-"""Positions in a list that is shown newest first, page by page."""
+"""Positions in paged lists, newest first."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ _MICROSECOND = timedelta(microseconds=1)
 
 
 class Listed(Protocol):
-    """A row that a list shows."""
+    """A row of a list."""
 
     created: datetime
     id: str
 
 
 def position_of(row: Listed) -> str:
-    """The `after` of the page that follows this row."""
+    """The `after` of the page following this row."""
     return f"{(row.created - _EPOCH) // _MICROSECOND}_{row.id}"
 
 

@@ -1,5 +1,4 @@
-"""Robots that users added. Each function works on a session: `await store.write(partial(put,
-…))`."""
+"""Robots added by users. All functions take a session."""
 
 from __future__ import annotations
 
@@ -15,20 +14,18 @@ from joulepath.optimizer.exceptions import UnknownRobot
 
 
 def check_own(name: str) -> None:
-    """Raises BundledRobot for a robot that comes with the service: nobody adds, replaces or deletes
-    it.
-    """
+    """Raises BundledRobot for a robot of the service, which cannot be changed."""
     if name in robot_names():
         raise BundledRobot
 
 
 def all_of(session: Session) -> list[OwnRobot]:
-    """All robots that users added, by name."""
+    """All added robots, by name."""
     return list(session.scalars(select(OwnRobot).order_by(OwnRobot.name)))
 
 
 def get(session: Session, name: str) -> OwnRobot:
-    """The robot of this name. Raises UnknownRobot, which knows the names of all robots."""
+    """The robot of this name. Raises UnknownRobot with the names of all robots."""
     found = session.get(OwnRobot, name)
     if found is None:
         raise UnknownRobot(name, [*robot_names(), *_own_names(session)])
@@ -40,7 +37,7 @@ def _own_names(session: Session) -> list[str]:
 
 
 def add(session: Session, robot: OwnRobot, most: int) -> None:
-    """Adds a robot. Raises RobotExists, or TooManyRobots if there are `most` of them."""
+    """Adds a robot. Raises RobotExists, or TooManyRobots above `most`."""
     if session.get(OwnRobot, robot.name) is not None:
         raise RobotExists
     _check_count(session, most)
@@ -48,9 +45,9 @@ def add(session: Session, robot: OwnRobot, most: int) -> None:
 
 
 def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
-    """Adds or replaces a robot, which keeps its owner; whether it is new.
+    """Adds a robot, or replaces it under its owner; returns whether it is new.
 
-    Raises NotOwner, or TooManyRobots if it is one more than `most`.
+    Raises NotOwner, or TooManyRobots above `most`.
     """
     known = session.get(OwnRobot, robot.name)
     if known is not None:
@@ -66,8 +63,10 @@ def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
 def delete(session: Session, name: str, client: Client) -> None:
     """Deletes a robot.
 
-    Raises BundledRobot for one that comes with the service, UnknownRobot if there is none, which
-    then knows those that were added, or NotOwner.
+    Raises:
+        BundledRobot: the robot comes with the service.
+        UnknownRobot: there is no such robot; the error has the names of added robots.
+        NotOwner: the robot belongs to another client.
     """
     check_own(name)
     robot = session.get(OwnRobot, name)

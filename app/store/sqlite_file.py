@@ -1,8 +1,7 @@
-"""The file of an SQLite database: which file it is, and bytes beside it that are held back for
-deleting.
+"""The file of an SQLite database: its identity, and space reserved for deletions.
 
-A connection stays on the file that it opened, even if that file is deleted or replaced: it would
-then acknowledge what nobody can ever read again.
+A connection stays on its open file even after the file is deleted or replaced: it would then
+acknowledge lost data.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 from joulepath.app.store.faults import DatabaseMoved, room
@@ -19,20 +19,27 @@ logger = logging.getLogger(__name__)
 Identity = dict[Path, tuple[int, int] | None]
 """Device and number of the database's file and of its write-ahead log."""
 
-_RESERVE = 8 << 20
-"""Bytes that are held back. A deletion writes one page for every thousand that it frees: enough for
-gigabytes.
-"""
-_SMALLEST_RESERVE = 1 << 20
+
+@dataclass(frozen=True)
+class ReserveSettings:
+    """Space reserved for deletions."""
+
+    bytes: int = 8 << 20
+    """Reserved bytes. A deletion writes one page per thousand freed pages: enough for gigabytes."""
+    smallest: int = 1 << 20
+    """Least reserve [byte]; with less free space there is none."""
+
+
+RESERVE = ReserveSettings()
 
 
 def identity(file: Path) -> Identity:
-    """Which files a connection has just opened. It must have read: SQLite opens the log then."""
+    """Identity of the files opened by a connection, after its first read has opened the log."""
     return {path: _number(path) for path in (file, Path(f"{file}-wal"))}
 
 
 def log_size(file: Path) -> int:
-    """Size of the write-ahead log [byte], which is written anew from its beginning."""
+    """Size of the write-ahead log [byte], including reusable space."""
     try:
         return Path(f"{file}-wal").stat().st_size
     except OSError:
@@ -40,7 +47,7 @@ def log_size(file: Path) -> int:
 
 
 def check(opened: Identity) -> None:
-    """Raises DatabaseMoved if the files at their paths are not those that were opened."""
+    """Raises DatabaseMoved if the files at their paths have changed since they were opened."""
     for path, number in opened.items():
         if _number(path) != number:
             raise DatabaseMoved(f"{path} is gone, or is another file than the one that was opened")
@@ -63,12 +70,11 @@ class Reserve:
         self._path = Path(f"{database}.reserve")
 
     def fill(self) -> None:
-        """Takes `_RESERVE` bytes of the disk, or half of what is free. Without room for the log
-        nothing can be written, so that the other half stays."""
+        """Reserves `_RESERVE` bytes, at most half of the free space: the log needs room as well."""
         with contextlib.suppress(OSError):
             held = self._path.stat().st_size if self._path.exists() else 0
-            size = min(_RESERVE, (room(self._path) + held) // 2)
-            if size >= max(_SMALLEST_RESERVE, 2 * held):
+            size = min(RESERVE.bytes, (room(self._path) + held) // 2)
+            if size >= max(RESERVE.smallest, 2 * held):
                 self._path.unlink(missing_ok=True)
                 self._take(size)
 

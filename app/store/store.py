@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import TypeVar
 
 from alembic.util import CommandError
@@ -35,19 +36,24 @@ logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
-_THREADS = 4
-"""A statement takes milliseconds, so a few threads suffice; the connection pool has more
-connections than this.
-"""
+
+@dataclass(frozen=True)
+class StoreSettings:
+    """Settings of the access to the database."""
+
+    threads: int = 4
+    """Threads: a statement takes milliseconds, and the connection pool has more connections."""
+    long: float = 0.5
+    """Time [s] above which a failure is a time-out of a lock or server."""
+    pause: float = 1.0
+    """Time [s] after a time-out in which all work fails at once, so that clients wait only once."""
+    check_period: float = 2.0
+    """Time [s] between two checks of the database."""
+
+
+STORE = StoreSettings()
+
 _UNAVAILABLE = (DBAPIError, PoolTimeout, OSError, CommandError)
-_LONG = 0.5
-"""Time [s] above which a failure was a wait for a lock or a server."""
-_PAUSE = 1.0
-"""Time [s] after such a failure in which all work fails at once, so that a client waits for one
-time-out at most.
-"""
-_CHECK_PERIOD = 2.0
-"""Time [s] between two checks of the database."""
 
 
 class Store:
@@ -58,7 +64,7 @@ class Store:
         self._file = sqlite_file(self._engine.url)
         self._reserve = None if self._file is None else Reserve(self._file)
         self._clock = clock
-        self._threads = ThreadPoolExecutor(_THREADS, thread_name_prefix="store")
+        self._threads = ThreadPoolExecutor(STORE.threads, thread_name_prefix="store")
         self._migrating = threading.Lock()
         self._migrated = False
         self._was_open = False
@@ -67,8 +73,7 @@ class Store:
         self._checking: asyncio.Task[None] | None = None
         self._told: StoreFault | None = None
         self.fault: StoreFault | None = None
-        """What is wrong with the database, as far as known; None if it was last read and
-        written."""
+        """The known fault of the database; None after successful access."""
 
     async def open(self) -> None:
         """Tries to reach the database, and checks it from then on. If a check fails, logs an error
@@ -89,13 +94,12 @@ class Store:
         try:
             await asyncio.get_running_loop().run_in_executor(self._threads, self._check)
         except StoreUnavailable as error:
-            # `fault` may be known from other work, of which the operator was told nothing
+            # `fault` may stem from other work, without a message to the operator.
             if self._told != error.cause:
                 self._told = error.cause
                 logger.error(
                     "the database cannot be used: requests that need studies or stored answers "
-                    "return 503 until it "
-                    "can; all other requests work",
+                    "return 503 until it can; all other requests work",
                     extra={"database": str(self), "cause": error.cause},
                 )
         else:
@@ -110,12 +114,10 @@ class Store:
         )
 
     async def write(self, work: Callable[[Session], T], frees: bool = False) -> T:
-        """The result of `work`, after its changes are on the disk. If `work` raises, nothing
-        changes.
+        """The result of `work`, after its changes are on the disk.
 
-        `frees`: the work deletes. On a full disk, it gets the space that is held back for deleting.
-
-        Raises StoreUnavailable.
+        If `work` raises, nothing changes. With `frees`, the work deletes data and may use the
+        reserved space on a full disk. Raises StoreUnavailable.
         """
         do = self._free if frees else self._write
         return await asyncio.get_running_loop().run_in_executor(self._threads, do, work)
@@ -137,7 +139,7 @@ class Store:
         except StoreUnavailable as error:
             if error.cause != "full" or self._file is None:
                 raise
-            # what the log takes of the disk may be all that is missing
+            # The space of the log may be sufficient.
             self._empty_log()
             result = self._do(work, True)
         self.fault = None
@@ -155,14 +157,14 @@ class Store:
                 raise
             result = self._write(work)
         with contextlib.suppress(OSError):
-            # what was deleted is of use only if the log may grow; to empty it, the file may have to
+            # Deleted space is useful only if log and file can grow.
             if released or (room(self._file) < LEAST_ROOM and self._reserve.release()):
                 self._empty_log()
                 self._reserve.fill()
         return result
 
     def _empty_log(self) -> None:
-        """Gives the space of SQLite's log back to the disk, if nobody reads from it."""
+        """Truncates the log of SQLite, unless a reader uses it."""
         with contextlib.suppress(*_UNAVAILABLE, sqlite3.Error):
             connection = self._engine.raw_connection()
             try:
@@ -193,17 +195,17 @@ class Store:
         fault = fault_of(error, self._file)
         # without the statement and its parameters: they hold data of the client
         reason = str(error.orig) if isinstance(error, DBAPIError) else str(error)
-        # once, not with every check; each request that it fails is in the log of requests
+        # Log a fault once; failed requests are in the log of requests.
         level = logging.DEBUG if fault == self.fault else logging.ERROR
         logger.log(
             level,
             "database unavailable",
             extra={"database": str(self), "cause": fault, "reason": reason},
         )
-        if self._clock() - began > _LONG:
-            self._paused[writes] = self._clock() + _PAUSE, fault
+        if self._clock() - began > STORE.long:
+            self._paused[writes] = self._clock() + STORE.pause, fault
         if fault == "deleted":
-            # new connections open the file that is there then
+            # New connections open the new file.
             self._migrated = False
             self._engine.dispose()
         self.fault = fault
@@ -224,7 +226,7 @@ class Store:
 
     async def _check_often(self) -> None:
         while True:
-            await asyncio.sleep(_CHECK_PERIOD)
+            await asyncio.sleep(STORE.check_period)
             await self.check()
 
     def _migrate(self) -> None:
@@ -232,8 +234,8 @@ class Store:
             if self._migrated:
                 return
             if self._was_open and self._file is not None and not self._file.exists():
-                # an empty database in place of one that is missing, for example with its volume,
-                # would hide the loss
+                # An empty database in place of a missing one, such as a lost volume, would hide the
+                # loss.
                 raise DatabaseMoved(f"{self._file} is gone")
             migrate(self._engine)
             self._migrated = self._was_open = True

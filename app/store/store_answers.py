@@ -1,4 +1,4 @@
-"""Stores the answers that a task's result refers to, and the result itself."""
+"""Storage of a task's result and of the answers to which it refers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from joulepath.app.store.store import Store
 
 
 class _TooLarge(Exception):
-    """The answer alone is larger than all that may be stored."""
+    """The answer alone exceeds the space for answers."""
 
 
 async def store_answers(
@@ -29,10 +29,10 @@ async def store_answers(
     owner: str | None,
     cell: str | None = None,
 ) -> TaskResult:
-    """The result, once the answers that it refers to are stored.
+    """The result, after storing the answers to which it refers.
 
-    Stores `result.stored`, answers of the endpoint `kind` that belong to `owner`. Deletes answers
-    that are too old or too many. Keeps its motions, which are of a `cell`. Raises StoreUnavailable.
+    `result.stored` are answers of the endpoint `kind` with an `owner`. Old or excessive answers are
+    deleted. The motions of the `cell` are kept. Raises StoreUnavailable.
     """
 
     def keep(session: Session) -> None:
@@ -52,10 +52,9 @@ async def keep_answer(
     owner: str | None,
     asked: Asked | None = None,
 ) -> TaskResult:
-    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without an id
-    of its own.
+    """The result, after storing it as `result.kept_as` for requests equal to `asked`.
 
-    It then answers what was `asked`, too.
+    Without the database, the result has no id of its own.
     """
     assert result.kept_as is not None
     kept = StoredAnswer(result.kept_as, result.document, result.figures)

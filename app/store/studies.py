@@ -1,6 +1,4 @@
-"""Studies and their iterations. Each function works on a session: `await
-store.write(partial(create, …))`.
-"""
+"""Studies and their iterations. All functions take a session."""
 
 from __future__ import annotations
 
@@ -37,13 +35,15 @@ class Step:
     electrical: float
     mechanical: float
     answered: Answered | None = None
-    """What the answer answers from now on, if it was computed."""
+    """The request answered by a newly computed answer."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """An iteration, the one before it, and the best ones up to that and up to itself. Requests are
-    loaded for `iteration` only, and there only by `entry`."""
+    """An iteration, the previous one, and the best iterations up to both.
+
+    Only `entry` loads a request, the one of `iteration`.
+    """
 
     study: Study
     iteration: Iteration
@@ -77,9 +77,9 @@ def energy_of(study: Study, iteration: Iteration | Step) -> float:
 
 
 def create(session: Session, study: Study) -> tuple[Study, bool]:
-    """Adds a study and returns it with False; if its key is known, the study of that key with True.
+    """Adds a study; returns it, and whether a study with this key existed already.
 
-    Raises KeyReused if that study differs.
+    Raises KeyReused if the existing study differs.
     """
     if study.idempotency_key is not None:
         known = session.scalar(select(Study).where(Study.idempotency_key == study.idempotency_key))
@@ -129,9 +129,9 @@ def delete(session: Session, study_id: str, client: Client) -> None:
 def known_step(
     session: Session, study_id: str, kind: str, request: dict[str, Any], key: str | None
 ) -> int | None:
-    """Number of the iteration with this key; None if there is none.
+    """Number of the iteration with this key; None without one.
 
-    Raises UnknownStudy, or KeyReused if that iteration has another request.
+    Raises UnknownStudy, or KeyReused if the iteration has another request.
     """
     _study(session, study_id)
     if key is None:
@@ -149,14 +149,12 @@ def known_step(
 def add(
     session: Session, study_id: str, step: Step, key: str | None, client: Client
 ) -> tuple[int, bool]:
-    """Adds an iteration and returns its number with False; if its key is known, the number of that
-    key with True.
+    """Adds an iteration; returns its number, and whether its key existed already.
 
     Raises UnknownStudy, NotOwner or KeyReused.
     """
     check_owner(client, _study(session, study_id).owner)
-    # locks the study (PostgreSQL), so that numbers have no gaps; SQLite has one writer at a time
-    # anyway
+    # Lock the study in PostgreSQL, so that numbers have no gaps; SQLite has only one writer.
     study = session.scalar(select(Study).where(Study.id == study_id).with_for_update())
     if study is None:
         raise UnknownStudy
@@ -192,7 +190,7 @@ def add(
 
 
 def entry(session: Session, study_id: str, number: int) -> Entry:
-    """An iteration with its request, and those that it is compared with.
+    """An iteration with its request and the iterations for comparison.
 
     Raises UnknownStudy or UnknownIteration.
     """

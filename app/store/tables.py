@@ -1,4 +1,4 @@
-"""The tables, as SQLAlchemy maps them. `migrations/` creates them; a test compares the two."""
+"""The tables in SQLAlchemy. `migrations/` creates them, and a test compares both."""
 
 from __future__ import annotations
 
@@ -21,12 +21,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from joulepath.app.schemas.lengths import (
-    HOLDER_LENGTH,
-    ID_LENGTH,
-    KEY_LENGTH,
-    NAME_LENGTH,
-    OWNER_LENGTH,
-    ROBOT_LENGTH,
+    LENGTHS,
 )
 
 # SQLite can alter a constraint only if it has a name
@@ -69,79 +64,72 @@ class Instant(TypeDecorator[datetime]):
 
 
 class Table(DeclarativeBase):
-    """Base of the tables. A column `owner` has the name of the API key that created the row; null
-    without one.
-    """
+    """Base of the tables. A column `owner` is the name of the creator's API key, or null."""
 
     metadata = MetaData(naming_convention=_NAMES)
 
 
 class Study(Table):
-    """A motion that is improved step by step until its energy is at most `threshold` [J]."""
+    """Iterative improvement of a motion until its energy is at most `threshold` [J]."""
 
     __tablename__ = "studies"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
-    name: Mapped[str] = mapped_column(String(NAME_LENGTH))
-    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
+    name: Mapped[str] = mapped_column(String(LENGTHS.name))
+    robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
     objective: Mapped[str] = mapped_column(String(32))
     threshold: Mapped[float]
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
-    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
-    figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
+    idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key), unique=True)
+    figures: Mapped[str | None] = mapped_column(String(LENGTHS.id))
     """Id of the figures of all iterations; null for the robot's own."""
 
 
 class OwnRobot(Table):
-    """A robot that a user added: its figures, as a bundled robot's file has them, and what was
-    remarked on them.
-    """
+    """An added robot: figures in the form of a bundled robot's file, and warnings."""
 
     __tablename__ = "robots"
 
-    name: Mapped[str] = mapped_column(String(ROBOT_LENGTH), primary_key=True)
+    name: Mapped[str] = mapped_column(String(LENGTHS.robot), primary_key=True)
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     figures: Mapped[dict[str, Any]] = mapped_column(JSON)
     warnings: Mapped[list[str]] = mapped_column(JSON)
 
 
 class StoredLog(Table):
-    """A log of one arm: the file as it was sent, packed with gzip, and the `settings` with which it
-    is read.
-    """
+    """A log of one arm: the file of the user, packed with gzip, and the `settings` of its
+    reader."""
 
     __tablename__ = "logs"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
-    name: Mapped[str | None] = mapped_column(String(NAME_LENGTH))
-    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
+    name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
+    robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     settings: Mapped[dict[str, Any]] = mapped_column(JSON)
     report: Mapped[dict[str, Any]] = mapped_column(JSON)
-    """What was seen in it: the fields of the answer that no column has."""
+    """Fields of the report without a column of their own."""
     size: Mapped[int]
     """Size of the body [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
 class Figures(Table):
-    """Figures of a robot that were identified on one arm: those that take the place of the robot's
-    own.
-    """
+    """Figures identified on one arm, replacing the robot's own."""
 
     __tablename__ = "figures"
     __table_args__ = (Index(None, "created", "id"),)
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     """Made of robot and content: the same figures have the same id on every server."""
-    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    robot: Mapped[str] = mapped_column(String(LENGTHS.robot))
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     content: Mapped[dict[str, Any]] = mapped_column(JSON)
 
 
@@ -159,15 +147,15 @@ class Answer(Table):
         Index(None, "job_id"),
     )
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
     kind: Mapped[str] = mapped_column(String(32))
     created: Mapped[datetime] = mapped_column(Instant)
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
-    job_id: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    job_id: Mapped[str | None] = mapped_column(String(LENGTHS.id))
     """Whoever deletes a job deletes its answers."""
-    robot: Mapped[str | None] = mapped_column(String(ROBOT_LENGTH))
-    """This and the next three are what lists show; null if it has none."""
+    robot: Mapped[str | None] = mapped_column(String(LENGTHS.robot))
+    """With the next three columns, the figures in lists; null without one."""
     energy: Mapped[float | None]
     duration: Mapped[float | None]
     status: Mapped[str | None] = mapped_column(String(16))
@@ -177,7 +165,7 @@ class Answer(Table):
 
 
 class CachedAnswer(Table):
-    """The answer to a request, whose canonical form has the hash `key`."""
+    """The answer to a request; `key` is the hash of its canonical form."""
 
     __tablename__ = "cached_answers"
     __table_args__ = (Index(None, "answer_id"),)
@@ -185,9 +173,7 @@ class CachedAnswer(Table):
     key: Mapped[str] = mapped_column(String(64), primary_key=True)
     answer_id: Mapped[str] = mapped_column(ForeignKey("answers.id", ondelete="CASCADE"))
     deadline: Mapped[float | None]
-    """Longest deadline [s] of a request that it answers; null if that does not matter, because it
-    is optimal.
-    """
+    """Longest deadline [s] of a request with this answer; null for an optimal answer."""
 
 
 class KnownMotion(Table):
@@ -199,9 +185,9 @@ class KnownMotion(Table):
     __table_args__ = (Index(None, "cell", "used"), Index(None, "used"))
 
     cell: Mapped[str] = mapped_column(String(64), primary_key=True)
-    """Hash of what a cycle says of the arm and its cell."""
+    """Hash of the arm and the cell of a cycle."""
     key: Mapped[str] = mapped_column(String(64), primary_key=True)
-    """Hash of everything that the motion hangs on."""
+    """Hash of everything on which the motion depends."""
     used: Mapped[datetime] = mapped_column(Instant)
     body: Mapped[bytes] = mapped_column(LargeBinary)
     """The spline: JSON, compressed."""
@@ -232,11 +218,11 @@ class Iteration(Table):
     """Number of the iteration of least energy up to this one, the first of equals."""
     met_by: Mapped[int | None]
     """Number of the first iteration up to this one with an energy of at most the threshold."""
-    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH))
+    idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key))
 
 
 class Job(Table):
-    """Requests that are computed one by one while their client does not wait.
+    """Requests computed one by one without a waiting client.
 
     `state` is `waiting`, `running`, `done` (every request has ended), `cancelling` or `cancelled`.
     """
@@ -244,10 +230,10 @@ class Job(Table):
     __tablename__ = "jobs"
     __table_args__ = (Index(None, "created", "id"), Index(None, "ended"))
 
-    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
-    name: Mapped[str | None] = mapped_column(String(NAME_LENGTH))
+    id: Mapped[str] = mapped_column(String(LENGTHS.id), primary_key=True)
+    name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
     state: Mapped[str] = mapped_column(String(16))
-    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
     keep_going: Mapped[bool]
     """Whether the other requests go on after one has failed."""
     created: Mapped[datetime] = mapped_column(Instant)
@@ -256,22 +242,21 @@ class Job(Table):
     total: Mapped[int]
     """Number of requests."""
     ended_before: Mapped[int]
-    """Number of requests that had ended when it started, or started again."""
+    """Number of ended requests at the latest start."""
     events: Mapped[int]
     """Number of its last event."""
     progressed: Mapped[datetime | None] = mapped_column(Instant)
     """Time of its last event `progress`."""
-    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
+    idempotency_key: Mapped[str | None] = mapped_column(String(LENGTHS.key), unique=True)
     fingerprint: Mapped[str] = mapped_column(String(64))
-    """SHA-256 of what was sent."""
+    """SHA-256 of the requests."""
 
 
 class JobRequest(Table):
     """One request of a job. `state` is `waiting`, `running`, `done`, `failed` or `cancelled`."""
 
     __tablename__ = "job_requests"
-    # what waits, the lowest numbers first: a job that has just begun goes before the rest of a long
-    # one
+    # Waiting requests with low numbers first: a new job precedes the rest of a long one.
     __table_args__ = (Index(None, "state", "number", "job_id"), Index(None, "job_id", "state"))
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
@@ -284,15 +269,15 @@ class JobRequest(Table):
     body: Mapped[bytes] = mapped_column(LargeBinary)
     """The request: JSON, compressed."""
     meaning: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    """See `cache.Meaning`; null if it is to be computed whatever was computed before."""
+    """See `cache.Meaning`; null if stored answers must not be used."""
     state: Mapped[str] = mapped_column(String(16))
     attempt: Mapped[int]
-    """How often it was handed out, apart from the times that another request took its worker."""
+    """Number of leases without preemptions."""
     deaths: Mapped[int]
     """How many workers died of it."""
     preempted: Mapped[int]
     """How often another request took its worker."""
-    leased_by: Mapped[str | None] = mapped_column(String(HOLDER_LENGTH))
+    leased_by: Mapped[str | None] = mapped_column(String(LENGTHS.holder))
     leased_until: Mapped[datetime | None] = mapped_column(Instant)
     wall_time: Mapped[float | None]
     energy: Mapped[float | None]
@@ -300,14 +285,12 @@ class JobRequest(Table):
     status: Mapped[str | None] = mapped_column(String(16))
     answer_id: Mapped[str | None] = mapped_column(ForeignKey("answers.id"), unique=True)
     problem: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
-    """Id of the figures that an identification found, if they could be stored. They may have been
-    deleted since.
-    """
+    figures: Mapped[str | None] = mapped_column(String(LENGTHS.id))
+    """Id of identified figures, if they were stored; they may have been deleted since."""
 
 
 class JobEvent(Table):
-    """Something that happened to a job, by its number in the job: 1, 2, 3, … without gaps."""
+    """An event of a job with its number 1, 2, 3, … without gaps."""
 
     __tablename__ = "job_events"
 

@@ -48,7 +48,7 @@ def full(history: History) -> dict[str, Any]:
 
 
 def entries(history: History) -> list[dict[str, Any]]:
-    """Fields of an Iteration, for each."""
+    """Fields of an Iteration for every entry."""
     study = history.state.study
     energies = [energy_of(study, iteration) for iteration in history.iterations]
     return [

@@ -1,6 +1,4 @@
-"""Progress of a study: each energy compared with the previous one, the best so far, and the
-threshold.
-"""
+"""Progress of a study: comparison of energies with the previous, the best and the threshold."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ def step(energy: float, last: float | None, best: float | None, threshold: float
 
 
 def progress(energies: Sequence[float], threshold: float) -> list[Progress]:
-    """The progress of each step, from the energies [J] of all steps."""
+    """The progress of all steps, from their energies [J]."""
     steps, last, best = [], None, None
     for energy in energies:
         steps.append(step(energy, last, best, threshold))

@@ -1,7 +1,6 @@
-"""Suggestions for the next iteration: requests that differ from an iteration of the study in one
-respect each.
+"""Suggestions for the next iteration: requests with one difference from an iteration.
 
-This module makes the requests only. The optimiser computes their energies.
+This module only makes the requests. The optimiser computes their energies.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 Step = Literal["method", "branch", "orientation", "duration", "payload"]
 Fields = dict[str, Any]
@@ -29,17 +28,26 @@ _TOOL_AXIS = [0.0, 0.0, 1.0]
 """Axis of the tool in the TCP frame."""
 _TILTS = [sign * radians(10.0) * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
 """Tilts of the tool: rotation vectors [rad]."""
-_LONGER = 1.25
-"""Factor of a longer duration."""
-_NEARER = 0.5
-"""Factor of the distance between flange and centre of mass."""
-_OTHER_BRANCHES = 2
-"""Most other branches that are suggested."""
+
+
+@dataclass(frozen=True)
+class SuggestionSettings:
+    """Settings of suggestions."""
+
+    longer: float = 1.25
+    """Factor of a longer duration."""
+    nearer: float = 0.5
+    """Factor of the distance between flange and centre of mass."""
+    other_branches: int = 2
+    """Most suggested branches."""
+
+
+SUGGESTIONS = SuggestionSettings()
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A suggestion that is not computed yet; `request` is a body of `POST /optimize`."""
+    """A suggestion without a computed energy; `request` is a body of `POST /optimize`."""
 
     step: Step
     summary: str
@@ -48,11 +56,11 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Base:
-    """The iteration that the suggestions start from.
+    """The iteration behind the suggestions.
 
     `request` is a body of `POST /optimize`, `q_goal` the goal configuration of its motion [rad],
-    `duration` [s] that of the motion. `candidates` are those of its answer; empty if the motion was
-    not optimised.
+    `duration` [s] the duration of the motion. `candidates` are the candidates of its answer; empty
+    for an evaluated motion.
     """
 
     request: Fields
@@ -65,8 +73,7 @@ class Base:
 def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base | None:
     """The base from the request and the answer of an iteration.
 
-    None if an evaluated motion has no two ends to optimise between: it passes configurations
-    between its ends, or ends where it starts.
+    None if an evaluated motion passes further configurations, or ends at its start.
     """
     if kind == "optimize":
         return Base(
@@ -84,9 +91,7 @@ def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base 
 
 
 def proposals(base: Base) -> list[Proposal]:
-    """All suggestions for the base, in the order in which they are computed: usually those first
-    that save most.
-    """
+    """All suggestions for the base in the order of computation, usually largest savings first."""
     arm = to_arm(OptimizeRequest.model_validate(base.request))
     takes_poses = inverse_kinematics_for(arm.robot) is not None
     here, *tilted = _poses(arm, base.q_goal, [np.zeros(3), *_TILTS])
@@ -110,8 +115,8 @@ def _method(base: Base) -> Iterator[Proposal]:
 def _duration(base: Base) -> Iterator[Proposal]:
     if base.request.get("duration") is not None and base.request["objective"] == "electrical":
         yield Proposal("duration", "Let the optimiser choose the duration.", _timed(base, None))
-    for factor, word in ((_LONGER, "longer"), (1 / _LONGER, "shorter")):
-        duration = min(base.duration * factor, LONGEST_DURATION)
+    for factor, word in ((SUGGESTIONS.longer, "longer"), (1 / SUGGESTIONS.longer, "shorter")):
+        duration = min(base.duration * factor, DURATIONS.longest)
         yield Proposal(
             "duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration)
         )
@@ -146,7 +151,7 @@ def _branch(base: Base) -> Iterator[Proposal]:
     known.sort(key=_least_energy)
     for candidate in known:
         name = _branch_name(candidate["goal"])
-        if name not in seen and len(seen) <= _OTHER_BRANCHES:
+        if name not in seen and len(seen) <= SUGGESTIONS.other_branches:
             seen.add(name)
             request = _without(base.request, "branch") | {"goal": {"q": candidate["q_goal"]}}
             yield Proposal("branch", f"Reach the goal in the branch {name}.", request)
@@ -164,8 +169,7 @@ def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Pro
     yield Proposal(
         "orientation",
         "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that "
-        "needs the least energy"
-        " (four directions compared).",
+        "needs the least energy (four directions compared).",
         base.request | {"goal": {"any_of": tilted}},
     )
 
@@ -173,7 +177,7 @@ def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Pro
 def _payload(base: Base) -> Iterator[Proposal]:
     payload = base.request.get("payload")
     if payload and payload["mass"] and any(payload["com"]):
-        nearer = payload | {"com": [_NEARER * part for part in payload["com"]]}
+        nearer = payload | {"com": [SUGGESTIONS.nearer * part for part in payload["com"]]}
         yield Proposal(
             "payload",
             "Grip the payload so that its centre of mass is at half its present distance from the "

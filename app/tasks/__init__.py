@@ -1,1 +1,1 @@
-"""What a worker process does with a request, one file per endpoint."""
+"""Parts common to the tasks of several endpoints."""

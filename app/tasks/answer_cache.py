@@ -1,6 +1,4 @@
-"""Answers by the canonical form of their requests: what was computed once need not be computed
-again.
-"""
+"""A cache of answers by the canonical form of their requests."""
 
 from __future__ import annotations
 
@@ -27,14 +25,12 @@ from joulepath.models.registry import robot_names
 from joulepath.optimizer.exceptions import UnknownRobot
 
 PATIENCE = 0.25
-"""Longest time [s] that a look into the database may take: what it may save is little more."""
+"""Longest time [s] of a query, in view of the time saved."""
 
 
 @dataclass(frozen=True)
 class AnswerCache:
-    """The answers of one client in the database. With `by_passed` set, none is found; new ones are
-    remembered.
-    """
+    """The answers of one client in the database. With `by_passed`, answers are only stored."""
 
     store: Store
     owner: str | None
@@ -42,11 +38,10 @@ class AnswerCache:
     in_flight: InFlight = field(default_factory=InFlight)
 
     async def asked(self, kind: str, body: Request | HeldBody, deadline: float) -> Asked | None:
-        """A validated request to the endpoint `kind`, as the cache knows it. None for one that it
-        does not: too large, or of a robot that is not known.
+        """The key of a validated request to the endpoint `kind`.
 
-        Two are the same if they mean the same, have the same robot and the same client, and are for
-        the same version of the service.
+        None for a request which is too large or names an unknown robot. Requests are equal if they
+        have the same meaning, robot, client and version of the service.
         """
         if isinstance(body, HeldBody) or self.store.fault is not None:
             return None
@@ -60,9 +55,11 @@ class AnswerCache:
         compute: Compute,
         is_heard: bool,
     ) -> TaskResult:
-        """The answer to a request: a stored one, that to an equal request which is being computed,
-        or what `compute` returns in `deadline` [s]. Raises what that raises. `is_heard`: somebody
-        listens to what `compute` finds."""
+        """The answer to a request: a stored one, a running equal one, or the result of `compute`.
+
+        `compute` has `deadline` [s], and its errors are raised. `is_heard`: a client listens to its
+        events.
+        """
         known = await self.find(asked, request_id)
         if known is not None:
             return known
@@ -72,10 +69,9 @@ class AnswerCache:
         return replace(result, age=0).for_request(request_id) if is_anothers else result
 
     async def motions(self, cell: str | None) -> dict[str, bytes]:
-        """Motions that cycles in this cell may have in common, by their keys; none for a cycle
-        whose cell is not known.
+        """Known motions of a cell by their keys; none for an unknown cell.
 
-        They are shared by all clients: no answer hangs on them.
+        All clients share them, since answers do not depend on them.
         """
         if cell is None or self.by_passed or self.store.fault is not None:
             return {}
@@ -86,7 +82,7 @@ class AnswerCache:
             return {}
 
     async def find(self, asked: Asked | None, request_id: str) -> TaskResult | None:
-        """A stored answer as that to the request with this id; None if there is none."""
+        """A stored answer with the id of this request; None without one."""
         found = await self._find(asked)
         return None if found is None else found.for_request(request_id)
 

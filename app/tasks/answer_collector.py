@@ -1,4 +1,4 @@
-"""Collects the complete answers that the result of a task refers to."""
+"""Collection of the complete answers referenced by the result of a task."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from joulepath.app.engine.result import StoredAnswer, json_document
 from joulepath.app.exceptions.base import InvalidRequest
 
 MOST_BYTES = 1 << 26
-"""Largest total size [byte], before compression, of the answers that one result refers to."""
+"""Largest total size [byte] of the answers of one result, before compression."""
 
 
 class AnswerCollector:
@@ -21,8 +21,7 @@ class AnswerCollector:
         self._answers: list[StoredAnswer] = []
 
     def add(self, content: Answer) -> str:
-        """Adds an answer and returns its path. Its fields `id` and `answer`, those that it has, are
-        set.
+        """Adds an answer, sets its fields `id` and `answer`, and returns its path.
 
         Raises InvalidRequest above MOST_BYTES.
         """

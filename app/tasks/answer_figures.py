@@ -1,4 +1,4 @@
-"""What lists show of an answer."""
+"""Figures of an answer in lists."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from joulepath.app.answers.envelope import AnswerFigures
 
 
 def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
-    """The figures of the JSON answer of any endpoint. Only a motion or a cycle has an energy: that
-    of its objective, electrical for `evaluate`."""
+    """The figures of the JSON answer of any endpoint.
+
+    The energy of a motion or cycle is the one of its objective, electrical for `evaluate`.
+    """
     given = answer.get("total", answer)
     energy, objective = given.get("energy"), answer.get("objective", "electrical")
     return AnswerFigures(

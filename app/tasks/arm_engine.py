@@ -1,6 +1,4 @@
-"""The engine for requests that name a robot: users' own robots come from the database, and go along
-with the task.
-"""
+"""The engine for requests naming a robot: users' own robots accompany the task."""
 
 from __future__ import annotations
 
@@ -22,24 +20,24 @@ from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 
 class Runner(Protocol):
-    """What runs a task: the engine, or a process that runs its tasks itself."""
+    """A runner of tasks: the engine, or a process running its own tasks."""
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
-        """The result of a task, for which `deadline` [s] is left. `tell` gets what it finds."""
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+        """The result of a task in at most `deadline` [s]; `tell` receives its events."""
         ...
 
 
 Given = Callable[[], AbstractContextManager[None]]
-"""Opens a context in which the task can use one item of the database by its name."""
+"""Function opening a context with access to one item of the database by name."""
 
 
 @dataclass(frozen=True)
 class Equipped:
-    """A task with the items of the database that it uses."""
+    """A task with its items of the database."""
 
     task: Task
     given: tuple[Given, ...]
@@ -57,8 +55,10 @@ class Equipped:
 
 @dataclass(frozen=True)
 class Needs:
-    """Items of the database that a task uses: a robot by its name, figures and a log by their ids,
-    and kept answers by their ids or paths."""
+    """Items of the database used by a task.
+
+    A robot by its name, figures and a log by their ids, kept answers by their ids or paths.
+    """
 
     robot: str | None = None
     figures: str | None = None
@@ -66,9 +66,7 @@ class Needs:
     answers: tuple[str, ...] = ()
 
     def after(self, error: UnknownRobot | UnknownFigures | UnknownLog | PartsNeeded) -> Needs:
-        """Adds the item that a worker asked for. Raises the worker's error if the item was provided
-        already.
-        """
+        """Adds the item missing in a worker. Raises the error if the item was provided already."""
         if isinstance(error, UnknownRobot):
             more = replace(self, robot=error.name)
         elif isinstance(error, UnknownFigures):
@@ -99,18 +97,16 @@ class Needs:
 
 @dataclass(frozen=True)
 class ArmEngine:
-    """Runs tasks about robots that come with the service and about those in the database, with
-    their own figures or with identified ones."""
+    """Runs tasks about bundled or added robots, with their own or identified figures."""
 
     engine: Runner
     store: Store
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
-        """The task's result; `tell` gets what it finds.
+    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+        """The task's result; `tell` receives its events.
 
-        Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and what the engine raises;
-        StoreUnavailable only for figures, a log, kept answers, and a robot that does not come with
-        the service.
+        Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and the errors of the
+        engine; StoreUnavailable only for items of the database.
         """
         request = getattr(task, "request", None)
         needs = Needs(getattr(request, "robot", None), getattr(request, "figures", None))
@@ -126,9 +122,9 @@ class ArmEngine:
 
 
 async def robot_in(store: Store, name: str) -> Robot:
-    """The robot of this name, one that comes with the service or one in the database.
+    """The bundled or added robot of this name.
 
-    Raises UnknownRobot; StoreUnavailable only for a robot that does not come with the service.
+    Raises UnknownRobot; StoreUnavailable only for added robots.
     """
     return (
         load_robot(name)
@@ -138,8 +134,7 @@ async def robot_in(store: Store, name: str) -> Robot:
 
 
 async def known_here(store: Store, name: str, used: str | None) -> AbstractContextManager[Any]:
-    """A context in which this process knows the robot of this name, too, and the figures of this
-    id.
+    """A context in which this process knows an added robot and identified figures.
 
     Raises UnknownRobot, UnknownFigures or StoreUnavailable.
     """
@@ -171,5 +166,5 @@ async def _kept(store: Store, name: str) -> bytes:
 
 
 async def own_figures(store: Store, name: str) -> dict[str, Any]:
-    """Figures of a robot that a user added. Raises UnknownRobot or StoreUnavailable."""
+    """Figures of an added robot. Raises UnknownRobot or StoreUnavailable."""
     return (await store.read(partial(robots.get, name=name))).figures

@@ -1,4 +1,4 @@
-"""Work that several requests wait for: equal requests at the same time are computed once."""
+"""Equal concurrent requests are computed once."""
 
 from __future__ import annotations
 
@@ -23,18 +23,17 @@ class _Work:
 
 
 class InFlight:
-    """What is being computed in this service, by the requests that it answers."""
+    """Running computations of this service by their requests."""
 
     def __init__(self) -> None:
         self._works: dict[Asked, _Work] = {}
 
     async def result(self, asked: Asked, compute: Compute) -> tuple[TaskResult, bool]:
-        """The answer to a request, and whether it was computed for an equal one, with the same
-        deadline.
+        """The answer to a request, and whether it was computed for an equal one.
 
-        The work goes on while somebody waits for it. Raises what it raises. If another request's
-        work fails because of the service, not of the request, this one is computed itself. Work
-        that workers died of is not begun again.
+        Equal requests have the same deadline. The computation continues while any request waits,
+        and its errors are raised. If the computation for another request fails because of the
+        service, this request is computed again, unless the computation has ended workers.
         """
         loop = asyncio.get_running_loop()
         end = loop.time() + asked.deadline
@@ -56,7 +55,7 @@ class InFlight:
         finally:
             work.waiting -= 1
             if not work.waiting:
-                # whoever comes now must not wait for what is being stopped
+                # New requests must not wait for a stopped computation.
                 self._forget(asked, work)
                 work.computing.cancel()
 

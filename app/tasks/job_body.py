@@ -24,7 +24,7 @@ from joulepath.app.tasks.request_key import meaning_of
 
 @dataclass(frozen=True)
 class Deadlines:
-    """Longest deadline [s] of a request that has one, and the deadline of one that has none."""
+    """Longest deadline [s] of a request, and the default deadline."""
 
     longest: float
     without: float
@@ -32,7 +32,7 @@ class Deadlines:
 
 @dataclass(frozen=True)
 class Validated(TaskResult):
-    """A job that may be stored. Its document is empty."""
+    """A valid job. Its document is empty."""
 
     job: NewJob = field(kw_only=True)
 
@@ -77,9 +77,7 @@ class JobBodyTask:
 
 @dataclass(frozen=True)
 class JobOfOneTask:
-    """A validated request to the endpoint `kind`, which is too large to be looked at in the
-    service's process.
-    """
+    """A validated request to the endpoint `kind`, too large for the service's own process."""
 
     kind: str
     asked: Request | HeldBody

@@ -1,4 +1,4 @@
-"""One request of a job in a worker: the task of its endpoint, and what lists show of its answer."""
+"""One request of a job in a worker: the task of its endpoint, and the figures of its answer."""
 
 from __future__ import annotations
 
@@ -29,19 +29,16 @@ from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"
-"""Kinds of requests that need something of the database: stored logs, and motions that are
-known."""
+"""Kinds of requests with items of the database: stored logs, known motions."""
 RESIDUALS = "residuals"
-"""Kind of the answer beside that of an identification: its curves."""
+"""Kind of the second answer of an identification: its curves."""
 
 
 @dataclass(frozen=True)
 class JobResult(TaskResult):
-    """An answer with its figures. Its documents are compressed; `parts` is the kind of those in
-    `stored`.
+    """An answer with its figures. Documents are compressed; `parts` is the kind of `stored`.
 
-    `wall_time` [s] is that of the work. `identified` are the figures of an arm that were found, if
-    any.
+    `wall_time` [s] is the time of the work. `identified` are figures found for an arm, if any.
     """
 
     wall_time: float = field(kw_only=True)
@@ -57,9 +54,9 @@ class JobRequestTask:
     body: bytes
     request_id: str
     logs: tuple[GivenLog, ...] = ()
-    """Those that an identification names."""
+    """Logs of an identification."""
     motions: Mapping[str, bytes] = field(default_factory=dict)
-    """Those of the cell of a cycle."""
+    """Known motions of the cell of a cycle."""
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of the endpoint, within about `deadline` seconds."""
@@ -76,8 +73,7 @@ class JobRequestTask:
         result = result if result.kept_as is not None else result.kept()
         answer = orjson.loads(result.document)
         figures = figures_of(answer)
-        # here and not in the service, which has more to do; nobody waits, so that size counts more
-        # than time
+        # Compression runs in the worker; no client waits, so that size matters more than time.
         return JobResult(
             packed(result.document),
             result.media_type,
@@ -93,7 +89,7 @@ class JobRequestTask:
 
 
 def _parts_of(kind: str, answer: dict[str, Any]) -> str:
-    """What the stored parts of an answer of the endpoint `kind` are."""
+    """Kind of the stored parts of an answer of the endpoint `kind`."""
     if kind == IDENTIFY:
         return RESIDUALS
     return "evaluate" if kind == "whatif" and answer["objective"] is None else "optimize"

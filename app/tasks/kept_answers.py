@@ -1,6 +1,4 @@
-"""Kept answers that a task needs: those that its request names, and the moves of a cycle among
-them.
-"""
+"""Kept answers of a task: the answers named in its request, and moves of cycles."""
 
 from __future__ import annotations
 
@@ -26,9 +24,7 @@ def answers_given(kept: Mapping[str, bytes]) -> AbstractContextManager[None]:
 
 
 def kept_answers(names: list[str]) -> list[Any]:
-    """The kept answers of these names. Raises PartsNeeded with those that are not at hand, and
-    InvalidRequest.
-    """
+    """The kept answers of these names. Raises PartsNeeded for missing ones, or InvalidRequest."""
     kept = _KEPT.get() or {}
     missing = [name for name in names if name not in kept]
     if missing:

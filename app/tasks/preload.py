@@ -1,4 +1,4 @@
-"""Imports everything that workers use, once, in the process that they are forked from."""
+"""Imports of all modules used by workers, in the process from which they are forked."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ with importing():
             import_module(module.name)
     for name in TASKS:
         import_module(f"joulepath.app.tasks.{name}")
-    # imported where it is called, because the process that answers HTTP does not need it
+    # The process answering HTTP does not need it, so that callers import it locally.
     import_module("toppra")
-    # whose fields messages about large bodies name
+    # Messages about large bodies name its fields.
     import_module("joulepath.app.schemas.studies")
 
-# SIGTERM from a service manager reaches every process of the service. This one ends with its
-# parent, and its end would end the workers, which must last until the requests in flight are
-# answered.
+# SIGTERM from a service manager reaches all processes. This process ends with its parent. An
+# earlier end would end the workers before running requests are answered.
 signal.signal(signal.SIGTERM, signal.SIG_IGN)

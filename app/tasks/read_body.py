@@ -16,14 +16,13 @@ from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import invalid_request
 
 _SMALL = 1024
-"""Most bytes, pickled, of a field that the service's process gets to see."""
+"""Largest pickled field [byte] readable in the service's process."""
 
 
 class HeldBody:
-    """A validated body that stays pickled until it comes to a worker, as part of a task: there it
-    is the model itself.
+    """A validated body, pickled until a worker receives it as part of a task.
 
-    Small fields can be read here. Others are an ellipsis: one can only see that they are not None.
+    Small fields can be read here. Large ones are an ellipsis if they are not None.
     """
 
     def __init__(self, pickled: bytes, fields: dict[str, Any], given: set[str]) -> None:
@@ -42,7 +41,7 @@ class HeldBody:
 
 @dataclass(frozen=True)
 class ReadBodyTask:
-    """A JSON body in the parts in which it was received, its schema, and the request's id."""
+    """A JSON body in its received parts, its schema, and the request's id."""
 
     model: type[BaseModel]
     parts: Sequence[bytes]
@@ -71,5 +70,5 @@ def pickled_body(read: BaseModel) -> tuple[bytes, dict[str, Any], set[str]]:
 
 
 def held(result: TaskResult) -> HeldBody:
-    """The body that a ReadBodyTask has read."""
+    """The body read by a ReadBodyTask."""
     return HeldBody(*pickle.loads(result.document))

@@ -1,4 +1,4 @@
-"""What tells a request from others: two are equal if they mean the same."""
+"""Keys of requests: requests with the same meaning are equal."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ _CELL = set(ArmRequest.model_fields) - {"payload"}
 
 
 def meaning_of(kind: str, body: Any) -> Meaning:
-    """What a validated request to the endpoint `kind` means: the order of fields, defaults that are
-    spelled out, and its deadline do not matter."""
+    """The meaning of a validated request to the endpoint `kind`.
+
+    It does not depend on the order of fields, on explicit defaults, or on the deadline.
+    """
     assert isinstance(body, BaseModel)
     content = [__version__, _FORM, kind, body.model_dump(mode="json", exclude={"deadline"})]
     base = (body.optimize or body.evaluate) if isinstance(body, WhatifRequest) else body
@@ -32,17 +34,16 @@ def meaning_of(kind: str, body: Any) -> Meaning:
 
 
 def cell_of(body: CycleRequest) -> str:
-    """What a cycle says of the arm and its cell: cycles that agree in it may have moves in
-    common."""
+    """A key of the arm and the cell of a cycle: cycles with equal keys may share moves."""
     return _hash([__version__, body.model_dump(mode="json", include=_CELL)])
 
 
 def key_of(
     meaning: Meaning, owner: str | None, own_robot: dict[str, Any] | None, job_id: str | None = None
 ) -> str:
-    """The key of a request of `owner`; `own_robot` are the figures of a robot that a user added.
+    """The key of a request of `owner`; `own_robot` are the figures of an added robot.
 
-    With a `job_id`, it is equal to none of another job.
+    With a `job_id`, it differs from the keys of all other jobs.
     """
     return _hash([meaning["digest"], owner, own_robot, job_id])
 

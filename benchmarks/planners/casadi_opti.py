@@ -42,8 +42,8 @@ class CasadiOpti:
     title = "CasADi Opti with IPOPT, hull bounds"
     packages: tuple[str, ...] = ("casadi",)
     what = (
-        "B-spline of 13 control points on 32 nodes, duration free, the same dynamics and "
-        "energy, hull bounds"
+        "B-spline of 13 control points on 32 nodes, duration free, the same dynamics and energy, "
+        "hull bounds"
     )
     hull = True
 

@@ -15,6 +15,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods import solver_for
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 PATIENCE = 10.0  # s
 
@@ -38,7 +39,11 @@ class Candidate:
         task = PreparedProblem.of(
             Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal)
         )
-        return _motion(solver_for(task, q_start, q_goal, Deadline.after(PATIENCE)).solve().spline)
+        return _motion(
+            solver_for(SolveContext.of(task, q_start, q_goal, Deadline.after(PATIENCE)))
+            .solve()
+            .spline
+        )
 
 
 class Answer:
@@ -91,7 +96,11 @@ class Line:
                 method="time_scaling",
             )
         )
-        return _motion(solver_for(task, q_start, q_goal, Deadline.after(PATIENCE)).solve().spline)
+        return _motion(
+            solver_for(SolveContext.of(task, q_start, q_goal, Deadline.after(PATIENCE)))
+            .solve()
+            .spline
+        )
 
 
 def _prepare(robot: Robot) -> None:

@@ -42,8 +42,8 @@ class ToppraFastest:
     title = "toppra, time-optimal line"
     packages: tuple[str, ...] = ("toppra",)
     what = (
-        "straight line in joint space, least time under limits of speed, acceleration and "
-        "torque; no limit on jerk"
+        "straight line in joint space, least time under limits of speed, acceleration and torque; "
+        "no limit on jerk"
     )
 
     def __init__(self, robot: Robot) -> None:

@@ -1,8 +1,11 @@
-"""The smallest capsule around points: it is convex, so that it holds the hull of a mesh if it holds
-its vertices.
+"""The smallest capsule around points.
+
+A capsule is convex: if it contains the vertices of a mesh, it contains the whole mesh.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
@@ -12,19 +15,28 @@ from joulepath.models.capsule_cover import outside
 from joulepath.models.robot import Array, LinkCapsule
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 
-# m: places of the ends are rounded to this, the radius up to it
-DIGIT = 1e-5
-# most points of which a hull is computed at a time, about a second if all are its corners
-HULL = 100_000
-# of the search for the ends: steps, and the change of an end [m] at which it stops
-STEPS, CONVERGED = 1500, 1e-5
+
+@dataclass(frozen=True)
+class CapsuleSearch:
+    """Settings of the search for the ends of the axis."""
+
+    digit: float = 1e-5
+    """Last digit of the ends and of the radius, which is rounded up [m]."""
+    hull_points: int = 100_000
+    """Most points of one convex hull, which takes about a second if all of them are vertices."""
+    steps: int = 1500
+    """Most steps."""
+    tolerance: float = 1e-5
+    """Change of an end [m] at which the search stops."""
+
+
+SEARCH = CapsuleSearch()
 
 
 def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[Array, float]:
-    """Ends (2, 3) [m] of the axis and radius [m] of a small capsule that holds points (n, 3) [m].
+    """Ends (2, 3) [m] of the axis and radius [m] of a small capsule around points (n, 3) [m].
 
-    Its volume is least as far as a direct search from each principal axis finds. The radius is
-    exact.
+    Direct searches from the three principal axes minimise the volume. The radius is exact.
     """
     points = _outermost(points, checkpoint)
     centre = points.mean(axis=0)
@@ -43,31 +55,38 @@ def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[A
                 start,
                 (points, checkpoint),
                 "Nelder-Mead",
-                options={"maxiter": STEPS, "xatol": CONVERGED},
+                options={"maxiter": SEARCH.steps, "xatol": SEARCH.tolerance},
             )
         )
     axis = (
-        np.round(min(found, key=lambda each: float(each.fun)).x.reshape(2, 3) / DIGIT) * DIGIT + 0.0
+        np.round(min(found, key=lambda each: float(each.fun)).x.reshape(2, 3) / SEARCH.digit)
+        * SEARCH.digit
+        + 0.0
     )
-    return axis, float(np.ceil(_reach(axis, points) / DIGIT) * DIGIT)
+    return axis, float(np.ceil(_reach(axis, points) / SEARCH.digit) * SEARCH.digit)
 
 
 def _outermost(points: Array, checkpoint: Checkpoint) -> Array:
-    """The corners of the hull, or all points if they are flat. Of very many points some more: those
-    of parts' hulls.
+    """Vertices of the convex hull; all points if they are flat.
+
+    Very many points are divided into parts, whose hulls are united.
     """
-    parts = np.array_split(points, -(-len(points) // HULL))
+    parts = np.array_split(points, -(-len(points) // SEARCH.hull_points))
     if len(parts) > 1:
         points = np.concatenate([_outermost(part, checkpoint) for part in parts])
     checkpoint()
     try:
-        return np.asarray(points[ConvexHull(points).vertices]) if len(points) <= HULL else points
+        return (
+            np.asarray(points[ConvexHull(points).vertices])
+            if len(points) <= SEARCH.hull_points
+            else points
+        )
     except (QhullError, ValueError):
         return points
 
 
 def _volume(x: Array, points: Array, checkpoint: Checkpoint) -> float:
-    """Volume [m³] of the capsule with ends x (6,) that reaches all points."""
+    """Volume [m³] of the capsule with axis ends x (6,) around all points."""
     checkpoint()
     axis = x.reshape(2, 3)
     radius = _reach(axis, points)

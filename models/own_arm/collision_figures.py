@@ -1,6 +1,6 @@
-"""Figures of the links' shapes: capsules, and the pairs of links that are not compared.
+"""Figures of link shapes: capsules, and pairs of links excluded from collision checks.
 
-A link that has neither capsules of the user nor shapes in the URDF gets a capsule from joint to
+A link without capsules of the user and without shapes in the URDF gets a capsule from joint to
 joint.
 """
 
@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from joulepath.models.own_arm import rules
-from joulepath.models.own_arm.description import LONGEST_NAME, WIDEST, Description, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
 from joulepath.models.own_arm.figure import assumed, stated
 from joulepath.models.own_arm.link_shapes import LinkShapes, Rows, check_near
 from joulepath.models.own_arm.meeting_pairs import pairs_that_meet
+from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.srdf import disabled_pairs
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain
@@ -22,8 +22,8 @@ from joulepath.models.shape_sizes import WrongSize, check_lengths
 from joulepath.models.uploads.limits import Checkpoint
 from joulepath.models.urdf import BASE
 
-# a link shorter than this, over its capsule's radius, has a ball
 SHORT = 1e-3
+"""Length over radius below which the capsule of a link is a ball."""
 _FRAME = "x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, radius."
 
 
@@ -35,8 +35,16 @@ def collision_figures(
     warnings: list[str],
     checkpoint: Checkpoint,
 ) -> dict[str, Any]:
-    """Figures of the section `collision`; `links` are the names of the moving links. Shapes that
-    are not read are added to `warnings`."""
+    """Figures of the section `collision`.
+
+    Args:
+        description: the user's description.
+        chain: the joints of the URDF.
+        upright: the frames of the links.
+        links: names of the moving links.
+        warnings: messages about unread shapes are appended here.
+        checkpoint: ends the computation by an exception.
+    """
     shapes, radius = (
         LinkShapes.of(description, chain, upright, checkpoint),
         _radius(description, upright),
@@ -54,8 +62,8 @@ def collision_figures(
     if pairs is None:
         often = pairs_that_meet(chain, upright, capsules, guessed, checkpoint)
         note = (
-            "Pairs whose capsules meet in 95 % of 300 random configurations, or in 30 % if one "
-            "is from joint to joint."
+            "Pairs whose capsules meet in 95 % of 300 random configurations, or in 30 % if one is "
+            "from joint to joint."
         )
         figures["never_meet"] = assumed(often, "1", note)
     else:
@@ -76,26 +84,24 @@ def _radius(description: Description, upright: UprightChain) -> float:
     """Radius [m] of links without a shape."""
     lengths = [np.linalg.norm(each.translation) for each in (*upright.placements, upright.flange)]
     given = description.collision.radius
-    radius = float(rules.RADIUS * sum(lengths)) if given is None else given
+    radius = float(RULES.radius * sum(lengths)) if given is None else given
     try:
-        check_lengths("collision.radius, that of links without a shape,", radius, WIDEST)
+        check_lengths("collision.radius", radius, PLAUSIBLE.radius)
     except WrongSize as error:
         raise InvalidArm("collision.radius", str(error)) from None
     return radius
 
 
 def _listed(names: list[str]) -> str:
-    """Names that a URDF gives, each once, as far as they are of a length to be read."""
-    return ", ".join(name[:LONGEST_NAME] for name in dict.fromkeys(names))
+    """Distinct names of a URDF, truncated to a readable length."""
+    return ", ".join(name[: PLAUSIBLE.name] for name in dict.fromkeys(names))
 
 
 def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:
-    """A capsule from the link's joint to the next one, or to the flange; a ball where both are at
-    one place.
-    """
+    """A capsule from the link's joint to the next joint or the flange; a ball if both coincide."""
     end = (*upright.placements, upright.flange)[k].translation
     length = float(np.linalg.norm(end))
-    # as far from both joints as its radius, so that it ends where the next link's begins
+    # One radius away from both joints: it ends at the beginning of the next link's capsule.
     share = min(0.5, radius / length) if length > SHORT * radius else 0.5
     return [[*(share * end).tolist(), *((1 - share) * end).tolist(), radius]]
 
@@ -103,9 +109,7 @@ def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:
 def _given_pairs(
     description: Description, chain: Chain, checkpoint: Checkpoint
 ) -> list[list[int]] | None:
-    """Pairs of links that the user does not want compared, in words of their own or in an SRDF;
-    None for no word.
-    """
+    """Pairs of links excluded by the description or an SRDF; None without either."""
     number = {link: k for k, rigid in enumerate(chain.rigid) for link in rigid}
     own, srdf = description.collision.never_meet, description.srdf
     for link in (each for pair in own or () for each in pair):
@@ -115,7 +119,7 @@ def _given_pairs(
             )
     if own is None and srdf is None:
         return None
-    # an SRDF may be that of a larger machine
+    # An SRDF may describe a larger machine.
     given = [*(own or ()), *(() if srdf is None else disabled_pairs(srdf, checkpoint))]
     known = [(number[a], number[b]) for a, b in given if a in number and b in number]
     return [

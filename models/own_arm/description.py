@@ -1,4 +1,4 @@
-"""What a user says of an arm of their own: its URDF, and what a URDF does not hold."""
+"""The description of a user's own arm: its URDF, and figures beyond a URDF."""
 
 from __future__ import annotations
 
@@ -14,16 +14,34 @@ Letter = Literal["A", "B", "C", "T"]
 # x, y, z of both ends of the axis in the link's frame, then the radius [m]
 CapsuleRow = tuple[float, float, float, float, float, float, float]
 
-# greatest radius of a capsule that a user gives [m]
-WIDEST = 1.0
-# characters of a name or a path in a file that a message repeats at most
-LONGEST_NAME = 200
+
+@dataclass(frozen=True)
+class PlausibleRanges:
+    """Ranges of an arm in SI units; a description beyond them is likely in other units."""
+
+    mass: float = 1e4
+    """Largest mass [kg], lever [m] or inertia [kg·m²]."""
+    length: float = 50.0
+    """Largest distance of a joint or shape from the previous joint [m]."""
+    angle: float = 100.0
+    """Largest position limit [rad]."""
+    mesh: float = 5.0
+    """Largest mesh of a link [m]; a file in millimetres needs a scale."""
+    radius: float = 1.0
+    """Largest radius of a capsule [m]."""
+    least: float = 1e-6
+    """Least positive limit, inertia or friction [SI]."""
+    most: float = 1e6
+    """Greatest limit, inertia or friction [SI]."""
+    name: int = 200
+    """Most characters of a name or path repeated in a message."""
+
+
+PLAUSIBLE = PlausibleRanges()
 
 
 class InvalidArm(ValueError):
-    """A description or URDF that makes no robot. `field` is the place in the description, e.g.
-    `drives.copper`.
-    """
+    """An invalid description or URDF. `field` is the path in the description: `drives.copper`."""
 
     def __init__(self, field: str, message: str) -> None:
         super().__init__(message)
@@ -35,11 +53,11 @@ class InvalidArm(ValueError):
 
 @dataclass(frozen=True)
 class Drives:
-    """Joint-side figures of motors and gears; what is None follows from the torque limits
-    (`joulepath.models.own_arm.rules`).
+    """Joint-side figures of motors and gears.
 
     `rotor_inertia` [kg·m²], `coulomb` [N·m] and `viscous` [N·m·s/rad] friction, `copper`
-    [W/(N·m)²]: copper loss over the square of the motor torque.
+    [W/(N·m)²]: copper loss over the square of the motor torque. None stands for the default derived
+    from the torque limits (`joulepath.models.own_arm.rules`).
     """
 
     rotor_inertia: PerJoint | None = None
@@ -50,9 +68,7 @@ class Drives:
 
 @dataclass(frozen=True)
 class Electronics:
-    """Power [W] of the arm's electronics, and the share of surplus power that the supply takes back
-    (0 … 1).
-    """
+    """Power [W] of the arm's electronics, and the share of surplus power fed back (0 … 1)."""
 
     idle_power: float | None = None
     controller_power: float | None = None
@@ -61,9 +77,12 @@ class Electronics:
 
 @dataclass(frozen=True)
 class Collision:
-    """Shape of the links. `capsules` by the name of a link; links without get those of the URDF's
-    own shapes, or one of `radius` [m] from joint to joint. `never_meet`: pairs of links that are
-    not compared."""
+    """Shapes of the links.
+
+    `capsules` are given by the name of a link. Other links have capsules around their URDF shapes,
+    or one of `radius` [m] from joint to joint. `never_meet` has pairs of links excluded from
+    checks.
+    """
 
     capsules: Mapping[str, tuple[CapsuleRow, ...]] | None = None
     radius: float | None = None
@@ -82,15 +101,13 @@ class Motion:
 
 @dataclass(frozen=True)
 class Description:
-    """An arm of a user's own: the URDF's text, the link `tip` at its end, and what a URDF does not
-    say.
+    """A user's own arm: text of the URDF, link `tip` at the end of the arm, further figures.
 
-    `acceleration` [rad/s²], `payload` [kg]. `base` is the link whose frame is the world frame
-    (default: the root). `velocity` [rad/s] and `torque` [N·m] replace the URDF's limits;
-    `torque_side` is what the latter are for; `jerk` [rad/s³]. `locked` has a position [rad] or [m]
-    for each joint that is held. `source` says where the URDF is from, `trust` how good it is.
-    `srdf` is the text of an SRDF, whose disabled collisions are not compared. `meshes` has the
-    content of mesh files by their paths.
+    `acceleration` [rad/s²], `payload` [kg]. `base` is the link with the world frame (default: the
+    root). `velocity` [rad/s] and `torque` [N·m] replace the limits of the URDF, `torque_side` says
+    whether torque limits include friction and rotor; `jerk` [rad/s³]. `locked` has positions [rad]
+    or [m] of fixed joints. `source` is the origin of the URDF, `trust` its trust letter. `srdf` is
+    the text of an SRDF with disabled collision checks. `meshes` has mesh files by path.
     """
 
     urdf: str

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from joulepath.models.own_arm import rules
 from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figure import assumed, either, per_joint
-from joulepath.models.own_arm.rules import NOTES
+from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.robot import Array
 
 _PLAIN = "Behind the gear."
@@ -20,11 +19,11 @@ def drives(description: Description, joints: tuple[str, ...], tau_max: Array) ->
     given, ones = description.drives, np.ones(len(joints))
     inertia = per_joint("drives.rotor_inertia", given.rotor_inertia, joints, zero=True)
     copper = per_joint("drives.copper", given.copper, joints)
-    # the loss in W/(N·m)² is that of the current, over the square of the torque constant
-    scale, constant = rules.TORQUE_CONSTANT**2, rules.TORQUE_CONSTANT * ones
+    # W/(N·m)² is the loss of the current [W/A²] over the square of the torque constant
+    scale, constant = RULES.torque_constant**2, RULES.torque_constant * ones
     return {
         "gear_ratio": assumed(100.0 * ones, "1", NOTES["gear_ratio"]),
-        # not a guess but a scale: with a copper loss of the user's own, nothing rests on it
+        # A scale and no guess: with a given copper loss, the energy does not depend on it.
         "torque_constant": either(
             description,
             None if copper is None else constant,
@@ -35,14 +34,14 @@ def drives(description: Description, joints: tuple[str, ...], tau_max: Array) ->
         "rotor_inertia": either(
             description,
             inertia,
-            rules.ROTOR_INERTIA * tau_max,
+            RULES.rotor_inertia * tau_max,
             "kg·m²",
             (_PLAIN, NOTES["rotor_inertia"]),
         ),
         "copper": either(
             description,
             None if copper is None else scale * copper,
-            scale * rules.COPPER / tau_max,
+            scale * RULES.copper / tau_max,
             "W/A²",
             (
                 "Copper loss over the torque's square, times the square of the torque constant.",
@@ -69,7 +68,7 @@ def electronics(description: Description, nq: int) -> dict[str, Any]:
         "idle_power": either(
             description,
             given.idle_power,
-            rules.IDLE_POWER * nq,
+            RULES.idle_power * nq,
             "W",
             ("Arm at rest.", NOTES["idle_power"]),
         ),
@@ -95,7 +94,7 @@ def friction(description: Description, joints: tuple[str, ...], tau_max: Array) 
     is_given = coulomb is not None and viscous is not None
     return {
         "coulomb": either(
-            description, coulomb, rules.COULOMB * tau_max, "N·m", (_PLAIN, NOTES["coulomb"])
+            description, coulomb, RULES.coulomb * tau_max, "N·m", (_PLAIN, NOTES["coulomb"])
         ),
         "curved": either(
             description, zeros if is_given else None, zeros, "N·m", ("Not in this law.",) * 2
@@ -108,7 +107,7 @@ def friction(description: Description, joints: tuple[str, ...], tau_max: Array) 
             ("Without effect, as `curved` is zero.",) * 2,
         ),
         "viscous": either(
-            description, viscous, rules.VISCOUS * tau_max, "N·m·s/rad", (_PLAIN, NOTES["viscous"])
+            description, viscous, RULES.viscous * tau_max, "N·m·s/rad", (_PLAIN, NOTES["viscous"])
         ),
     }
 

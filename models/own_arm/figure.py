@@ -1,4 +1,4 @@
-"""One figure: a value with its unit, source, trust letter and note, as a robot's file has it."""
+"""One figure of a robot: value, unit, source, trust letter and note."""
 
 from __future__ import annotations
 
@@ -6,27 +6,24 @@ from typing import Any
 
 import numpy as np
 
-from joulepath.models.own_arm.description import Description, InvalidArm, PerJoint
+from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm, PerJoint
 from joulepath.models.robot import Array
-
-# no limit, inertia or friction of an arm is beyond these, in SI units
-LEAST, MOST = 1e-6, 1e6
 
 
 def stated(description: Description, value: Any, unit: str, note: str) -> dict[str, Any]:
-    """A figure of the URDF, or of the description, whose source and letter the user states."""
+    """A figure of the URDF or description, with the user's source and trust letter."""
     return _figure(value, unit, description.source, description.trust, note)
 
 
 def assumed(value: Any, unit: str, note: str) -> dict[str, Any]:
-    """A figure that nobody gave."""
+    """An engineering default."""
     return _figure(value, unit, "none: engineering default", "E", note)
 
 
 def either(
     description: Description, given: Any, default: Any, unit: str, notes: tuple[str, str]
 ) -> dict[str, Any]:
-    """The figure that the user gave, or the default where it is None; `notes` on both."""
+    """The user's figure, or the default if it is None; `notes` has the note of each."""
     if given is None:
         return assumed(default, unit, notes[1])
     return stated(description, given, unit, notes[0])
@@ -35,10 +32,16 @@ def either(
 def per_joint(
     field: str, given: PerJoint | None, joints: tuple[str, ...], zero: bool = False
 ) -> Array | None:
-    """One value (nq,) for each joint; None stays None.
+    """Values (nq,) of all joints; None stays None.
 
-    Raises InvalidArm, which names the joint, unless all are between LEAST and MOST, or 0 where
-    `zero` allows it.
+    Args:
+        field: the field of the description, for the error.
+        given: one number for all joints, or one per joint.
+        joints: names of the joints.
+        zero: whether 0 is allowed, beside the range from PLAUSIBLE.least to PLAUSIBLE.most.
+
+    Raises:
+        InvalidArm: a value is out of range; the error names the joint.
     """
     if given is None:
         return None
@@ -51,10 +54,12 @@ def per_joint(
         )
     values = np.broadcast_to(values, len(joints))
     for value, joint in zip(values, joints, strict=True):
-        if not (LEAST <= value <= MOST or (zero and value == 0)):
+        if not (PLAUSIBLE.least <= value <= PLAUSIBLE.most or (zero and value == 0)):
             least = "0, or from " if zero else "from "
             raise InvalidArm(
-                field, f"{field} of joint {joint!r} must be {least}{LEAST:g} to {MOST:g}."
+                field,
+                f"{field} of joint {joint!r} must be {least}{PLAUSIBLE.least:g} to "
+                f"{PLAUSIBLE.most:g}.",
             )
     return np.asarray(values)
 

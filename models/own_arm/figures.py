@@ -1,6 +1,5 @@
-"""The figures of a robot, as a bundled robot's file has them, from the description of a user's own
-arm.
-"""
+"""Figures of a robot, in the form of a bundled `figures.yaml`, from the description of an own
+arm."""
 
 from __future__ import annotations
 
@@ -11,29 +10,31 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.from_figures import NO_LINKS
-from joulepath.models.own_arm import rules
 from joulepath.models.own_arm.collision_figures import collision_figures
-from joulepath.models.own_arm.description import Description, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
 from joulepath.models.own_arm.energy_figures import drives, electronics, friction
 from joulepath.models.own_arm.figure import assumed, either, per_joint, stated
+from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
-# kg and kg·m², m, rad: beyond these, a description is in other units
-HEAVIEST, LONGEST, FARTHEST_TURN = 1e4, 50.0, 100.0
 _PLACEMENT = "x, y, z, roll, pitch, yaw"
 
 
 def own_figures(
     name: str, description: Description, checkpoint: Checkpoint = unwatched
 ) -> tuple[dict[str, Any], list[str]]:
-    """Figures of a robot with this name; and warnings: what is hardly real, and which figures are
-    defaults.
+    """Figures of the robot, and warnings about implausible values and engineering defaults.
 
-    Raises InvalidArm, which names the field of the description, and the link or joint, and what
-    `checkpoint` raises.
+    Args:
+        name: the name of the robot.
+        description: the user's description.
+        checkpoint: ends the computation by an exception.
+
+    Raises:
+        InvalidArm: the error names the field, and the link or joint.
     """
     chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
@@ -49,9 +50,7 @@ def own_figures(
         "drives": drives(description, chain.joints, tau_max),
         "electronics": electronics(description, chain.nq),
         "friction_table": {
-            "knee": assumed(
-                rules.KNEE, "rad/s", "Coulomb friction's step is spread over this speed."
-            )
+            "knee": assumed(RULES.knee, "rad/s", "Coulomb friction is smoothed over this speed.")
         },
         "friction_laws": {"coulomb_viscous": friction(description, chain.joints, tau_max)},
     }
@@ -74,7 +73,7 @@ def own_figures(
 
 
 def _link_names(chain: Chain) -> list[str]:
-    """Names of the moving links. Those that mean something else in the figures get an ending."""
+    """Names of the moving links; names with another meaning in the figures get a suffix."""
     names = list[str]()
     for link in chain.links:
         while link in (BASE, FLANGE, *NO_LINKS, *names):
@@ -87,8 +86,8 @@ def _kinematics(
     description: Description, chain: Chain, upright: UprightChain, links: list[str]
 ) -> dict[str, Any]:
     frame = (
-        f"{_PLACEMENT} of each joint's frame in that of the link before, turned so that the "
-        "joint turns about z."
+        f"{_PLACEMENT} of each joint's frame in the frame of the previous link, rotated so that "
+        "the joint turns about z."
     )
     figures = {
         "joint_names": stated(description, list(chain.joints), "1", "From base to flange."),
@@ -116,7 +115,7 @@ def _row(placement: pin.SE3) -> list[float]:
 def _inertials(
     description: Description, chain: Chain, upright: UprightChain, warnings: list[str]
 ) -> dict[str, Any]:
-    """Of each moving link with all that is fixed to it."""
+    """Inertials of the moving links, with all bodies fixed to them."""
     ends = [*upright.placements[1:], upright.flange]
     for link, body, end in zip(chain.links, upright.inertias, ends, strict=True):
         _check_body(link, body, float(np.linalg.norm(end.translation)), warnings)
@@ -141,52 +140,50 @@ _ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]) -> None:
-    """Whether a body can be real; a warning where it hardly is. `length` [m] to the next joint."""
+    """Raises InvalidArm for an impossible body; warns of an implausible one.
+
+    `length` is the distance [m] to the next joint.
+    """
     if not body.mass > 0:
         raise InvalidArm(
             "urdf", f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>."
         )
     if (
-        not (np.abs([body.mass, *body.lever, *body.inertia.ravel()]) <= HEAVIEST).all()
-        or not length <= LONGEST
+        not (np.abs([body.mass, *body.lever, *body.inertia.ravel()]) <= PLAUSIBLE.mass).all()
+        or not length <= PLAUSIBLE.length
     ):
         raise InvalidArm(
             "urdf",
-            f"Link {link!r} must be lighter than {HEAVIEST:g} kg and shorter than {LONGEST:g} m: "
-            "are its units SI?",
+            f"Link {link!r} must be lighter than {PLAUSIBLE.mass:g} kg and shorter than "
+            f"{PLAUSIBLE.length:g} m: are its units SI?",
         )
     moments = np.linalg.eigvalsh(body.inertia)
-    if moments[0] < -rules.ROUNDED * abs(moments[2]):
+    if moments[0] < -RULES.rounded * abs(moments[2]):
         raise InvalidArm(
             "urdf",
             f"Link {link!r} has an inertia with a negative principal moment of {moments[0]:.3g}.",
         )
     excess = moments[2] / max(moments[0] + moments[1], 1e-300) - 1
-    if moments[2] > 0 and excess > rules.IMPOSSIBLE:
+    if moments[2] > 0 and excess > RULES.impossible:
         raise InvalidArm(
             "urdf",
             f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² "
-            "is more than the "
-            f"sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
+            f"is more than the sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
         )
-    if moments[2] > 0 and excess > rules.ROUNDED:
+    if moments[2] > 0 and excess > RULES.rounded:
         warnings.append(
             f"Link {link!r}: a principal moment is {excess:.1%} above the sum of the others."
         )
-    least = rules.LEAST_GYRATION * length / np.sqrt(12)
+    least = RULES.least_gyration * length / np.sqrt(12)
     gyration = float(np.sqrt(max(moments[2], 0.0) / body.mass))
     if gyration < least:
         warnings.append(
             f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} "
-            "m, 0.7 of that of a "
-            "rod to the next joint."
+            "m, 0.7 of that of a rod to the next joint."
         )
 
 
-_SIDE = (
-    "What the torque limit is for: the motor, friction and rotor included, or the link, "
-    "without them."
-)
+_SIDE = "Whether the torque limit is for the motor, with friction and rotor, or for the link."
 
 
 def _limits(description: Description, chain: Chain) -> dict[str, Any]:
@@ -207,10 +204,10 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
                     f"give `{field}`.",
                 )
         found[field] = per_joint(field, tuple(of_urdf), chain.joints) if values is None else values
-    if not 0 <= description.payload <= HEAVIEST:
-        raise InvalidArm("payload", f"payload must be a mass from 0 to {HEAVIEST:g} kg.")
-    if max(np.abs([chain.q_min, chain.q_max]).ravel()) > FARTHEST_TURN:
-        raise InvalidArm("urdf", f"A joint's limits must be within {FARTHEST_TURN:g} rad.")
+    if not 0 <= description.payload <= PLAUSIBLE.mass:
+        raise InvalidArm("payload", f"payload must be a mass from 0 to {PLAUSIBLE.mass:g} kg.")
+    if max(np.abs([chain.q_min, chain.q_max]).ravel()) > PLAUSIBLE.angle:
+        raise InvalidArm("urdf", f"A joint's limits must be within {PLAUSIBLE.angle:g} rad.")
     return {
         "position_min": stated(
             description, chain.q_min, "rad", "A joint without end has one turn to either side."
@@ -223,22 +220,22 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
         "jerk": either(
             description,
             jerk,
-            rules.JERK * acceleration,
+            RULES.jerk * acceleration,
             "rad/s³",
-            ("Symmetric.", rules.NOTES["jerk"]),
+            ("Symmetric.", NOTES["jerk"]),
         ),
         "torque": stated(
             description, found["torque"], "N·m", "At the joint, behind the gear: see torque_side."
         ),
         "torque_side": either(
-            description, description.torque_side, "motor", "1", (_SIDE, rules.NOTES["torque_side"])
+            description, description.torque_side, "motor", "1", (_SIDE, NOTES["torque_side"])
         ),
         "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
     }
 
 
 def _assumed(figures: dict[str, Any]) -> Iterator[str]:
-    """Places of the figures that are defaults."""
+    """Paths of the figures with engineering defaults."""
     for name, content in figures.items():
         if isinstance(content, dict) and content.get("trust") == "E":
             yield name

@@ -1,7 +1,7 @@
-"""Capsules of a URDF's links, in the frames of the links that they move with.
+"""Capsules of the links of a URDF, in the frames of the moving links.
 
-A link has the capsules that the user gives, else one around each of its `<collision>` shapes,
-meshes included as far as their files were given.
+A link has the user's capsules, or else one around each of its `<collision>` shapes. Meshes count if
+their files were given.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.own_arm.capsule_around import capsule_around
-from joulepath.models.own_arm.description import WIDEST, CapsuleRow, Description, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, CapsuleRow, Description, InvalidArm
 from joulepath.models.own_arm.mesh_files import corners
 from joulepath.models.own_arm.robot_xml import numbers
 from joulepath.models.own_arm.upright import UprightChain
@@ -24,20 +24,18 @@ from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
 from joulepath.models.uploads.limits import LIMITS, Checkpoint
 
-# largest mesh of a link, and farthest place of a shape from its joint [m]: files in millimetres
-# need a scale
-LARGEST, FARTHEST = 5.0, 50.0
-
 Rows = list[list[float]]
-"""Of each capsule the ends of its axis and the radius, as in a robot's figures [m]."""
+"""Capsules: both ends of the axis and the radius [m], as in the figures of a robot."""
 Around = tuple[Array, float]
 """Ends (2, 3) of the axis and radius of a capsule [m]."""
 
 
 @dataclass(frozen=True)
 class LinkShapes:
-    """The links of a chain; `missing` are the files of meshes that were asked for and not given,
-    and `unknown` the kinds of shapes that are not read."""
+    """Shapes of the links of a chain.
+
+    `missing` collects the names of missing mesh files, `unknown` the unsupported kinds of shapes.
+    """
 
     chain: Chain
     upright: UprightChain
@@ -53,9 +51,7 @@ class LinkShapes:
     def of(
         cls, description: Description, chain: Chain, upright: UprightChain, checkpoint: Checkpoint
     ) -> LinkShapes:
-        """The links of a description. Raises InvalidArm for capsules of a link that the arm does
-        not have.
-        """
+        """The shapes of a description. Raises InvalidArm for capsules of an unknown link."""
         given = description.collision.capsules or {}
         if unknown := [name for name in given if not any(name in rigid for rigid in chain.rigid)]:
             raise InvalidArm(
@@ -64,7 +60,7 @@ class LinkShapes:
         return cls(chain, upright, given, description.meshes or {}, checkpoint)
 
     def rows(self, k: int) -> Rows:
-        """Capsules of all that moves with link k, 0 for the base. Raises InvalidArm."""
+        """Capsules of all URDF links fixed to link k, 0 for the base. Raises InvalidArm."""
         given = [row for link in self.chain.rigid[k] for row in self._given(k, link)]
         of_urdf = [
             row
@@ -80,7 +76,7 @@ class LinkShapes:
         for row in rows:
             self._count("collision.capsules", link)
             with _of_field("collision.capsules"):
-                check_lengths(f"The radius of a capsule of {link!r}", row[6], WIDEST)
+                check_lengths(f"The radius of a capsule of {link!r}", row[6], PLAUSIBLE.radius)
         return [
             _placed(self._frame(k, link), (np.array(row[:6]).reshape(2, 3), row[6])) for row in rows
         ]
@@ -99,9 +95,7 @@ class LinkShapes:
         return rows
 
     def _around(self, geometry: Element, where: str) -> Around | None:
-        """The capsule around a shape, in its frame; None for a shape that is not known, or not
-        there.
-        """
+        """The capsule around a shape, in its frame; None for an unknown or missing shape."""
         for kind in ("sphere", "cylinder", "capsule", "box", "mesh"):
             element = geometry.find(kind)
             if element is None:
@@ -137,9 +131,9 @@ class LinkShapes:
         with _of_field("urdf"):
             check_scale(f"{where} with a `scale` that", scale, points)
         points = points * scale
-        if not np.ptp(points, axis=0).max() < LARGEST:
+        if not np.ptp(points, axis=0).max() < PLAUSIBLE.mesh:
             raise InvalidArm(
-                "meshes", f"{where} larger than {LARGEST:g} m: has the URDF its `scale`?"
+                "meshes", f"{where} larger than {PLAUSIBLE.mesh:g} m: has the URDF its `scale`?"
             )
         with _of_field("meshes"):
             check_surface(f"{where} that", points)
@@ -152,12 +146,12 @@ class LinkShapes:
         if len(self._seen) > LIMITS.shapes:
             raise InvalidArm(
                 field,
-                f"With those of link {link!r}, the arm has more than {LIMITS.shapes} shapes: give "
-                "fewer capsules.",
+                f"With link {link!r}, the arm has more than {LIMITS.shapes} shapes: give fewer "
+                "capsules.",
             )
 
     def _frame(self, k: int, link: str) -> pin.SE3:
-        """The frame of a URDF link in that of the link k that it moves with."""
+        """The pose of a URDF link in the frame of the moving link k."""
         model = self.chain.model
         placement = model.frames[model.getFrameId(link, pin.FrameType.BODY)].placement
         own = pin.SE3(self.chain.T_base) if k == 0 else pin.SE3(self.upright.R[k], np.zeros(3))
@@ -165,19 +159,16 @@ class LinkShapes:
 
 
 def check_near(name: str, rows: Rows) -> None:
-    """Raises InvalidArm for capsules of a link that are far away, or nowhere: the origin of a joint
-    or a shape is.
-    """
-    if not (np.abs(np.array(rows)) < FARTHEST).all():
+    """Raises InvalidArm for capsules far from their joint or with undefined coordinates."""
+    if not (np.abs(np.array(rows)) < PLAUSIBLE.length).all():
         raise InvalidArm(
-            "urdf", f"The shape of link {name!r} is farther than {FARTHEST:g} m from its joint."
+            "urdf",
+            f"The shape of link {name!r} is farther than {PLAUSIBLE.length:g} m from its joint.",
         )
 
 
 def _lengths(element: Element, part: str, where: str, count: int = 1) -> Array:
-    """Lengths (count,) [m] in an attribute of a shape. Raises InvalidArm unless they are those of a
-    body.
-    """
+    """Lengths (count,) [m] in an attribute of a shape. Raises InvalidArm for implausible ones."""
     found = numbers(element, part, where, count=count)
     with _of_field("urdf"):
         check_lengths(f"{where}, whose `{part}`", found)
@@ -186,7 +177,7 @@ def _lengths(element: Element, part: str, where: str, count: int = 1) -> Array:
 
 @contextmanager
 def _of_field(field: str) -> Iterator[None]:
-    """Raises InvalidArm at the field for a wrong size."""
+    """Converts WrongSize into InvalidArm of a field."""
     try:
         yield
     except WrongSize as error:

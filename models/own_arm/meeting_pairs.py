@@ -1,9 +1,11 @@
-"""Pairs of links whose capsules are hardly ever apart: to compare them would make every motion a
-collision.
+"""Pairs of links whose capsules overlap in nearly every configuration.
+
+Checking such a pair would make every motion a collision.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import coal
@@ -16,12 +18,23 @@ from joulepath.models.own_arm.urdf_chain import Chain
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint
 
-# random configurations over which pairs are looked at, and the share of them from which on two
-# links cannot be apart. Joints have the ranges that links leave them: a pair that meets this often
-# with a guessed capsule says that it is too thick there
-SAMPLES, ALWAYS, OFTEN = 300, 0.95, 0.3
-# m: what rounding may take from a ball around a capsule
-ROUNDING = 1e-9
+
+@dataclass(frozen=True)
+class OverlapSettings:
+    """Settings of the search for overlapping pairs."""
+
+    samples: int = 300
+    """Random configurations."""
+    share: float = 0.95
+    """Least share of overlapping configurations of an excluded pair."""
+    guessed_share: float = 0.3
+    """The same for a pair with a guessed capsule: a maker would not build joint ranges in which
+    links collide this often, so that the guess is too thick."""
+    rounding: float = 1e-9
+    """Margin of the bounding balls [m] for rounding."""
+
+
+OVERLAP = OverlapSettings()
 
 
 def pairs_that_meet(
@@ -31,8 +44,15 @@ def pairs_that_meet(
     guessed: list[bool],
     checkpoint: Checkpoint,
 ) -> list[list[int]]:
-    """Pairs of links, next but one or farther, whose capsules meet in nearly every configuration,
-    or often if one of them is `guessed`."""
+    """Pairs of non-adjacent links whose capsules overlap in most random configurations.
+
+    Args:
+        chain: the joints and their ranges.
+        upright: the frames of the links.
+        capsules: capsules of every link, base first.
+        guessed: whether the capsules of a link are an assumption.
+        checkpoint: ends the computation by an exception.
+    """
     pairs = [(a, b) for a, b in combinations(range(chain.nq + 1), 2) if a + 1 < b]
     meets = np.zeros(len(pairs))
     shapes = [
@@ -40,7 +60,9 @@ def pairs_that_meet(
     ]
     balls = [_balls(rows) for rows in capsules]
     request = coal.CollisionRequest()
-    for q in np.random.default_rng(0).uniform(chain.q_min, chain.q_max, (SAMPLES, chain.nq)):
+    for q in np.random.default_rng(0).uniform(
+        chain.q_min, chain.q_max, (OVERLAP.samples, chain.nq)
+    ):
         frames = [pin.SE3.Identity()]
         for angle, placement in zip(q, upright.placements, strict=True):
             frames.append(
@@ -62,11 +84,11 @@ def pairs_that_meet(
                 )
                 for i, j in _close(T_a, around_a, T_b, around_b)
             )
-    share = [OFTEN if guessed[a] or guessed[b] else ALWAYS for a, b in pairs]
+    share = [OVERLAP.guessed_share if guessed[a] or guessed[b] else OVERLAP.share for a, b in pairs]
     return [
         list(pair)
         for pair, count, least in zip(pairs, meets, share, strict=True)
-        if count >= least * SAMPLES
+        if count >= least * OVERLAP.samples
     ]
 
 
@@ -74,14 +96,14 @@ def _balls(rows: Rows) -> Array:
     """Centre and radius (n, 4) [m] of the ball around each capsule."""
     return np.array(
         [
-            [*((np.array(row[:3]) + row[3:6]) / 2), row[6] + _length(row) / 2 + ROUNDING]
+            [*((np.array(row[:3]) + row[3:6]) / 2), row[6] + _length(row) / 2 + OVERLAP.rounding]
             for row in rows
         ]
     )
 
 
 def _close(T_a: pin.SE3, first: Array, T_b: pin.SE3, second: Array) -> list[list[int]]:
-    """Which of balls (n, 4) and (m, 4) [m], in their frames, overlap: indices of each pair."""
+    """Index pairs of overlapping balls (n, 4) and (m, 4) [m], each given in its own frame."""
     a, b = (
         balls[:, :3] @ T.rotation.T + T.translation for T, balls in ((T_a, first), (T_b, second))
     )

@@ -1,6 +1,4 @@
-"""Mesh files of a user's own arm: in a folder or a zip, found by the end of their paths, read by
-trimesh.
-"""
+"""Mesh files of an own arm in a folder or zip, found by the end of their paths."""
 
 from __future__ import annotations
 
@@ -12,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from joulepath.models.own_arm.description import LONGEST_NAME, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
 from joulepath.models.uploads.mesh import read_mesh
 from joulepath.models.uploads.mesh_text import MeshSize
 from joulepath.models.uploads.xml_tree import xml_tree
 
-# kinds that are read; of others, as of DAE, a link has its capsule from joint to joint
+# supported kinds; a link with other meshes has a capsule from joint to joint
 KINDS = ("stl", "obj")
 _PIECE = 1 << 20
-"""Bytes that are unpacked between two checkpoints."""
+"""Bytes unpacked between two checkpoints."""
 
 
 def in_zip(content: bytes, checkpoint: Checkpoint = unwatched) -> dict[str, bytes]:
@@ -43,7 +41,7 @@ def in_zip(content: bytes, checkpoint: Checkpoint = unwatched) -> dict[str, byte
         for piece in _unpacked(archive, entry):
             checkpoint()
             pieces.append(piece)
-            # a size that the header states may be false
+            # The size in the header may be wrong.
             left -= len(piece)
             if left < 0:
                 most = LIMITS.mesh_bytes >> 20
@@ -67,9 +65,7 @@ def _no_zip(error: Exception) -> InvalidArm:
 
 
 def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:
-    """The mesh files that the text of a URDF names, as far as they are in a folder; none for a text
-    that is no XML.
-    """
+    """The mesh files of a URDF in a folder; none if the text is not XML."""
     try:
         named = (each.get("filename", "") for each in xml_tree(urdf).iter("mesh"))
     except UnreadableFile:
@@ -89,10 +85,9 @@ def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:
 def corners(
     meshes: Mapping[str, bytes], reference: str, checkpoint: Checkpoint = unwatched
 ) -> Array | None:
-    """Corners (n, 3) of the mesh that a URDF names, in its own units; None if it is not among the
-    files.
+    """Corners (n, 3) of a mesh of the URDF, in its own units; None without its file.
 
-    Raises InvalidArm for a file that is none, or if several files fit.
+    Raises InvalidArm for an unreadable file, or several matching files.
     """
     path = _file_of(meshes, reference)
     if path is None:
@@ -101,17 +96,17 @@ def corners(
     try:
         found, _ = read_mesh(_kind(path), meshes[path], most, checkpoint)
     except UnreadableFile as error:
-        raise InvalidArm("meshes", f"{reference[:LONGEST_NAME]!r} {error}") from error
+        raise InvalidArm("meshes", f"{reference[: PLAUSIBLE.name]!r} {error}") from error
     if len(found) < 4 or not np.isfinite(found).all():
         raise InvalidArm(
             "meshes",
-            f"{reference[:LONGEST_NAME]!r} must have from 4 to {most.corners} finite corners.",
+            f"{reference[: PLAUSIBLE.name]!r} must have from 4 to {most.corners} finite corners.",
         )
     return found
 
 
 def _file_of(meshes: Mapping[str, bytes], reference: str) -> str | None:
-    """The path whose end agrees longest with the reference's."""
+    """The path with the longest common ending with the reference."""
     wanted = _parts(reference)[::-1]
 
     def agreement(path: str) -> int:
@@ -125,7 +120,7 @@ def _file_of(meshes: Mapping[str, bytes], reference: str) -> str | None:
     if len(fitting) > 1 and len({meshes[path] for path in fitting}) > 1:
         raise InvalidArm(
             "meshes",
-            f"Several files fit {reference[:LONGEST_NAME]!r}: {', '.join(sorted(fitting)[:3])}.",
+            f"Several files fit {reference[: PLAUSIBLE.name]!r}: {', '.join(sorted(fitting)[:3])}.",
         )
     return fitting[0] if fitting else None
 
@@ -136,7 +131,7 @@ def _below(folder: Path, reference: str) -> Iterator[Path]:
 
 
 def _parts(path: str) -> list[str]:
-    """Parts of a path or a URL, without scheme and steps up."""
+    """Components of a path or URL, without scheme, `.` and `..`."""
     plain = path.partition("://")[2] or path
     return [part for part in plain.replace("\\", "/").split("/") if part not in ("", ".", "..")]
 

@@ -27,17 +27,19 @@ _DESCRIPTION = TypeAdapter(Description)
 
 
 def read_description(path: Path) -> Description:
-    """The description in a YAML file, whose `urdf` is the path of the URDF, relative to the file.
+    """The description in a YAML file.
 
-    `meshes` is the path of a folder or zip with mesh files; without it, they are looked for beside
-    the URDF.
+    Its `urdf` is the path of the URDF, and `meshes` the path of a folder or zip with mesh files,
+    both relative to the file. Without `meshes`, the folder of the URDF is searched.
 
-    Raises InvalidArm, which names the field; OSError if there is no such file.
+    Raises:
+        InvalidArm: the description is invalid; the error names the field.
+        OSError: the file cannot be read.
     """
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
         place = data.pop("meshes", None) if isinstance(data, dict) else None
-        # as JSON, whose lists are tuples to the validator
+        # The strict validator accepts JSON lists as tuples.
         found = _DESCRIPTION.validate_json(json.dumps(data))
     except (yaml.YAMLError, UnicodeDecodeError, TypeError) as error:
         raise InvalidArm("", f"{path.name} is no description in YAML: {error}") from None
@@ -61,9 +63,7 @@ def read_description(path: Path) -> Description:
 
 
 def _meshes(folder: Path, place: Any, beside: Path, urdf: str) -> dict[str, bytes]:
-    """The mesh files at a place relative to the folder of the description, or beside the URDF if
-    there is none.
-    """
+    """Mesh files at a path relative to the description, or beside the URDF without a path."""
     if place is None:
         return in_folder(beside, urdf)
     if not isinstance(place, str) or not (folder / place).exists():
@@ -75,8 +75,8 @@ def _meshes(folder: Path, place: Any, beside: Path, urdf: str) -> dict[str, byte
 
 
 def _first(error: ValidationError) -> InvalidArm:
-    """The first fault, with its place in the words of the file."""
+    """The first error, with its path in the file."""
     first = error.errors(include_url=False)[0]
-    # a union's members are no places
+    # Members of unions are not part of the path.
     place = ".".join(str(part) for part in first["loc"] if "[" not in str(part) and part != "float")
     return InvalidArm(place, f"{place or 'The file'}: {first['msg']}.")

@@ -13,7 +13,7 @@ from joulepath.models.uploads.xml_tree import xml_tree
 
 
 def robot_element(text: str, field: str, checkpoint: Checkpoint) -> Element:
-    """The root element of a description, `field` being "urdf" or "srdf". Raises InvalidArm."""
+    """The root element of a URDF or SRDF; `field` is "urdf" or "srdf". Raises InvalidArm."""
     kind = field.upper()
     try:
         root = xml_tree(text, checkpoint)
@@ -29,11 +29,17 @@ def robot_element(text: str, field: str, checkpoint: Checkpoint) -> Element:
 def numbers(
     element: Element | None, part: str, where: str, default: str = "", count: int = 3
 ) -> Array:
-    """The numbers (count,) of an attribute, or of `default` where element or attribute is not
-    there.
+    """The numbers (count,) of an attribute.
 
-    Raises InvalidArm unless there are `count`, all finite; its message starts with `where`, e.g.
-    "Joint 'a' has an <axis>".
+    Args:
+        element: the element; None if it is missing.
+        part: name of the attribute.
+        where: beginning of the error message, such as "Joint 'a' has an <axis>".
+        default: text in place of a missing element or attribute.
+        count: how many numbers are required.
+
+    Raises:
+        InvalidArm: the attribute does not have `count` finite numbers.
     """
     text = default if element is None else element.get(part, default)
     words = text.split(maxsplit=count)
@@ -48,6 +54,6 @@ def numbers(
 
 
 def number(element: Element | None, part: str, where: str, default: str = "") -> float:
-    """The one number of an attribute: see `numbers`."""
+    """The only number of an attribute: see `numbers`."""
     (value,) = numbers(element, part, where, default, 1)
     return float(value)

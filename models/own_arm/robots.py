@@ -1,4 +1,4 @@
-"""Robots of users' own arms, built once for each content of their figures."""
+"""Robots of own arms, built once per content of their figures."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def own_robot(name: str, figures: dict[str, Any]) -> Robot:
 
 
 def read_robot(path: Path) -> Robot:
-    """The robot that a description in YAML makes, named as the file. Raises InvalidArm or OSError.
+    """The robot of a YAML description, named after the file. Raises InvalidArm or OSError.
 
-    What was assumed has the trust letter E in `Robot.figures`.
+    Engineering defaults have the trust letter E in `Robot.figures`.
     """
     return own_robot(path.stem, own_figures(path.stem, read_description(path))[0])

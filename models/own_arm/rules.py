@@ -1,32 +1,48 @@
-"""What is assumed of an arm whose figures nobody has told: rules over joints of known arms, each
-with its range.
+"""Rules for figures missing in the description of an own arm, fitted to the joints of known arms.
 
-Rotor inertia through twelve joints of UR arms, FR3 and iiwa (rms factor 1.6, worst 2.5), friction
-through the strain- wave joints of UR arms, copper loss through UR5e and UR3e. tau_max is the
-greatest torque of the joint [N·m].
+Rotor inertia was fitted to twelve joints of UR arms, FR3 and iiwa (rms factor 1.6, worst 2.5),
+friction to the strain-wave joints of UR arms, copper loss to UR5e and UR3e. tau_max is the greatest
+torque of the joint [N·m]. NOTES has the range of each rule.
 """
 
 from __future__ import annotations
 
-# rotor inertia behind the gear [kg·m²], Coulomb friction [N·m] and viscous friction [N·m·s/rad],
-# over tau_max
-ROTOR_INERTIA, COULOMB, VISCOUS = 0.0117, 0.06, 0.055
-# copper loss [W/(N·m)²] times tau_max
-COPPER = 0.5
-# idle power of each joint's electronics [W]; jerk limit over the acceleration limit [1/s]
-IDLE_POWER, JERK = 6.0, 20.0
-# torque constant [N·m/A]: without effect on the energy, as copper loss is scaled with its square
-TORQUE_CONSTANT = 10.0
-# speed over which the step of Coulomb friction is spread [rad/s]
-KNEE = 1e-3
-# radius of a link without a shape over the sum of the distances between joints
-RADIUS = 0.045
-# least radius of gyration over that of a thin rod between the joints; below it, a link's inertia is
-# hardly real
-LEAST_GYRATION = 0.7
-# relative excess of a principal moment over the sum of the others: a rounded figure, and an
-# impossible one
-ROUNDED, IMPOSSIBLE = 1e-3, 0.1
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class DefaultRules:
+    """Defaults of missing figures, and tolerances of given ones."""
+
+    rotor_inertia: float = 0.0117
+    """Rotor inertia behind the gear over tau_max [kg·m²/(N·m)]."""
+    coulomb: float = 0.06
+    """Coulomb friction over tau_max [1]."""
+    viscous: float = 0.055
+    """Viscous friction over tau_max [s/rad]."""
+    copper: float = 0.5
+    """Copper loss times tau_max [W/(N·m)]."""
+    idle_power: float = 6.0
+    """Idle power of the electronics per joint [W]."""
+    jerk: float = 20.0
+    """Jerk limit over the acceleration limit [1/s]."""
+    torque_constant: float = 10.0
+    """Torque constant [N·m/A]; the energy does not depend on it, as copper loss scales with its
+    square."""
+    knee: float = 1e-3
+    """Speed over which the step of Coulomb friction is smoothed [rad/s]."""
+    radius: float = 0.045
+    """Radius of a link without a shape over the sum of the distances between joints."""
+    least_gyration: float = 0.7
+    """Radius of gyration over that of a thin rod between the joints, below which a link's inertia
+    is implausible."""
+    rounded: float = 1e-3
+    """Relative excess of a principal moment over the sum of the others by rounding."""
+    impossible: float = 0.1
+    """The same excess beyond which an inertia is refused."""
+
+
+RULES = DefaultRules()
 
 NOTES = {
     "rotor_inertia": "0.0117 times the greatest torque. Range 0.4 to 2.5 times.",
@@ -34,7 +50,7 @@ NOTES = {
     "viscous": "0.055 times the greatest torque, as in strain-wave gears. Range 0.3 to 3 times.",
     "copper": "0.5 W/(N·m)² over the greatest torque. Range 0.4 to 2.5 times.",
     "idle_power": "6 W for each joint. Range 3 to 15 W.",
-    "controller_power": "Not counted: give the control box's own figure.",
+    "controller_power": "Not counted: give the figure of the control box.",
     "regeneration": "Nothing is taken back.",
     "torque_side": "Of the motor, friction and rotor included: nearly always the tighter reading.",
     "jerk": "20 times the acceleration limit, in 1/s.",

@@ -1,4 +1,4 @@
-"""Pairs of links that an SRDF, the semantic description beside a URDF, does not compare."""
+"""Pairs of links for which an SRDF disables collision checks."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from joulepath.models.uploads.limits import Checkpoint
 
 
 def disabled_pairs(text: str, checkpoint: Checkpoint) -> list[tuple[str, str]]:
-    """Links of each `<disable_collisions>`. Raises InvalidArm for a text that is no SRDF.
+    """Pairs of links of all `<disable_collisions>`. Raises InvalidArm for other text.
 
-    Such lists are found by sampling: they are taken as the user's word.
+    Such lists come from sampling; they are accepted as a statement of the user.
     """
     root = robot_element(text, "srdf", checkpoint)
     return [

@@ -1,4 +1,4 @@
-"""A chain whose joints all turn about the z axis of their own frames, as every robot's do here."""
+"""A chain whose joints turn about the z axes of their frames, the convention of all robots here."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class UprightChain:
-    """`R` (nq + 1, 3, 3): axes of each link's frame in the URDF's, the base first. `placements`:
-    each joint's frame in the one before; `flange`: the tip in the last; `inertias` of the moving
-    links, in their frames."""
+    """A chain with rotated link frames.
+
+    `R` (nq + 1, 3, 3) are the axes of the link frames in the URDF's frames, base first.
+    `placements` are the poses of the joint frames in the previous link frame, `flange` the pose of
+    the tip in the last one, `inertias` the inertias of the moving links in their frames.
+    """
 
     R: Array
     placements: tuple[pin.SE3, ...]
@@ -24,9 +27,9 @@ class UprightChain:
 
     @staticmethod
     def of(chain: Chain) -> UprightChain:
-        """The same arm with its frames turned."""
+        """The same arm with rotated frames."""
         R = np.array([np.eye(3), *(turn_onto(axis) for axis in chain.axes)])
-        # the base keeps its own axes, wherever it stands in the URDF
+        # The base keeps its axes, wherever it is in the URDF.
         turns = [pin.SE3(chain.T_base), *(pin.SE3(each, np.zeros(3)) for each in R[1:])]
         placements = list(chain.model.jointPlacements)[1:]
         return UprightChain(
@@ -41,7 +44,7 @@ class UprightChain:
 
 
 def turn_onto(axis: Array) -> Array:
-    """The rotation (3, 3) of least angle that turns the z axis into a unit vector (3,)."""
+    """The rotation (3, 3) of least angle from the z axis to a unit vector (3,)."""
     x, y, z = axis
     if z < -0.5:
         # about x by half a turn, and on from there

@@ -1,11 +1,10 @@
-"""A document of figures: those of a robot, some of them identified on one arm, with their
-covariance.
+"""Documents of figures identified on one arm, with their covariance.
 
-It has the form of the robot's `figures.yaml`. `robot` names the robot. A figure that was identified
-has `sd` beside its value. At the top, `covariance` has the names and the matrix of all identified
-parameters, `session_sd` [1] is how much friction differs from day to day, and `move_sd` [W] what
-the model cannot express of a motion, as a mean power. Only the figures of `REPLACEABLE` may differ
-from the robot's own.
+A document has the form of the robot's `figures.yaml`; `robot` is the name of the robot. An
+identified figure has `sd` beside its value. At the top level, `covariance` has the names and the
+matrix of all identified parameters, `session_sd` [1] is the relative deviation of friction from day
+to day, and `move_sd` [W] the mean power of model errors in a motion. Only the figures in
+`REPLACEABLE` may differ from the robot's own figures.
 """
 
 from __future__ import annotations
@@ -20,8 +19,7 @@ from joulepath.models.robot import Array
 from joulepath.models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS
 
 TOP = ("covariance", "session_sd", "move_sd")
-# parts of a friction law, of which `load` may be left out, and figures of the other sections, with
-# their least and greatest value
+# least and greatest value of the parts of a friction law, of which `load` is optional
 LAW: dict[str, tuple[float, float]] = {
     "coulomb": (0.0, 1e5),
     "curved": (0.0, 1e5),
@@ -52,13 +50,29 @@ REPLACEABLE: dict[str, dict[str, tuple[float, float]]] = {
 }
 _WIDTHS = {"center_of_mass": 3, "inertia_frame_rpy": 3, "inertia": 6}
 _WORDS = ("unit", "source", "trust", "note")
-MOST_LAWS, MOST_WORD, MOST_PARAMETERS, MOST_VARIANCE = 8, 2000, 200, 1e12
-# relative: a principal moment below zero, or above the sum of the others, by rounding of a figure
-ROUNDED = 1e-3
+
+
+@dataclass(frozen=True)
+class DocumentLimits:
+    """Ceilings and tolerances of a document."""
+
+    laws: int = 8
+    """Friction laws."""
+    text: int = 2000
+    """Characters of a unit, source or note."""
+    parameters: int = 200
+    """Parameters of the covariance."""
+    variance: float = 1e12
+    """Largest entry of the covariance."""
+    rounded: float = 1e-3
+    """Relative violation of the triangle inequality of principal moments due to rounding."""
+
+
+DOCUMENT = DocumentLimits()
 
 
 class InvalidFigures(ValueError):
-    """A document that makes no figures; `field` names the place."""
+    """An invalid document of figures; `field` is the place of the error."""
 
     def __init__(self, field: str, message: str) -> None:
         super().__init__(f"{field}: {message}" if field else message)
@@ -67,10 +81,12 @@ class InvalidFigures(ValueError):
 
 @dataclass(frozen=True)
 class Covariance:
-    """Covariance `matrix` (n, n) of the identified parameters; see the module. A name is the path
-    of a figure, with the index of the joint where it has one value each:
-    `friction_laws.identified.coulomb.0`, `electronics.idle_power`. Links have the parameters that
-    their torques are linear in: `inertials.mx.1`."""
+    """Covariance `matrix` (n, n) of the identified parameters.
+
+    A name is the path of a figure, with the index of the joint for figures of joints:
+    `friction_laws.identified.coulomb.0`, `electronics.idle_power`. Links have the parameters in
+    which torques are linear: `inertials.mx.1`.
+    """
 
     names: tuple[str, ...]
     matrix: Array
@@ -78,9 +94,7 @@ class Covariance:
     move_sd: float
 
     def place_of(self, name: str, law: str) -> tuple[str, int] | None:
-        """The figure of `parameters` and the joint that a name stands for; None for one of another
-        friction law.
-        """
+        """Figure of `parameters` and joint of a name; None for another friction law."""
         parts = name.split(".")
         if parts[0] == "electronics":
             return BASE_POWER, 0
@@ -89,12 +103,12 @@ class Covariance:
         return parts[-2], int(parts[-1])
 
     def places(self, law: str) -> list[tuple[str, int]]:
-        """Those of all names, of the friction law `law`."""
+        """Figures and joints of all names, with the friction law `law`."""
         return [found for name in self.names if (found := self.place_of(name, law)) is not None]
 
 
 def covariance_of(figures: dict[str, Any]) -> Covariance | None:
-    """The covariance of a robot's figures; None if none of them was identified."""
+    """The covariance of a robot's figures; None without identified figures."""
     if "covariance" not in figures:
         return None
     given = figures["covariance"]
@@ -107,10 +121,15 @@ def covariance_of(figures: dict[str, Any]) -> Covariance | None:
 
 
 def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str, Any]:
-    """What a document puts in the place of the own `figures` of the robot of this name: sections,
-    figures, covariance.
+    """Validated sections, figures and covariance with which a document replaces the robot's own.
 
-    All of it is checked. Raises InvalidFigures, which names the place.
+    Args:
+        robot: name of the robot.
+        figures: the robot's own figures.
+        document: the document of the user.
+
+    Raises:
+        InvalidFigures: the document is invalid; the error names the place.
     """
     if not isinstance(document, dict):
         raise InvalidFigures("", "Figures must be a mapping of sections.")
@@ -130,8 +149,7 @@ def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str,
         else:
             raise InvalidFigures(
                 section,
-                "differs from the robot's own. Identified figures may replace only "
-                "friction_laws, "
+                "differs from the robot's own. Identified figures may replace only friction_laws, "
                 f"{', '.join(REPLACEABLE)}.",
             )
     whole = merged(figures, replaced)
@@ -141,18 +159,18 @@ def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str,
 
 
 def with_document(robot: str, figures: dict[str, Any], document: Any) -> dict[str, Any]:
-    """The robot's figures with those of the document in their place. Raises InvalidFigures."""
+    """The robot's figures, updated by a document. Raises InvalidFigures."""
     return merged(figures, replaced_in(robot, figures, document))
 
 
 def merged(figures: dict[str, Any], replaced: dict[str, Any]) -> dict[str, Any]:
-    """The robot's figures with those in their place that `replaced_in` gave."""
+    """The robot's figures, updated by the result of `replaced_in`."""
     result = dict(figures)
     for section, content in replaced.items():
         if section in TOP:
             result[section] = content
         elif section == "friction_laws":
-            # the document's laws come first: the first one is the default
+            # The first law is the default: laws of the document come first.
             result[section] = content | {
                 n: law for n, law in figures[section].items() if n not in content
             }
@@ -162,9 +180,9 @@ def merged(figures: dict[str, Any], replaced: dict[str, Any]) -> dict[str, Any]:
 
 
 def _laws(own: dict[str, Any], content: Any, nq: int) -> dict[str, Any]:
-    if not isinstance(content, dict) or not 0 < len(content) <= MOST_LAWS:
+    if not isinstance(content, dict) or not 0 < len(content) <= DOCUMENT.laws:
         raise InvalidFigures(
-            "friction_laws", f"must be a mapping of 1 to {MOST_LAWS} laws by name."
+            "friction_laws", f"must be a mapping of 1 to {DOCUMENT.laws} laws by name."
         )
     laws = {}
     for name, law in content.items():
@@ -207,7 +225,7 @@ def _section(section: str, own: dict[str, Any], content: Any, nq: int) -> dict[s
 def _figure(
     where: str, figure: Any, allowed: tuple[float, float], shape: tuple[int, ...]
 ) -> dict[str, Any]:
-    """The figure, with nothing in it but what is known. Raises InvalidFigures."""
+    """The validated figure with its known fields. Raises InvalidFigures."""
     if not isinstance(figure, dict) or not {"value", "unit", "source", "trust"} <= set(figure):
         raise InvalidFigures(where, "must have value, unit, source and trust.")
     if unknown := set(figure) - {"value", "sd", *_WORDS}:
@@ -215,9 +233,11 @@ def _figure(
             where, f"has fields that no figure has: {', '.join(sorted(map(str, unknown)))[:200]}."
         )
     for word in _WORDS:
-        if word in figure and (not isinstance(figure[word], str) or len(figure[word]) > MOST_WORD):
+        if word in figure and (
+            not isinstance(figure[word], str) or len(figure[word]) > DOCUMENT.text
+        ):
             raise InvalidFigures(
-                f"{where}.{word}", f"must be a text of at most {MOST_WORD} characters."
+                f"{where}.{word}", f"must be a text of at most {DOCUMENT.text} characters."
             )
     if figure["trust"] not in ("A", "B", "C", "T", "E"):
         raise InvalidFigures(f"{where}.trust", "must be one of A, B, C, T, E.")
@@ -242,11 +262,11 @@ def numbers(where: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _check_bodies(inertials: dict[str, Any]) -> None:
-    """Raises InvalidFigures for an inertia that no body has."""
+    """Raises InvalidFigures for a physically impossible inertia."""
     for k, row in enumerate(inertials["inertia"]["value"]):
         ixx, ixy, ixz, iyy, iyz, izz = row
         moments = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-        slack = ROUNDED * abs(float(moments[-1]))
+        slack = DOCUMENT.rounded * abs(float(moments[-1]))
         if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
             raise InvalidFigures(
                 f"inertials.inertia.{k}", "belongs to no body: see its principal moments."
@@ -254,7 +274,7 @@ def _check_bodies(inertials: dict[str, Any]) -> None:
 
 
 def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> dict[str, Any]:
-    """The fields of `TOP` that the document has, checked."""
+    """The validated fields of `TOP` in the document."""
     result: dict[str, Any] = {}
     for name, most in (("session_sd", 1.0), ("move_sd", 1e5)):
         if document.get(name) is not None:
@@ -272,23 +292,23 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
     ):
         raise InvalidFigures("covariance", "must have names and matrix, and nothing else.")
     names = given["names"]
-    if not 0 < len(names) <= MOST_PARAMETERS or len(set(map(str, names))) != len(names):
-        raise InvalidFigures("covariance.names", f"must be 1 to {MOST_PARAMETERS} different names.")
+    if not 0 < len(names) <= DOCUMENT.parameters or len(set(map(str, names))) != len(names):
+        raise InvalidFigures(
+            "covariance.names", f"must be 1 to {DOCUMENT.parameters} different names."
+        )
     for k, name in enumerate(names):
         if not _is_parameter(name, figures, nq):
             raise InvalidFigures(
                 f"covariance.names.{k}",
                 "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, "
-                "drives.copper.2 or "
-                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power, or "
-                "inertials.m.1 with "
-                f"one of {', '.join(LINKS)}.",
+                f"drives.copper.2 or electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} "
+                f"and idle_power, or inertials.m.1 with one of {', '.join(LINKS)}.",
             )
     matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
     scale = float(np.abs(matrix).max())
-    if scale > MOST_VARIANCE:
+    if scale > DOCUMENT.variance:
         raise InvalidFigures(
-            "covariance.matrix", f"must have entries of at most {MOST_VARIANCE:g}."
+            "covariance.matrix", f"must have entries of at most {DOCUMENT.variance:g}."
         )
     if (
         np.abs(matrix - matrix.T).max() > 1e-9 * scale

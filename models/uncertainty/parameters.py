@@ -1,4 +1,4 @@
-"""The figures that the energy of a motion is differentiated by, and their order in a vector."""
+"""Figures by which the energy of a motion is differentiated, and their order in a vector."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Drives, FrictionLaw
 
-# power of the electronics [W], then those with one value per joint; friction as in FrictionLaw, the
-# rest as in Drives
+# power of the electronics [W], then figures of joints as in FrictionLaw and Drives
 BASE_POWER = "base_power"
 FRICTION = ("coulomb", "curved", "speed", "viscous", "load")
 DRIVES = (
@@ -21,19 +20,18 @@ DRIVES = (
     "inverter_quadratic",
 )
 PER_JOINT = FRICTION + DRIVES
-# of each link: mass [kg], first moments [kg·m] and inertia [kg·m²] in the frame of its joint, in
-# Pinocchio's order. They stand behind the others, link by link, and only where a document has
-# errors of them
+# Mass [kg], first moments [kg·m] and inertia [kg·m²] of a link in the frame of its joint, in
+# Pinocchio's order. They follow the other figures link by link if a document has errors of links.
 LINKS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 
 def count(nq: int, links: bool = False) -> int:
-    """Length of the vector for nq joints, with those of `links` or without."""
+    """Length of the vector for nq joints, with or without the parameters of links."""
     return 1 + nq * (len(PER_JOINT) + links * len(LINKS))
 
 
 def place(name: str, nq: int) -> slice:
-    """Where the values of a figure stand in the vector."""
+    """Slice of a figure in the vector."""
     if name == BASE_POWER:
         return slice(0, 1)
     if name in LINKS:
@@ -44,15 +42,13 @@ def place(name: str, nq: int) -> slice:
 
 
 def index(name: str, joint: int, nq: int) -> int:
-    """Where the value of a joint stands in the vector."""
+    """Index of a figure of one joint in the vector."""
     where = place(name, nq)
     return int(where.start + joint * (where.step or 1))
 
 
 def values(law: FrictionLaw, drives: Drives, base_power: float) -> Array:
-    """The vector of an arm with this friction law, these drives and this power [W] of its
-    electronics.
-    """
+    """The vector of a friction law, drives, and the power [W] of the electronics."""
     nq = len(law.coulomb)
     load = np.zeros(nq) if law.load is None else law.load
     friction = {name: load if name == "load" else getattr(law, name) for name in FRICTION}

@@ -1,4 +1,4 @@
-"""The ranges of figures that no log has identified: `default_ranges.yaml`."""
+"""Ranges of figures without identification: `default_ranges.yaml`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import yaml
 
 from joulepath.models.robot import Array, Mask, Robot
 
-# quantile of the standard normal distribution at 95 %
 P95 = 1.6448536269514722
-# a joint is large if its torque limit is at least this share of the greatest one
+"""Quantile of the standard normal distribution at 95 %."""
 LARGE = 0.5
+"""Least torque limit of a large joint over the greatest torque limit of the arm."""
 ENGINEERING = "E"
 """The trust letter of figures without a source."""
 
@@ -31,9 +31,7 @@ def default_ranges() -> dict[str, Any]:
 
 
 def range_of(name: str, letters: AbstractSet[str] = frozenset()) -> tuple[float, float]:
-    """P5 and P95 of a factor on the robot's own value, or of a value, for figures with these trust
-    letters.
-    """
+    """P5 and P95 of a factor on the robot's figure, or of its value, for given trust letters."""
     entry = default_ranges()[name]
     if ENGINEERING in letters:
         entry = entry.get("engineering_default", entry)
@@ -42,9 +40,7 @@ def range_of(name: str, letters: AbstractSet[str] = frozenset()) -> tuple[float,
 
 
 def lognormal(low: float, high: float) -> tuple[float, float]:
-    """Mean and standard deviation of the logarithm of a positive figure whose P5 and P95 are `low`
-    and `high`.
-    """
+    """Mean and standard deviation of the logarithm of a figure with P5 `low` and P95 `high`."""
     return float(np.log([low, high]).mean()), float(np.log(high / low) / (2 * P95))
 
 

@@ -1,10 +1,9 @@
-"""What the errors of a robot's figures may be: draws of them, and the covariance of each source.
+"""Errors of a robot's figures: random draws, and the covariance of every source.
 
-Identified figures have the covariance of their document. The others have the ranges of
-`default_ranges.yaml`: lognormal where they are factors or positive values, and evenly spread from
-zero on. Figures of one kind of motor err together: the large joints share a factor, and so do the
-small ones. The draws are a Latin hypercube of fixed seed: the same figures have the same draws
-everywhere.
+Identified figures have the covariance of their document. All others have the ranges of
+`default_ranges.yaml`: lognormal for factors and positive values, uniform for ranges from zero.
+Figures of one kind of motor share a factor: one for the large joints, one for the small joints. The
+draws are a Latin hypercube with fixed seed, so that equal figures have equal draws everywhere.
 """
 
 from __future__ import annotations
@@ -22,25 +21,38 @@ from joulepath.models.uncertainty.parameters import BASE_POWER, LINKS, count, in
 from joulepath.models.uncertainty.ranges import default_ranges, large_joints, lognormal, range_of
 
 DRAWS = 2048
-SEED = 18
-# robots whose draws are kept: a megabyte each
-MOST_SPREADS = 16
-# share of the greatest variance that is rounding
-ROUNDING = 1e-6
-FRICTION, LOAD, SESSION, INERTIALS = "friction", "load", "session", "inertials"
+"""Random draws of the figures."""
+FRICTION = "friction"
+LOAD = "load"
+SESSION = "session"
+INERTIALS = "inertials"
 _DRY = ("coulomb", "curved", "viscous")
 
 
 @dataclass(frozen=True)
-class Spread:
-    """Errors of the figures of `parameters.values`, and of the links' if the robot's document has
-    such errors.
+class SpreadSettings:
+    """Settings of the draws."""
 
-    `mean` (p,) are the means of the deviations from the robot's own figures, `draws` (n, p) are
-    about these means. `covariances` (p, p) are those of each source, by name: a figure to measure,
-    or `session`. `root` (p, r) makes their sum of independent standard normal factors. `move_draws`
-    (2, n) [W] are independent draws of what the model cannot express of a motion, as a mean power,
-    and `move_sd` [W] is their standard deviation.
+    seed: int = 18
+    """Seed of the Latin hypercube."""
+    cached: int = 16
+    """Robots with cached draws, a megabyte each."""
+    rounding: float = 1e-6
+    """Share of the greatest variance below which a variance is rounding."""
+
+
+SETTINGS = SpreadSettings()
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Errors of the figures in `parameters.values`, with links if the document has their errors.
+
+    `mean` (p,) are mean deviations from the robot's figures, and `draws` (n, p) deviations from the
+    mean. `covariances` (p, p) belong to sources by name: a figure to measure, or `session`. `root`
+    (p, r) maps independent standard normal factors to their sum. `move_draws` (2, n) [W] are
+    independent draws of the mean power of model errors in a motion, with standard deviation
+    `move_sd` [W].
     """
 
     mean: Array
@@ -51,17 +63,15 @@ class Spread:
     move_sd: float
 
 
-@lru_cache(MOST_SPREADS)
+@lru_cache(SETTINGS.cached)
 def spread_of(robot: Robot, law: str, known: tuple[str, ...] = ()) -> Spread:
-    """The spread of a robot's figures with the friction law of this name. Those of `known` have no
-    error.
-    """
+    """The spread of a robot's figures with one friction law; figures in `known` have no error."""
     return _Sources(robot, law, known).spread()
 
 
 @dataclass
 class _Sources:
-    """The sources of error of a robot's figures, one after the other."""
+    """Accumulates the sources of error of a robot's figures."""
 
     robot: Robot
     law: str
@@ -83,7 +93,7 @@ class _Sources:
 
     def spread(self) -> Spread:
         known = self._known
-        # that of another law says nothing of this one's figures
+        # The covariance of another friction law does not apply.
         identified = set() if known is None else {name for name, _ in known.places(self.law)}
         self._electronics(identified)
         self._friction(identified)
@@ -101,7 +111,7 @@ class _Sources:
                     1.0
                 )
             for source, mask in masks.items():
-                # what is shared with other figures counts half for each
+                # The covariance of two figures counts half for either source.
                 covariances[source] = covariance * (mask[:, None] + mask) / 2
             session = self._session(known.session_sd, identified)
             draws, covariances[SESSION] = draws + session, np.cov(session.T)
@@ -130,15 +140,13 @@ class _Sources:
         return values(law, robot.drives, power)
 
     def _normal(self) -> Array:
-        """A standard normal column (n,): one value of each of n strips of equal probability, in
-        random order.
-        """
+        """Standard normal draws (n,), one from each of n strips of equal probability, shuffled."""
         self._columns += 1
-        order = np.random.default_rng([SEED, self._columns]).permutation(DRAWS)
+        order = np.random.default_rng([SETTINGS.seed, self._columns]).permutation(DRAWS)
         return np.asarray(ndtri((order + 0.5) / DRAWS))
 
     def _factor(self, name: str, letters: set[str] = frozenset()) -> Array:  # type: ignore[assignment]
-        """Draws (n,) of a range: of a factor, or of a value."""
+        """Draws (n,) of a factor or value with the range of this name."""
         low, high = range_of(name, letters)
         normal = self._normal()
         if low == 0:
@@ -161,7 +169,7 @@ class _Sources:
             self._add("idle_power", BASE_POWER, self.robot.electronics.idle_power * (factor - 1))
 
     def _friction(self, identified: set[str]) -> None:
-        """Of a law without identified figures: a factor for all joints, and one for each."""
+        """Without identification: one factor common to all joints, and one factor per joint."""
         nominal, nq = self._nominal, self.robot.nq
         law = self.robot.figures.get("friction_laws", {}).get(self.law, {})
         if not identified & set(_DRY):
@@ -192,7 +200,7 @@ class _Sources:
             )
 
     def _identified(self, known: Covariance) -> tuple[Array, Array]:
-        """Draws (n, p) of the figures of the document's covariance, and this (p, p)."""
+        """Draws (n, p) with the covariance of the document, and this covariance (p, p)."""
         nq = self.robot.nq
         chosen = [
             k for k, name in enumerate(known.names) if known.place_of(name, self.law) is not None
@@ -207,7 +215,7 @@ class _Sources:
         return normal @ root.T, covariance
 
     def _session(self, session_sd: float, identified: set[str]) -> Array:
-        """Draws (n, p) of the friction of another day: one factor for all joints."""
+        """Draws (n, p) of the friction on another day: one factor for all joints."""
         nq, result = self.robot.nq, np.zeros((DRAWS, self._size))
         factor = session_sd * self._normal()
         for name in (*_DRY, "load"):
@@ -217,12 +225,10 @@ class _Sources:
 
 
 def _root(covariance: Array) -> Array:
-    """A matrix (p, r) whose product with its transpose is the covariance (p, p), without what is
-    rounding.
-    """
-    # figures have different units: each is scaled by its own standard deviation
+    """A matrix R (p, r) with R Rᵀ equal to the covariance (p, p), up to rounding."""
+    # Figures have different units: scale them by their standard deviations.
     sd = np.sqrt(np.diag(covariance))
     scale = np.where(sd > 0, sd, 1.0)
     size, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    kept = size > ROUNDING * size[-1]
+    kept = size > SETTINGS.rounding * size[-1]
     return np.asarray(scale[:, None] * vectors[:, kept] * np.sqrt(size[kept]))

@@ -1,5 +1,7 @@
-"""What a GLB asks for: more than it has bytes, where accessors have no data or meshes are
-repeated."""
+"""Validation of the resources requested by a GLB.
+
+Accessors without data and repeated meshes may request far more than the size of the file.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +12,14 @@ from typing import Any
 from joulepath.models.uploads.limits import LIMITS, UnreadableFile
 from joulepath.models.uploads.mesh_text import MeshSize
 
-_MAGIC, _JSON = b"glTF", 0x4E4F534A
+_MAGIC = b"glTF"
+_JSON = 0x4E4F534A
 _TRIANGLES = 4
-"""Mode of a primitive whose corners are taken by threes; of strips and fans, each corner makes a
-triangle.
-"""
+"""Mode of a primitive with separate triangles; in strips and fans, every corner adds a triangle."""
 
 
 def check_glb(content: bytes, most: MeshSize) -> None:
-    """Raises UnreadableFile for a GLB that would take more memory or time than its own size allows
-    for.
-    """
+    """Raises UnreadableFile for a GLB with excessive demands on memory or time."""
     try:
         header = _header(content)
         accessors, nodes, meshes = (
@@ -47,8 +46,7 @@ def check_glb(content: bytes, most: MeshSize) -> None:
     ):
         raise UnreadableFile(
             "is no plain glb file (accessors without data, repeated or deeply nested nodes, too "
-            "many entries): export "
-            "the mesh alone, without compression, animation or materials."
+            "many entries): export the mesh alone, without compression, animation or materials."
         )
 
 
@@ -68,9 +66,7 @@ def _triangles(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> in
 
 
 def _depth(children: list[list[int]]) -> int:
-    """Most nodes below one another; more than LIMITS allow for nodes that are repeated or below
-    themselves.
-    """
+    """Levels of nested nodes; above LIMITS for repeated or cyclic nodes."""
     below = [child for each in children for child in each]
     if len(below) != len(set(below)):
         return LIMITS.glb_depth + 1

@@ -1,4 +1,4 @@
-"""How much an uploaded file may hold."""
+"""Ceilings on the content of uploaded files."""
 
 from __future__ import annotations
 
@@ -6,42 +6,35 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 Checkpoint = Callable[[], None]
-"""Called while a file is read, some hundred times a second or more; it raises whatever is to end
-the reading.
-"""
+"""Function called at least a hundred times a second while a file is read; it may raise an exception
+to stop reading."""
 
 
 def unwatched() -> None:
-    """The checkpoint of a caller who waits for as long as the reading takes."""
+    """A checkpoint without a time limit."""
 
 
 @dataclass(frozen=True)
 class UploadLimits:
-    """Greatest numbers of what a file may hold: each is several times that of any published file
-    that was looked at.
-    """
+    """Ceilings on files, several times the largest values of published files."""
 
     xml_bytes: int = 8 << 20
-    """Bytes of one document; published arms have up to 0.5 MB. The attributes of one element are
-    all read before they can be counted, so many of them in 1.5 s."""
+    """Bytes of one document; published arms have up to 0.5 MB. All attributes of an element are
+    read before they are counted, in at most 1.5 s for a document of this size."""
     xml_depth: int = 100
-    """Elements inside one another; a URDF needs 5, and what simulators add to it some 10 more.
-    Libraries that copy and write the tree call themselves once for each level, and run out of stack
-    at about 1,000."""
+    """Levels of nested elements; a URDF needs 5, and extensions of simulators some 10 more.
+    Libraries copy and write the tree recursively and exhaust the stack at about 1,000."""
     xml_attributes: int = 200
-    """Attributes of one element; a URDF needs 6. The XML library below Pinocchio searches them one
-    by one, so that its time grows with their square."""
+    """Attributes of one element; a URDF needs 6. The XML library of Pinocchio searches linearly, so
+    that its time grows with their square."""
     xml_nodes: int = 200_000
     """Elements, comments and processing instructions of one document; published arms have up to
-    3,000. The tree of so many takes some 50 MB."""
+    3,000. A tree of this size takes some 50 MB."""
     xml_piece: int = 1 << 18
-    """Bytes that are parsed between two checkpoints, in some 10 ms. Of what follows a fault, the
-    parser still scans the rest of the piece; a token that is longer than a piece is scanned again
-    with each."""
+    """Bytes parsed between two checkpoints, in some 10 ms. After a fault the parser still scans the
+    rest of the piece; it scans a token longer than a piece again with every piece."""
     shapes: int = 1000
-    """Collision shapes and capsules of one arm. Each pair of shapes is compared in 300
-    configurations.
-    """
+    """Collision shapes and capsules of one arm; all pairs are compared in 300 configurations."""
     mesh_files: int = 200
     """Mesh files of one arm."""
     mesh_bytes: int = 128 << 20
@@ -51,23 +44,20 @@ class UploadLimits:
     mesh_triangles: int = 3_000_000
     """Triangles of one mesh of a link: a closed surface has twice as many as corners."""
     mesh_line: int = 1 << 20
-    """Bytes of one line of an OBJ; a polygon of so many has some 150,000 corners. A line is split
-    as a whole, which takes ten times its memory."""
+    """Bytes of one line of an OBJ, some 150,000 corners of a polygon. Splitting a line takes ten
+    times its memory."""
     mesh_lines: int = 4096
-    """Lines of a mesh that are read between two checkpoints, about 4 ms."""
+    """Lines of a mesh read between two checkpoints, in about 4 ms."""
     glb_entries: int = 4096
-    """Nodes, accessors, and copies of primitives of one GLB. Each copy becomes a mesh of its own,
-    in 0.2 ms.
-    """
+    """Nodes, accessors, and copies of primitives of one GLB; every copy becomes a mesh in 0.2
+    ms."""
     glb_depth: int = 32
-    """Nodes of a GLB below one another: each node's pose is computed from the root on, and a
-    drawing program's assemblies have up to 10 levels."""
+    """Levels of nested nodes of a GLB: poses are computed from the root, and assemblies of drawing
+    programs have up to 10 levels."""
 
 
 LIMITS = UploadLimits()
 
 
 class UnreadableFile(ValueError):
-    """A file that cannot be read, or holds too much. The message is a sentence without a subject,
-    as "has no …".
-    """
+    """An unreadable or oversized file. The message is a predicate such as "has no faces."."""

@@ -1,8 +1,9 @@
-"""Meshes from files in memory, by trimesh, which follows no reference to another file."""
+"""Meshes from files in memory by trimesh, without following references to other files."""
 
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from io import BytesIO
 
 import numpy as np
@@ -12,17 +13,24 @@ from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint, UnreadableFile, unwatched
 from joulepath.models.uploads.mesh_text import MeshSize, plain_obj, plain_stl
 
-_STL_HEAD, _STL_TRIANGLE = 84, 50  # bytes
+
+@dataclass(frozen=True)
+class StlLayout:
+    """Layout of a binary STL [byte]."""
+
+    head: int = 84
+    triangle: int = 50
+
+
+_STL = StlLayout()
 
 
 def read_mesh(
     kind: str, content: bytes, most: MeshSize, checkpoint: Checkpoint = unwatched
 ) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Corners (n, 3) in the units of a file, and triangles (m, 3) by their numbers; all bodies of
-    it as one.
+    """Corners (n, 3) in the units of a file and index triples (m, 3), all bodies joined.
 
-    `kind` is `stl`, `obj` or `glb`; of a GLB, the caller checks what it asks for. Raises
-    UnreadableFile.
+    `kind` is `stl`, `obj` or `glb`; the caller checks a GLB by `check_glb`. Raises UnreadableFile.
     """
     if kind == "obj":
         content = plain_obj(content, most, checkpoint)
@@ -46,14 +54,16 @@ def read_mesh(
 
 
 def _is_binary_stl(content: bytes, most: MeshSize) -> bool:
-    """Whether the length is that of as many triangles as the head says. Raises UnreadableFile for
-    too many, or where it is less and the file is no text."""
+    """Whether the length agrees with the number of triangles in the head.
+
+    Raises UnreadableFile for too many triangles, or a truncated binary file.
+    """
     count = (
-        struct.unpack("<I", content[_STL_HEAD - 4 : _STL_HEAD])[0]
-        if len(content) >= _STL_HEAD
+        struct.unpack("<I", content[_STL.head - 4 : _STL.head])[0]
+        if len(content) >= _STL.head
         else 0
     )
-    length = _STL_HEAD + _STL_TRIANGLE * count
+    length = _STL.head + _STL.triangle * count
     if len(content) == length:
         most.check(3 * count, count)
     elif len(content) < length and b"solid" not in content[:1024].lower():

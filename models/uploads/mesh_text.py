@@ -1,7 +1,7 @@
-"""Corners and faces of mesh files in text, without all else that such files may hold.
+"""Reduction of text mesh files to corners and triangles.
 
-trimesh keeps groups, materials and solids apart, and its time grows with the square of their
-number. They do not matter here: each file becomes one of corners and triangles alone.
+trimesh separates groups, materials and solids, and its time grows with the square of their number.
+They have no meaning here.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class MeshSize:
 
 
 def plain_obj(content: bytes, most: MeshSize, checkpoint: Checkpoint) -> bytes:
-    """An OBJ with the corners of another one, and its faces as triangles. Raises UnreadableFile."""
+    """An OBJ reduced to corners and triangles. Raises UnreadableFile."""
     corners, faces = list[bytes](), list[bytes]()
-    # a backslash joins lines
+    # A backslash joins lines.
     for line in _lines(content.replace(b"\r\n", b"\n").replace(b"\\\n", b""), checkpoint):
         kind = line[:2].rstrip()
         if kind not in (b"v", b"f") and not line[:1].isspace():
@@ -52,9 +52,7 @@ def plain_obj(content: bytes, most: MeshSize, checkpoint: Checkpoint) -> bytes:
 
 
 def _index(word: bytes, corners: int) -> int:
-    """The number of a face's corner, from 1; negative ones count back from the last corner above
-    the face.
-    """
+    """Number of a face's corner, from 1; negative numbers count back from the latest corner."""
     try:
         index = int(word.partition(b"/")[0])
     except ValueError:
@@ -67,7 +65,7 @@ def _index(word: bytes, corners: int) -> int:
 
 
 def plain_stl(content: bytes, most: MeshSize, checkpoint: Checkpoint) -> bytes:
-    """An STL in text with the triangles of another one, as one solid. Raises UnreadableFile."""
+    """A text STL reduced to one solid. Raises UnreadableFile."""
     found, count = [b"solid"], 0
     for line in _lines(content, checkpoint):
         place = line.lower().find(b"vertex")

@@ -1,8 +1,7 @@
-"""XML from users as a tree of elements, by expat with handlers that count what a document holds.
+"""XML from users as a tree of elements, parsed by expat with counting handlers.
 
-Prefixes of names stay as they are written, declared or not: readers of URDF know no namespaces. A
-document type is refused, so that there are no entities to expand and nothing outside the document
-to read.
+Prefixes of names stay as written, declared or not, since URDF has no namespaces. A document type is
+refused: this excludes entity expansion and external references.
 """
 
 from __future__ import annotations
@@ -15,8 +14,7 @@ from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, 
 
 
 def xml_tree(text: str, checkpoint: Checkpoint = unwatched) -> Element:
-    """The root element of an XML document. Raises UnreadableFile, also for more than LIMITS
-    allow."""
+    """The root element of an XML document. Raises UnreadableFile, also beyond LIMITS."""
     counted = _Counted()
     try:
         data = text.encode()
@@ -32,14 +30,12 @@ def xml_tree(text: str, checkpoint: Checkpoint = unwatched) -> Element:
 
 
 class _Counted:
-    """A parser that builds a tree, and raises UnreadableFile as soon as the document holds too
-    much.
-    """
+    """A tree-building parser; it raises UnreadableFile as soon as a document exceeds LIMITS."""
 
     def __init__(self) -> None:
         self.tree = TreeBuilder()
         self._depth = self._nodes = 0
-        # whatever encoding the document names, its text has been decoded
+        # The text has been decoded already, whatever encoding the document declares.
         self.parser = expat.ParserCreate("utf-8")
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self._start

@@ -1,8 +1,8 @@
-"""The cells of a grid over two joints around a path.
+"""Cells of a grid over two joints around a path.
 
-A value at a point of a cell is at least the least value at the cell's corners, less Σ h² / 8 ·
-(bound on the second derivative along the side h) over both sides: interpolation along one side errs
-by no more than that, and does not increase the other's second derivatives.
+A value at a point of a cell is at least the least value at the corners of the cell, less Σ h² / 8 ·
+(bound on the second derivative along the side h) over both sides. For interpolation along one side
+errs by at most this, and does not increase the second derivatives along the other side.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from joulepath.optimizer.native.shared_library import address, library
 
 @dataclass(frozen=True)
 class Curvature:
-    """Bounds on a term's change that its corners do not show: `along` (S, ...) is 1/8 of the second
-    derivative over a step, `across` (S, 2, ...) the second derivatives by the grid's joints
-    [1/rad²]."""
+    """Bounds on the change of a term between the corners of cells."""
 
     along: Array
+    """1 / 8 of the second derivative over a step of the path, shape (S, ...)."""
     across: Array
+    """Second derivatives by the joints of the grid, shape (S, 2, ...) [1/rad²]."""
 
 
 @dataclass(frozen=True)
 class Spacing:
-    """Distance of the points next to the path [rad], and its growth from one interval to the next
-    outwards.
-    """
+    """Spacing of the points of a grid, which grows outwards."""
 
     first: float = 0.16
+    """Distance of the points next to the path [rad]."""
     growth: float = 1.25
+    """Ratio of an interval to the interval before it."""
 
     def axis(self, half: float) -> Array:
-        """Positions [rad] from -half to half, with 0 in the middle, closer near 0."""
+        """Positions from -half to half [rad] with 0 in the middle."""
         nodes, spacing = [0.0], self.first
         while nodes[-1] < half:
             nodes.append(nodes[-1] + spacing)
@@ -47,15 +47,14 @@ class Spacing:
 
 @dataclass(frozen=True)
 class GridCells:
-    """The grid of two `axes` (n,) and (m,) [rad]: values of n · m points, and of (n - 1) · (m - 1)
-    cells, in rows.
-    """
+    """The cells of a grid with two axes; points and cells are numbered row by row."""
 
     axes: tuple[Array, Array]
+    """Positions along both joints, shapes (n,) and (m,) [rad]."""
 
     @property
     def centre(self) -> int:
-        """The point on the path."""
+        """Index of the point on the path."""
         return len(self.axes[0]) * len(self.axes[1]) // 2
 
     @property
@@ -70,8 +69,13 @@ class GridCells:
     def deviation(
         self, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]
     ) -> Array:
-        """Bounds (S, 2, cells, k) on how far values of k joints are from their means (S, nq), in
-        each cell and along each step; `value` (S, 2, points, nq) has those of both ends of a step.
+        """Bounds on the deviation of values from their means, shape (S, 2, cells, k).
+
+        Args:
+            value: values at the points at both ends of each step, shape (S, 2, points, nq).
+            mean: means, shape (S, nq).
+            curvature: bounds on the change of the values between the points.
+            joints: the k joints of interest.
         """
         at = np.array(joints)
         S, nq = mean.shape
@@ -84,16 +88,18 @@ class GridCells:
         return result
 
     def beyond(self, half: Array) -> Array:
-        """inf for the cells (S, cells) beyond boxes of these half sides (S, 2) [rad], where no
-        motion is, else 0.
+        """inf for the cells outside of boxes, which no motion reaches, else 0; shape (S, cells).
+
+        Args:
+            half: half sides of the boxes, shape (S, 2) [rad].
         """
         nearest = [np.minimum(np.abs(axis[:-1]), np.abs(axis[1:])) for axis in self.axes]
         outside = (nearest[0] > half[:, :1])[:, :, None] | (nearest[1] > half[:, 1:])[:, None]
         return np.where(outside, np.inf, 0.0).reshape(len(half), -1)
 
     def needed(self, half: Array) -> Mask:
-        """The points (S + 1, points) that are corners of a cell within the boxes of a step beside a
-        node.
+        """Whether a point is a corner of a cell within the boxes of a step beside a node, (S + 1,
+        points).
         """
         n, m = map(len, self.axes)
         within = (self.beyond(half) == 0).reshape(len(half), n - 1, m - 1)

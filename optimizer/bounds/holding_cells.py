@@ -1,9 +1,9 @@
-"""Bounds of `bounds.holding` on motions from given joint positions to others, or into boxes, over
-every duration.
+"""Bounds of `holding` on motions from given joint positions into boxes of goals, over all
+durations.
 
-Beyond the durations where the plain bound reaches a cap it stays above it; between them, cells of
-durations have the bound. A full turn more of a joint than the least has the plain bound of its
-displacement.
+The plain bound is convex in the duration. Outside of the durations between which it is below a cap
+it stays above the cap; between them, cells of durations have the bound of holding. Motions with
+another full turn of a joint than the nearest have the plain bound of their displacement.
 """
 
 from __future__ import annotations
@@ -16,33 +16,48 @@ import numpy as np
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.cruise import TINY, copper_loss
-from joulepath.optimizer.bounds.holding import HoldingBound, Planes
-from joulepath.optimizer.bounds.least_displacement import turned
-from joulepath.optimizer.bounds.lower_bound import LeastBound, NetEnergy
+from joulepath.optimizer.bounds.holding import HoldingBound
+from joulepath.optimizer.bounds.holding_planes import Planes
+from joulepath.optimizer.bounds.least_displacement import full_turns
+from joulepath.optimizer.bounds.lower_bound import LeastBound
+from joulepath.optimizer.bounds.net_energy import NetEnergy
 from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
-# the bound is raised by this share of the plain one at most; durations at which that is compared,
-# and cells
-MOST, PROBES, CELLS = 0.3, 24, 12
-# least share of the shortest duration that the probes span
-LEAST_RATIO = 1e-6
+
+@dataclass(frozen=True)
+class HoldingCellSettings:
+    """Settings of the cells of durations of the bound of holding."""
+
+    most_rise: float = 0.3
+    """Greatest rise above the plain bound, relative to it."""
+    probes: int = 24
+    """Number of durations at which the plain bound is compared with the cap."""
+    cells: int = 12
+    """Number of cells of durations."""
+    least_range: float = 1e-6
+    """Least range of the durations that are compared, relative to the shortest."""
+
+
+HOLDING_CELLS = HoldingCellSettings()
 
 
 @dataclass(frozen=True)
 class HoldingCells:
-    """The bounds of a problem, where they hold: see `of`."""
+    """The bounds of a problem's motions with the loss of holding."""
 
     prepared: PreparedProblem
     bound: HoldingBound
 
     @classmethod
     def of(cls, prepared: PreparedProblem) -> HoldingCells | None:
-        """None for another objective, a dwell, friction that grows with the load or is not concave,
-        no copper loss.
+        """The bounds; None where they do not hold.
+
+        They need the electrical objective without a dwell, concave friction that does not grow with
+        the load, and copper loss in every joint.
         """
         arm, problem = prepared.arm, prepared.problem
         law, loss = arm.friction_law, copper_loss(arm)
@@ -61,62 +76,78 @@ class HoldingCells:
         return cls(prepared, HoldingBound(arm, ChainDerivatives.of(arm), loss))
 
     def group(self, start: Array, low: Array, high: Array, gain: Array, plain: Array) -> Group:
-        """Bounds of motions from starts (n, nq) into boxes of goals between low and high (n, nq)
-        [rad], for gains of potential energy (n,) [J] or more, and `plain` bounds (n,) [J]."""
+        """Bounds on motions into boxes of goals.
+
+        Args:
+            start: start configurations, shape (n, nq) [rad].
+            low: lower corners of the boxes, shape (n, nq) [rad].
+            high: upper corners of the boxes, shape (n, nq) [rad].
+            gain: least gains of potential energy, shape (n,) [J].
+            plain: plain bounds, shape (n,) [J].
+        """
         half = (high - low) / 2
-        d, next_ = self._displacements(start, (low + high) / 2, half)
+        d, of_other_turns = self._displacements(start, (low + high) / 2, half)
         nearest = np.maximum(np.abs(d) - half, 0.0)
         cap = np.minimum(
-            plain + MOST * np.abs(plain), self._plain.of_other_turns(nearest, next_, gain)
+            plain + HOLDING_CELLS.most_rise * np.abs(plain),
+            self._plain.of_other_turns(nearest, of_other_turns, gain),
         )
         net = NetEnergy.for_motions(self.prepared.arm, nearest, gain)
         edges, eta, allowed = self._cells(net, nearest, cap)
-        # the nearest goal of the box first, whose motions may be the shortest
+        # planes are about the nearest goal of a box, whose motions may be the shortest
         line = Line.of(self.bound.chain, start, np.sign(d) * nearest)
         planes = self.bound(line, 2 * half, edges, eta, net.deficit)
         turn = d - ((low + high) / 2 - start)
         return Group(planes, start + np.sign(d) * nearest - turn, np.where(allowed, cap, np.inf))
 
     def _cells(self, net: NetEnergy, away: Array, cap: Array) -> tuple[Array, Array, Mask]:
-        """Cells of the durations at which the plain bound is below `cap` (n,) [J], for
-        displacements (n, nq) [rad]: edges (n, CELLS + 1) [s] and η (n, CELLS); and which motions
-        may be made in the allowed time (n,)."""
-        problem, rows = self.prepared.problem, np.arange(len(away))
-        first = np.maximum(shortest_duration(away, self.prepared.arm.active_limits), LEAST_DURATION)
+        """Cells of the durations between which the plain bound is below a cap.
+
+        Args:
+            net: plain bound over the duration.
+            away: least displacements, shape (n, nq) [rad].
+            cap: caps, shape (n,) [J].
+
+        Returns:
+            Edges (n, cells + 1) [s], η (n, cells), and whether a motion has an allowed duration
+            (n,).
+        """
+        problem, rows, n = self.prepared.problem, np.arange(len(away)), HOLDING_CELLS.probes
+        first = np.maximum(
+            shortest_duration(away, self.prepared.arm.active_limits), DURATIONS.least
+        )
         first = np.maximum(first, problem.duration_min or 0.0)
-        longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
-        # the plain bound is no less than work and the power that is drawn at all times
+        longest = DURATIONS.longest if problem.duration_max is None else problem.duration_max
+        # the plain bound is at least the work plus the power drawn at all times
         drawn = net.power - net.deficit
-        last = np.minimum(
-            np.where(drawn > 0, (cap - net.work) / np.maximum(drawn, TINY), np.inf), longest
-        )
-        probes = first[:, None] * np.maximum(last / first, 1 + LEAST_RATIO)[:, None] ** np.linspace(
-            0, 1, PROBES
-        )
-        below = (
-            net[np.repeat(rows, PROBES)].at(probes.ravel())[0].reshape(probes.shape) < cap[:, None]
-        )
+        last = np.where(drawn > 0, (cap - net.work) / np.maximum(drawn, TINY), np.inf)
+        ratio = np.maximum(np.minimum(last, longest) / first, 1 + HOLDING_CELLS.least_range)
+        probes = first[:, None] * ratio[:, None] ** np.linspace(0, 1, n)
+        plain = net[np.repeat(rows, n)].at(probes.ravel())[0].reshape(probes.shape)
+        below = plain < cap[:, None]
         left = probes[rows, np.maximum(below.argmax(axis=1) - 1, 0)]
-        right = probes[rows, np.minimum(PROBES - below[:, ::-1].argmax(axis=1), PROBES - 1)]
-        edges = left[:, None] * (right / left)[:, None] ** np.linspace(0, 1, CELLS + 1)
+        right = probes[rows, np.minimum(n - below[:, ::-1].argmax(axis=1), n - 1)]
+        cells = HOLDING_CELLS.cells
+        edges = left[:, None] * (right / left)[:, None] ** np.linspace(0, 1, cells + 1)
         middle = ((edges[:, 1:] + edges[:, :-1]) / 2).ravel()
-        return (
-            edges,
-            net[np.repeat(rows, CELLS)].multiplier(middle).reshape(-1, CELLS),
-            first <= longest,
-        )
+        eta = net[np.repeat(rows, cells)].multiplier(middle).reshape(-1, cells)
+        return edges, eta, first <= longest
 
     def _displacements(self, start: Array, goal: Array, half: Array) -> tuple[Array, Array]:
-        """The least displacements d (n, nq) [rad] to the middles of boxes within the limits, and
-        the least of other turns to the boxes; inf for none."""
+        """Displacements to boxes of goals over all full turns within the limits.
+
+        Returns:
+            The least displacements to the middles (n, nq) [rad], and the least absolute
+            displacements with another full turn to the boxes (n, nq) [rad]; inf for none.
+        """
         limits = self.prepared.arm.active_limits
-        nearest, next_ = np.full(goal.shape, np.inf), np.full(goal.shape, np.inf)
-        for to, reached in turned(goal, half, limits):
+        nearest, second = np.full(goal.shape, np.inf), np.full(goal.shape, np.inf)
+        for to, reached in full_turns(goal, half, limits):
             away = np.where(reached, to - start, np.inf)
             nearer = np.abs(away) < np.abs(nearest)
-            next_ = np.minimum(next_, np.abs(np.where(nearer, nearest, away)))
+            second = np.minimum(second, np.abs(np.where(nearer, nearest, away)))
             nearest = np.where(nearer, away, nearest)
-        return np.where(np.isfinite(nearest), nearest, 0.0), np.maximum(next_ - half, 0.0)
+        return np.where(np.isfinite(nearest), nearest, 0.0), np.maximum(second - half, 0.0)
 
     @cached_property
     def _plain(self) -> LeastBound:
@@ -125,15 +156,22 @@ class HoldingCells:
 
 @dataclass(frozen=True)
 class Group:
-    """Bounds of motions into boxes of goals: `planes` about the goals `nearest` (n, nq) [rad], up
-    to `cap` (n,) [J].
-    """
+    """Bounds of motions into boxes of goals."""
 
     planes: Planes
+    """Planes about the nearest goals."""
     nearest: Array
+    """Nearest goal of each box, shape (n, nq) [rad]."""
     cap: Array
+    """Greatest bound of each box, shape (n,) [J]."""
 
     def at(self, row: Indices, goal: Array, half: Array, gain: Array) -> Array:
-        """Bounds (k,) [J] on motions into boxes within those of rows (k,), around goals (k, nq) of
-        half sides (k, nq) [rad], for gains of potential energy (k,) [J] or more."""
+        """Bounds on motions into smaller boxes of goals, shape (k,) [J].
+
+        Args:
+            row: rows of the boxes that hold the smaller boxes, shape (k,).
+            goal: middles of the smaller boxes, shape (k, nq) [rad].
+            half: half sides of the smaller boxes, shape (k, nq) [rad].
+            gain: least gains of potential energy, shape (k,) [J].
+        """
         return np.minimum(self.cap[row], self.planes.at(row, goal - self.nearest[row], half, gain))

@@ -1,5 +1,4 @@
-"""The least value Ψ of a dual bound's terms of position in each step; the proof is in
-`dual_bound`."""
+"""Least values Ψ of a dual bound's terms of position on each step; proof in `dual_bound`."""
 
 from __future__ import annotations
 
@@ -15,18 +14,24 @@ from joulepath.optimizer.bounds.path_terms import PathTerms
 from joulepath.optimizer.bounds.weights import Weights
 from joulepath.optimizer.native.shared_library import address, library
 
-# τ of the proof: what the others' share of a momentum's change is weighted with
-_TAU = 1.0
+TAU = 1.0
+"""τ of the proof: weight of the other joints in the change of momentum."""
 
 
 @dataclass(frozen=True)
 class LeastPotential:
-    """Ψ of a path's terms."""
+    """Least values Ψ of the terms of a path."""
 
     terms: PathTerms
 
     def __call__(self, weights: Weights, fast: Array, slow: Array) -> Array:
-        """Ψ (B, S) [W] for 1 / T from `slow` to `fast` (B,) [1/s]."""
+        """Ψ in cells of durations, shape (B, S) [W].
+
+        Args:
+            weights: weights of the bound.
+            fast: greatest 1 / T of each cell, shape (B,) [1/s].
+            slow: least 1 / T of each cell, shape (B,) [1/s].
+        """
         terms, (at_terms, _) = self.terms, self._as_c
         S, nq = terms.half.shape
         result = np.empty((len(fast), S))
@@ -52,7 +57,7 @@ class LeastPotential:
 
     @cached_property
     def _as_c(self) -> tuple[list[int], list[NDArray[Any]]]:
-        """Addresses of the terms as the C has them, in its order, and the arrays themselves."""
+        """Addresses of the terms in the order of the C function, and the arrays they point to."""
         terms = self.terms
         given = (
             *terms.cells.axes,
@@ -76,11 +81,12 @@ class LeastPotential:
         return [address(each) for each in arrays], arrays
 
     def _cross(self, weights: Weights) -> Array:
-        """What the square of the momentum's change takes from the stiffness (S, others) of the
-        joints beside the grid, by 1 / T²."""
+        """Stiffness (S, others) that the square of the momentum's change takes from other joints,
+        by 1 / T².
+        """
         moved = weights.scale * self.terms.momentum_others
         return np.asarray(
-            (1 + 1 / _TAU)
+            (1 + 1 / TAU)
             * ((moved / weights.mixing) * moved.sum(axis=1, keepdims=True)).sum(axis=-1)
         )
 
@@ -92,11 +98,9 @@ def _hold(weights: Weights) -> Array:
 
 def _weight(weights: Weights) -> Array:
     """(1 + τ) / (2 μ) (nq,) times the square of the multipliers' factor."""
-    return np.asarray(weights.scale**2 * (1 + _TAU) / (2 * weights.mixing))
+    return np.asarray(weights.scale**2 * (1 + TAU) / (2 * weights.mixing))
 
 
 def _excess(fast: Array, slow: Array) -> Array:
-    """How far (B,) β Γ' exceeds the slope that it has at both ends of a cell, as a share of it; see
-    `dual_bound`.
-    """
+    """Greatest excess of Γ̇ over the gradient within a cell (B,), as a share of the gradient."""
     return np.asarray((fast - slow) ** 2 / (4 * fast * slow))

@@ -1,60 +1,50 @@
-"""Lower bound on the mechanical work of all motions between two configurations, from the energy of
-the arm.
+"""Lower bound on the mechanical work of all motions between two configurations, from the arm's
+energy.
 
-Let E = K + U be kinetic and potential energy of rigid bodies and rotors, W = ∫ Σ_j |tau_j v_j| dt
-the mechanical work. The torques tau are those of rigid bodies and rotors, without friction, so that
+Let E = K + U be kinetic and potential energy of rigid bodies and rotors, and W = ∫ Σ_j |tau_j v_j|
+dt the mechanical work. The torques tau are those of rigid bodies and rotors, without friction, so
 dE/dt = Σ_j tau_j v_j (U and K do not depend on time) and
 
-    W ≥ ∫ |dE/dt| dt,                                                                            (1)
+    W ≥ ∫ |dE/dt| dt,                                                                       (1)
 
 the total variation of E between two rests, E(0) = U_0 and E(T) = U_1.
 
-**Range.** If E reaches h ≥ max(U_0, U_1) and l ≤ min(U_0, U_1), it first reaches the one, then the
-  other:
+**Range.** If E reaches h ≥ max(U_0, U_1) and l ≤ min(U_0, U_1), it reaches one of them first:
 
-    W ≥ h - l + min((h - U_0) + (U_1 - l), (U_0 - l) + (h - U_1)).
-    (2)
+    W ≥ h - l + min((h - U_0) + (U_1 - l), (U_0 - l) + (h - U_1)).                          (2)
 
-Nothing else is known: h = max(U_0, U_1) and l = min(U_0, U_1) give |U_1 - U_0|.
+Without further knowledge, h = max(U_0, U_1) and l = min(U_0, U_1) give |U_1 - U_0|.
 
-**Barrier.** Joints whose axes are parallel to gravity turn the arm about the vertical and leave U
-  as it is. Let k be
-the first other joint. With the links beyond k lumped at the origin of joint k + 1, potential energy
-is a function of
-q_k alone, u(q_k) = constant + a cos q_k + b sin q_k. The true one differs by at most R = Σ_i m_i
-|g| r_i over the links
-i beyond k, where r_i, the length of the chain from that origin to the centre of mass of link i, is
-never less than
-their distance. On its way q_k takes every value between its ends, so E ≥ U ≥ u - R holds at the
-greatest of them:
-h = max u - R. At the least of them U ≤ u + R, so that l = min u + R + K_max, where K_max is the
-most kinetic energy
-under the limits on speed and acceleration: each link's centre of mass is no faster than Σ_j |v_j|
-times its greatest
-distance from the axis of joint j, and turns no faster than Σ_j |v_j|.
+**Barrier.** Joints with axes parallel to gravity turn the arm about the vertical and do not change
+U. Let k be the first other joint. With the links beyond k lumped at the origin of joint k + 1, the
+potential energy is a function of q_k alone, u(q_k) = constant + a cos q_k + b sin q_k. The true
+energy differs by at most R = Σ_i m_i |g| r_i over the links i beyond k, where r_i is the length of
+the chain from this origin to the centre of mass of link i, at least their distance. On the way q_k
+takes every value between its ends, so E ≥ U ≥ u - R at the greatest u: h = max u - R. At the least
+u, U ≤ u + R, so l = min u + R + K_max with the greatest kinetic energy K_max under the limits on
+speed and acceleration: the centre of mass of each link is at most as fast as Σ_j |v_j| times its
+greatest distance from the axis of joint j, and the link turns at most at Σ_j |v_j|.
 
 **Travel.** From (2) with l = min(U_0, U_1), E(t) ≤ e = (W + U_0 + U_1) / 2 at all times. The mass
-  matrix is that of the
-rotors, D = diag(rotor inertia), plus that of the links, which is positive semidefinite. With |v|_D²
-= vᵀ D v,
+matrix is the sum of the rotors' D = diag(rotor inertia) and the links', which is positive
+semidefinite. With |v|_D² = vᵀ D v,
 
-    |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min( sqrt(2 max(e - U(q(t)), 0)), A min(t, T - t) ) dt,
-      (3)
+    |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min( sqrt(2 max(e - U(q(t)), 0)), A min(t, T - t) ) dt,  (3)
 
-A = |a_max|_D, as v starts and ends at zero. U is bounded from below by the time that the arm has
-for falling: joint j is at most s_j(t) = min(v_max t, a_max t² / 2, j_max t³ / 6) from its start,
-and |∂U/∂q_j| ≤ G_j, the weight of the links that it carries times their greatest distances from its
-axis (zero for the joints before k). So
+A = |a_max|_D, as v starts and ends at zero. The time for falling bounds U from below: joint j is at
+most s_j(t) = min(v_max t, a_max t² / 2, j_max t³ / 6) from its start, and |∂U/∂q_j| ≤ G_j, the
+weight of the links that it carries times their greatest distances from its axis (zero for the
+joints before k). So
 
     U(q(t)) ≥ max(U_0 - Σ_j G_j s_j(t), U_1 - Σ_j G_j s_j(T - t), least u - R).
 
 The right-hand side of (3) grows with e. The least e for which (3) holds gives W ≥ 2 e - U_0 - U_1.
-The integral is replaced by the sum of upper bounds on CELLS cells. A motion that takes less than T
-and then rests until T does the same work: the bound for the longest allowed duration holds for all.
+A sum of upper bounds on cells replaces the integral. A motion that takes less than T and then rests
+until T does the same work: the bound for the longest allowed duration holds for all.
 
-The bound is tight neither for a motion that pays in one joint what gravity gives in another, as (1)
-adds up the joints before the absolute value, nor for one that could swing through a potential well
-and does not.
+The bound is not tight for a motion in which one joint takes up the energy that gravity gives to
+another, because (1) adds up the joints before the absolute value, nor for a motion that could swing
+through a potential well and does not.
 """
 
 from __future__ import annotations
@@ -67,24 +57,32 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
-# cells of the integral in (3), and halvings of the interval that holds its energy
-CELLS, BISECTIONS = 32, 30
-# an axis counts as parallel to gravity up to this sine of the angle, the rounding of a placement
-PARALLEL = 1e-8
-# error of a potential energy as a share of weight times length of the arm: rounding, and the angle
-# of PARALLEL axes
-ROUNDING = 1e-7
+
+@dataclass(frozen=True)
+class MechanicalSettings:
+    """Settings of the mechanical bound."""
+
+    cells: int = 32
+    """Number of cells of the integral in (3)."""
+    bisections: int = 30
+    """Number of halvings of the interval that holds the energy e."""
+    parallel: float = 1e-8
+    """Sine of the angle below which an axis is parallel to gravity: rounding of a placement."""
+    rounding: float = 1e-7
+    """Error of a potential energy, relative to weight times length of the arm.
+
+    It covers rounding and the angle of `parallel` axes.
+    """
+
+
+MECHANICAL = MechanicalSettings()
 
 
 @dataclass(frozen=True)
 class EnergyRange:
-    """What bounds the energy of an arm: see the module's text.
-
-    `lengths` (nq, nq) [m] at [j, i] is the greatest distance of link i's centre of mass from the
-    axis of joint j, zero for i < j.
-    """
+    """Bounds on the kinetic and potential energy of an arm; the symbols are those of the module."""
 
     prepared: PreparedProblem
 
@@ -105,13 +103,16 @@ class EnergyRange:
 
     @cached_property
     def lengths(self) -> Array:
-        """See the class."""
+        """Greatest distance of link i's centre of mass from the axis of joint j, at [j, i], (nq,
+        nq) [m].
+
+        It is zero for i < j.
+        """
         placements, bodies = self.model.jointPlacements, self.model.inertias
         n = self.model.nq
         result = np.zeros((n, n))
         for j in range(n):
-            # about its own axis, link j moves only what is off the axis; later links may turn any
-            # way
+            # link j turns about its own axis; later links may turn about any axis
             along = 0.0
             for i in range(j, n):
                 offset = np.array(bodies[i + 1].lever)
@@ -123,12 +124,11 @@ class EnergyRange:
 
     @cached_property
     def leading(self) -> int | None:
-        """Index of the first joint whose angle changes the potential energy; None if there is
-        none."""
+        """Index k of the first joint that changes the potential energy; None if there is none."""
         strength, R = float(np.linalg.norm(self.gravity)), np.eye(3)
         for k in range(self.model.nq):
             R = R @ np.array(self.model.jointPlacements[k + 1].rotation)
-            if np.linalg.norm(np.cross(R[:, 2], self.gravity)) > PARALLEL * strength:
+            if np.linalg.norm(np.cross(R[:, 2], self.gravity)) > MECHANICAL.parallel * strength:
                 return k
         return None
 
@@ -174,15 +174,15 @@ class EnergyRange:
 
     @cached_property
     def rounding(self) -> float:
-        """Greatest error of a potential energy [J]; the bound gives it away."""
+        """Greatest error of a potential energy [J], which is subtracted from the bound."""
         return (
-            ROUNDING
+            MECHANICAL.rounding
             * float(np.linalg.norm(self.gravity))
             * float(self.lengths.sum(axis=0) @ self.masses)
         )
 
     def most_kinetic(self, duration: Array) -> Array:
-        """The most kinetic energy (P,) [J] of a motion from rest to rest in `duration` (P,) [s]."""
+        """Greatest kinetic energies (P,) [J] of motions from rest to rest in durations (P,) [s]."""
         limits = self.prepared.problem.arm.active_limits
         v = np.minimum(limits.v_max, limits.a_max * duration[:, None] / 2)
         spin = np.array(
@@ -196,14 +196,15 @@ class EnergyRange:
         return np.asarray((rotors + links) / 2)
 
     def fall(self, ends: Array, least: Array, duration: Array) -> tuple[Array, Array]:
-        """Least potential energy and A min(t, T - t), both (P, CELLS), in the cells of motions of
-        `duration` (P,) [s].
+        """Least potential energies and A min(t, T - t) in the cells of motions, both (P, cells).
 
-        `ends` (P, 2) [J] are the potential energies of start and goal, `least` (P,) [J] is that of
-        all configurations.
+        Args:
+            ends: potential energies of start and goal, shape (P, 2) [J].
+            least: least potential energies of all configurations, shape (P,) [J].
+            duration: durations, shape (P,) [s].
         """
         limits = self.prepared.problem.arm.active_limits
-        edges = duration[:, None] * np.linspace(0.0, 1.0, CELLS + 1)
+        edges = duration[:, None] * np.linspace(0.0, 1.0, MECHANICAL.cells + 1)
         left, right = edges[:, :-1], edges[:, 1:]
 
         def fallen(t: Array) -> Array:
@@ -222,18 +223,17 @@ class EnergyRange:
 
 @dataclass(frozen=True)
 class Swing:
-    """How high and how low motions have to go on their way: potential energies (P,) [J].
-
-    `ends` (P, 2) are those of start and goal. Every motion comes to `top` at least, if it does not
-    start or end higher, and down to `bottom` at least, if what it has there is not kinetic
-    (`variation` allows for that). No configuration has less than `least`.
-    """
+    """Highest and lowest potential energies that motions have to reach, shape (P,) [J]."""
 
     arm: EnergyRange
     ends: Array
+    """Potential energies of start and goal, shape (P, 2) [J]."""
     top: Array
+    """Energy that every motion reaches at least, h."""
     bottom: Array
+    """Energy that every motion reaches at most, l without the kinetic energy K_max."""
     least: Array
+    """Lower bound on the potential energy of all configurations."""
 
     @classmethod
     def of(cls, arm: EnergyRange, q_start: Array, q_goal: Array, ends: Array) -> Swing:
@@ -253,7 +253,7 @@ class Swing:
         )
 
     def variation(self, duration: Array) -> Array:
-        """(2) (P,) [J] for motions of at most `duration` (P,) [s]."""
+        """The right-hand side of (2), (P,) [J], for motions of at most given durations (P,) [s]."""
         first, last = self.ends.T
         low = self.ends.min(axis=1)
         fast = 0.0 if self.arm.leading is None else self.arm.most_kinetic(duration)
@@ -267,13 +267,17 @@ class Swing:
 def mechanical_bounds(
     prepared: PreparedProblem, q_start: Array, q_goal: Array, potentials: Array
 ) -> Array:
-    """Bounds (P,) [J] on the mechanical work of motions from q_start to q_goal (P, nq) [rad].
+    """Lower bounds on the mechanical work of motions, shape (P,) [J].
 
-    `potentials` (P, 2) [J] are the potential energies of start and goal.
+    Args:
+        prepared: problem of the motions.
+        q_start: start configurations, shape (P, nq) [rad].
+        q_goal: goal configurations, shape (P, nq) [rad].
+        potentials: potential energies of start and goal, shape (P, 2) [J].
     """
     arm, problem = EnergyRange(prepared), prepared.problem
     longest = np.full(
-        len(q_start), LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+        len(q_start), DURATIONS.longest if problem.duration_max is None else problem.duration_max
     )
     swing = Swing.of(arm, q_start, q_goal, potentials)
     travelled = 2 * _least_energy(
@@ -285,8 +289,10 @@ def mechanical_bounds(
 
 
 def _extremes(wave: Array, one: Array, other: Array) -> tuple[Array, Array]:
-    """Greatest and least (P,) of wave[0] cos q + wave[1] sin q over the angles between `one` and
-    `other` (P,) [rad].
+    """Extremes of wave[0] cos q + wave[1] sin q over angles between two angles (P,) [rad].
+
+    Returns:
+        Greatest and least values (P,).
     """
     low, high = np.minimum(one, other), np.maximum(one, other)
     ends = np.stack([wave[0] * np.cos(q) + wave[1] * np.sin(q) for q in (low, high)])
@@ -302,26 +308,31 @@ def _extremes(wave: Array, one: Array, other: Array) -> tuple[Array, Array]:
 
 
 def most_travel(potential: Array, fastest: Array, energy: Array, duration: Array | float) -> Array:
-    """The right-hand side (P,) of (3) with `energy` (P, 1) [J]; the others as `EnergyRange.fall`
-    gives them.
+    """The right-hand side of (3), shape (P,).
+
+    Args:
+        potential: least potential energies in the cells, by `EnergyRange.fall`.
+        fastest: A min(t, T - t) in the cells, by `EnergyRange.fall`.
+        energy: e, shape (P, 1) [J].
+        duration: durations [s].
     """
     speed = np.minimum(np.sqrt(2 * np.maximum(energy - potential, 0.0)), fastest)
-    return np.asarray(speed.sum(axis=1) * duration / CELLS)
+    return np.asarray(speed.sum(axis=1) * duration / MECHANICAL.cells)
 
 
 def _least_energy(
     arm: EnergyRange, displacement: Array, potentials: Array, least: Array, duration: Array
 ) -> Array:
-    """The least e (P,) [J] for which (3) holds, rounded down, at least the greater potential energy
-    of the ends.
+    """Least e (P,) [J] for which (3) holds, rounded down, at least the potential energies of the
+    ends.
     """
     needed = np.sqrt(displacement**2 @ arm.prepared.problem.arm.drives.rotor_inertia)
     potential, fastest = arm.fall(potentials, least, duration)
     low = potentials.max(axis=1)
-    # an average speed of |Δq|_D / T needs this much above the greatest bound of the potential
-    # energy, or less
+    # kinetic energy above the greatest bound of the potential energy at which the mean speed
+    # |Δq|_D / T is certainly reached
     high = np.maximum(low, potential.max(axis=1)) + 2 * (needed / duration) ** 2
-    for _ in range(BISECTIONS):
+    for _ in range(MECHANICAL.bisections):
         middle = (low + high) / 2
         enough = most_travel(potential, fastest, middle[:, None], duration) >= needed
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)

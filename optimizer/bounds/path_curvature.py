@@ -1,4 +1,4 @@
-"""Bounds on what the terms of a dual bound's path do between the points where they are computed."""
+"""Bounds on the change of a dual bound's terms between the points at which they are computed."""
 
 from __future__ import annotations
 
@@ -11,16 +11,12 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.grid_cells import Curvature
 
-STEP = 1e-5
-"""Step of the difference along the multipliers, relative to them."""
+DIFFERENCE_STEP = 1e-5
+"""Step of the difference quotient along the multipliers, relative to the multipliers."""
 
 
 class PathCurvature:
-    """Bounds on derivatives of the terms in each step of a path.
-
-    The steps are dx (S, nq) [rad] long, of either sign; multipliers ω (S + 1, nq) are linear on
-    them.
-    """
+    """Bounds on derivatives of the terms in each step of a path."""
 
     def __init__(
         self,
@@ -30,6 +26,15 @@ class PathCurvature:
         grid: tuple[int, ...],
         others: tuple[int, ...],
     ) -> None:
+        """The bounds of a chain.
+
+        Args:
+            chain: chain of the arm.
+            dx: steps of the path, shape (S, nq) [rad].
+            omega: ω at the nodes, shape (S + 1, nq) [rad/s], linear on each step.
+            grid: joints of the grid.
+            others: the other joints.
+        """
         self.dx, self.grid, self.others = np.abs(dx), list(grid), list(others)
         self.change = np.abs(np.diff(omega, axis=0))
         self.most = np.array([np.maximum(np.abs(a), np.abs(b)) for a, b in pairwise(omega)])
@@ -39,8 +44,8 @@ class PathCurvature:
         self.D2_most, self.D3_most = _along(self.most, self.D2), _along(self.most, D3)
         D2_step, D3_step = _along(self.dx, self.D2), _along_each(self.dx, self.D3_most)
         self.M_along = _along_each(self.dx, D2_step) / 8
-        # N, a derivative of M along ω, is a difference; what it misses is a second derivative
-        missed = STEP / 2 * _along_each(self.most, self.D2_most)
+        # N, a derivative of M along ω, is a difference quotient; its error is a second derivative
+        missed = DIFFERENCE_STEP / 2 * _along_each(self.most, self.D2_most)
         # second derivative of N over a step: ω changes, and so does ∂M
         self.N_along = (
             _along_each(self.dx, D3_step) + 2 * _along_each(self.change, D2_step)
@@ -61,8 +66,8 @@ class PathCurvature:
         return Curvature(along / 8, np.stack(across, axis=1))
 
     def inertia(self, omega_rate: Array, x_rate: Array) -> tuple[Curvature, Curvature]:
-        """Curvatures of `kinetic` and `momentum`; the difference quotient's error is in the one
-        along the path.
+        """Curvatures of `kinetic` and `momentum`, with the error of the difference quotient along
+        the path.
         """
         M, N = (
             np.stack([each[g, g] for g in self.grid])
@@ -80,8 +85,15 @@ class PathCurvature:
         return kinetic, momentum
 
     def others_of(self, omega_rate: Array, x_rate: Array) -> tuple[Array, Array, Array]:
-        """The bounds on derivatives by the joints beside the grid's: of the gradient's rows,
-        `kinetic`, `momentum`.
+        """Bounds on derivatives by the joints beside the grid.
+
+        Args:
+            omega_rate: |ω'|, shape (S, nq).
+            x_rate: |x'|, shape (S, nq).
+
+        Returns:
+            Row sums of the second derivatives of ω · g, and first derivatives of `kinetic` and
+            `momentum`.
         """
         others = self.others
         gravity = _along(self.most, self.U3)[:, others][:, :, others].sum(axis=-1)
@@ -90,12 +102,16 @@ class PathCurvature:
         return gravity, ((own + other / 2) * x_rate[:, None]).sum(axis=-1), own + other
 
     def spread(self, rows: Array, spacing: Array, half: Array) -> Array:
-        """Bounds (S, nq) on Σ_jk N_jk w_j w_k by w_j² from `rows` (S + 1, nq), their greatest at
-        the points of a node.
+        """Bounds ν (S, nq) with Σ_jk N_jk w_j w_k ≤ Σ_j ν_j w_j².
 
-        The sum is at most Σ_j (max(N_jj, 0) + Σ_{k≠j} |N_jk|) w_j². This is convex in N, so that
-        its greatest value at the corners bounds it for what interpolation gives; the rest is added
-        row by row.
+        The sum is at most Σ_j (max(N_jj, 0) + Σ_{k≠j} |N_jk|) w_j². This row sum is convex in N, so
+        its greatest value at the corners of a cell bounds it for interpolated N. The error of the
+        interpolation is added row by row.
+
+        Args:
+            rows: greatest row sums at the points of a node, shape (S + 1, nq).
+            spacing: greatest spacing of the grid along both of its joints [rad].
+            half: half sides of the boxes, shape (S, nq) [rad].
         """
         across = (
             sum(
@@ -111,13 +127,13 @@ class PathCurvature:
 
 
 def _along(direction: Array, bound: Array) -> Array:
-    """A bound (nq, ...) on derivatives by joints, along directions (S, nq): (S, ...)."""
+    """A bound (nq, ...) on derivatives by joints, along directions (S, nq): shape (S, ...)."""
     return np.asarray(
         (direction @ bound.reshape(len(bound), -1)).reshape(len(direction), *bound.shape[1:])
     )
 
 
 def _along_each(direction: Array, bound: Array) -> Array:
-    """Bounds (S, nq, ...) on derivatives, along one direction (S, nq) each: (S, ...)."""
+    """Bounds (S, nq, ...) on derivatives, each along its own direction (S, nq): shape (S, ...)."""
     flat = bound.reshape(*bound.shape[:2], prod(bound.shape[2:]))
     return np.asarray((direction[:, None] @ flat).reshape(len(bound), *bound.shape[2:]))

@@ -1,9 +1,9 @@
-"""Gravity and inertia terms of a dual bound on a grid around its path, with bounds on what lies
-between grid points.
+"""Gravity and inertia terms of a dual bound on a grid around its path, with bounds between its
+points.
 
-Between the two ends of a step of the path, interpolation between the ends' values at the same
-offset from it errs by no more than 1 / 8 of the bound on the second derivative over the step; so
-does that between the bounds of both ends.
+Between the two ends of a step, interpolation between the values at the same offset from the path
+errs by at most 1 / 8 of the bound on the second derivative over the step. The same holds for the
+interpolation between bounds at both ends.
 """
 
 from __future__ import annotations
@@ -22,39 +22,47 @@ from joulepath.optimizer.bounds.reference import Reference
 
 @dataclass(frozen=True)
 class PathTerms:
-    """Terms of a path and its multipliers ω = 2 c λ at both ends of each step: at points, (S, 2,
-    K), and in cells of the grid, (S, 2, cells, ...).
+    """Terms of a path and its multipliers ω = 2 c λ at both ends of each of S steps.
 
-    With x' and ω' for the derivatives by the share of the duration, N = Σ_i ω_i ∂_i M: `gravity` =
-    ω · g [W]; `slope` (S, nq) = its gradient and `momentum` (S, nq) = M ω' + N x', on the path, the
-    means of a step's ends. `kinetic` = ω' · M x' + x' · N x' / 2, less such a mean, `kinetic_mean`
-    (S,). In a cell, `deviation` (..., nq) bounds |M ω' + N x' - momentum|, and `steepness` (...,
-    others) |gradient - slope|. `spread` (S, nq) bounds how far w · N w exceeds zero by w², for
-    every joint and anywhere in the boxes. `others` are the joints beside the two of the grid; by
-    them, `gravity` has second derivatives whose rows add up to at most `gravity_others` (S,
-    others), and `kinetic_others` (S, others) and `momentum_others` (S, others, nq) bound the first
-    derivatives.
+    Terms are given at K points of a grid, shape (S, 2, K), and in its cells, shape (S, 2, cells,
+    ...). Primes are derivatives by the share of the duration, N = Σ_i ω_i ∂_i M.
     """
 
     cells: GridCells
     grid: tuple[int, int]
+    """Joints of the grid."""
     others: tuple[int, ...]
+    """The other joints."""
     half: Array
+    """Half sides of the boxes that hold all motions, shape (S, nq) [rad]."""
     omega: Array
+    """ω at the nodes, shape (S + 1, nq) [rad/s]."""
     x_rate: Array
+    """x', shape (S, nq) [rad]."""
     gravity: Array
+    """ω · g at the points [W]."""
     slope: Array
+    """Gradient of ω · g on the path, mean of both ends of a step, shape (S, nq)."""
     momentum: Array
+    """M ω' + N x' on the path, mean of both ends of a step, shape (S, nq)."""
     kinetic: Array
+    """ω' · M x' + x' · N x' / 2 at the points, less `kinetic_mean`."""
     kinetic_mean: Array
+    """Its value on the path, mean of both ends of a step, shape (S,)."""
     deviation: Array
+    """Bounds on |M ω' + N x' - momentum| in the cells, shape (S, 2, cells, nq)."""
     steepness: Array
+    """Bounds on |gradient of ω · g - slope| by the other joints, shape (S, 2, cells, others)."""
     gravity_curvature: Curvature
     kinetic_curvature: Curvature
     gravity_others: Array
+    """Row sums of bounds on second derivatives of ω · g by other joints, shape (S, others)."""
     kinetic_others: Array
+    """Bounds on first derivatives of the kinetic term by other joints, shape (S, others)."""
     momentum_others: Array
+    """Bounds on first derivatives of M ω' + N x' by other joints, shape (S, others, nq)."""
     spread: Array
+    """ν with w · N w ≤ Σ_j ν_j w_j² anywhere in the boxes, shape (S, nq)."""
 
 
 def path_terms(
@@ -65,8 +73,15 @@ def path_terms(
     grid: tuple[int, int],
     spacing: Spacing,
 ) -> PathTerms:
-    """The terms for copper loss `loss` (nq,) [W/(N·m)²], boxes of half sides `half` (S, nq) and the
-    joints `grid`.
+    """The terms of a path.
+
+    Args:
+        chain: chain of the arm.
+        reference: path and multipliers.
+        loss: copper loss c, shape (nq,) [W/(N·m)²].
+        half: half sides of the boxes that hold all motions, shape (S, nq) [rad].
+        grid: joints of the grid.
+        spacing: spacing of the grid.
     """
     x, S, nq = reference.x, reference.steps, chain.nq
     omega = 2 * loss * reference.multipliers

@@ -1,6 +1,4 @@
-"""The greatest values H of a dual bound's terms of speed, over a motion; the proof is in
-`dual_bound`.
-"""
+"""Greatest values H of a dual bound's terms of speed, over a motion; proof in `dual_bound`."""
 
 from __future__ import annotations
 
@@ -13,20 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.bounds.cruise import TINY
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.path_terms import PathTerms
 from joulepath.optimizer.bounds.time_parts import TimeParts
 from joulepath.optimizer.bounds.weights import Weights
 from joulepath.optimizer.native.shared_library import address, library
 
-# halvings of the interval that holds the multiplier of a joint's displacement
-_BISECTIONS = 9
-# what a quotient's denominator is at least
-_TINY = 1e-300
+BISECTIONS = 9
+"""Halvings of the interval of the multiplier m of a joint's displacement."""
 
 
 class _Friction(ctypes.Structure):
-    """The `Friction` of the C."""
+    """The struct `Friction` of the C library."""
 
     _fields_ = [(name, ctypes.c_long) for name in ("intervals", "nq")] + [
         (name, ctypes.c_void_p)
@@ -35,7 +32,7 @@ class _Friction(ctypes.Structure):
 
 
 class _Path(ctypes.Structure):
-    """The `Path` of the C."""
+    """The struct `Path` of the C library."""
 
     _fields_ = [("S", ctypes.c_long)] + [
         (name, ctypes.c_void_p) for name in ("spread", "costate", "momentum", "x_rate", "omega")
@@ -43,7 +40,7 @@ class _Path(ctypes.Structure):
 
 
 class _Parts(ctypes.Structure):
-    """The `Parts` of the C."""
+    """The struct `Parts` of the C library."""
 
     _fields_ = [("P", ctypes.c_long)] + [
         (name, ctypes.c_void_p) for name in ("step", "within", "length", "speed", "mean")
@@ -52,20 +49,23 @@ class _Parts(ctypes.Structure):
 
 @dataclass(frozen=True)
 class SpeedConjugate:
-    """Σ_j ∫ H_j ds of motions of `duration` (E,) [s], which grow, with a path's terms; `loss` (nq,)
-    is c.
-    """
+    """Σ_j ∫ H_j ds with the terms of a path."""
 
     friction: FrictionConjugate
     limits: Limits
     terms: PathTerms
     loss: Array
+    """Copper loss c, shape (nq,) [W/(N·m)²]."""
     duration: Array
+    """Durations in ascending order, shape (E,) [s]."""
 
     def __call__(self, weights: Weights) -> tuple[Array, Array]:
-        """Bounds (E,) [W] on the integrals, and ∫ p · x' ds (E,) [N·m·rad].
+        """Bounds on the integrals at each duration.
 
-        Speeds are those that a motion of the next duration may have, too. m is linear in 1 / T.
+        Speeds are bounded by those of the next greater duration. m is linear in 1 / T.
+
+        Returns:
+            Bounds (E,) [W], and ∫ p · x' ds (E,) [N·m·rad].
         """
         structures, _ = self._as_c
         stiffness, slowness = weights.confinement + weights.mixing, self._slowness(weights)
@@ -74,7 +74,7 @@ class SpeedConjugate:
             *map(ctypes.addressof, structures),
             weights.scale,
             weights.work,
-            _BISECTIONS,
+            BISECTIONS,
             len(self.duration),
             *map(address, (stiffness, slowness, self.duration, *result)),
         )
@@ -82,7 +82,7 @@ class SpeedConjugate:
 
     @cached_property
     def _as_c(self) -> tuple[tuple[ctypes.Structure, ...], list[NDArray[Any]]]:
-        """What does not depend on the weights, and the arrays that it points to."""
+        """The structs, which do not depend on the weights, and the arrays that they point to."""
         friction, terms, parts = self.friction, self.terms, self._parts
         path = [
             np.ascontiguousarray(each)
@@ -111,14 +111,14 @@ class SpeedConjugate:
 
     @cached_property
     def _mean(self) -> Array:
-        """The means by step (2, S, nq) [rad/s] of the greatest speeds for the first and the last
+        """Means by step (2, S, nq) [rad/s] of the greatest speeds for the first and the last
         duration.
         """
         return self._parts.mean_speed(np.array([0, -1]))
 
     @cached_property
     def _costate(self) -> Array:
-        """Γ / T (S + 1, nq) at the nodes, for multipliers as they are."""
+        """Γ / T at the nodes (S + 1, nq), for multipliers with the factor 1."""
         slope = self.terms.slope
         return np.concatenate(
             [np.zeros((1, slope.shape[1])), np.cumsum(slope, axis=0) / len(slope)]
@@ -126,4 +126,4 @@ class SpeedConjugate:
 
     def _slowness(self, weights: Weights) -> Array:
         """η / c (nq,)."""
-        return np.asarray(weights.work / np.maximum(self.loss, _TINY))
+        return np.asarray(weights.work / np.maximum(self.loss, TINY))

@@ -1,6 +1,4 @@
-"""The steps of a path, split into parts that are short where the greatest speed rises or falls
-fast.
-"""
+"""Steps of a path in parts, short while the limits on acceleration or jerk restrict the speed."""
 
 from __future__ import annotations
 
@@ -12,37 +10,56 @@ from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.bounds.reference import greatest_speed
 from joulepath.optimizer.collision.bodies import Indices
 
-# a part is no longer than this [s] while speed is short of time to build up, nor are there more of
-# them in a step
-_SHORT, _MOST = 0.015, 24
+
+@dataclass(frozen=True)
+class PartSettings:
+    """Settings of the division of steps into parts."""
+
+    longest: float = 0.015
+    """Longest part [s] while the limits on acceleration and jerk restrict the speed."""
+    most_parts: int = 24
+    """Largest number of parts of a step."""
+
+
+PARTS = PartSettings()
 
 
 @dataclass(frozen=True)
 class TimeParts:
-    """Parts of steps: `step` (P,) the step of each, both ends (P, 2) as shares of it, and `length`
-    (P,), which adds up to 1; `speed` (B, P, nq) [rad/s] bounds the speeds in it, for B greatest
-    durations."""
+    """Parts of the steps of a path."""
 
     step: Indices
+    """Step of each part, shape (P,)."""
     within: Array
+    """First and last instant of each part as shares of its step, shape (P, 2)."""
     length: Array
+    """Length of each part as a share of the motion, shape (P,); the sum is 1."""
     speed: Array
+    """Bounds on the speed in each part for B durations, shape (B, P, nq) [rad/s]."""
 
     @classmethod
     def of(cls, steps: int, limits: Limits, duration: Array) -> TimeParts:
-        """The parts of so many steps of motions of at most `duration` (B,) [s]."""
+        """The parts of the steps of motions.
+
+        Args:
+            steps: number of steps.
+            limits: limits on speed, acceleration and jerk.
+            duration: greatest durations, shape (B,) [s].
+        """
         longest = float(duration.max())
         build_up = float((limits.v_max / limits.a_max + limits.a_max / limits.j_max).max())
         k = np.arange(steps)
         left = np.minimum(k, steps - 1 - k) * longest / steps
         count = np.where(
-            left < build_up, np.clip(np.ceil(longest / steps / _SHORT), 1, _MOST), 1
+            left < build_up,
+            np.clip(np.ceil(longest / steps / PARTS.longest), 1, PARTS.most_parts),
+            1,
         ).astype(int)
         step = np.repeat(k, count)
         part = np.arange(len(step)) - np.repeat(np.cumsum(count) - count, count)
         within = np.stack([part, part + 1], axis=1) / count[step][:, None]
         share = (step[:, None] + within) / steps
-        # the part's instant that is farthest from both ends
+        # the instant of each part at the greatest distance from both ends of the motion
         inner = np.where(
             (share[:, 0] < 0.5) & (share[:, 1] > 0.5), 0.5, np.minimum(share[:, 1], 1 - share[:, 0])
         )
@@ -54,8 +71,10 @@ class TimeParts:
         )
 
     def mean_speed(self, which: Indices) -> Array:
-        """The means (k, S, nq) [rad/s] of the speeds in each step, for some of the greatest
-        durations.
+        """Mean bounds on the speed in each step, shape (k, S, nq) [rad/s].
+
+        Args:
+            which: indices of durations, shape (k,).
         """
         first = np.flatnonzero(np.diff(self.step, prepend=-1))
         weight = self.length[:, None] * len(first)

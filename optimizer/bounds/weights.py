@@ -1,4 +1,4 @@
-"""What a dual bound's quality depends on, and not its validity."""
+"""Weights of a dual bound, which affect its quality and not its validity."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class Weights:
-    """The multipliers' factor `scale` and, per joint (nq,) [N·m·s/rad], κ and μ of `dual_bound`;
-    `work` is η.
-    """
+    """Weights of a dual bound; see the proof in `dual_bound`."""
 
     scale: float
+    """Factor of the multipliers [1]."""
     confinement: Array
+    """κ, shape (nq,) [N·m·s/rad]."""
     mixing: Array
+    """μ, shape (nq,) [N·m·s/rad]."""
     work: float = 0.0
+    """η [1]."""

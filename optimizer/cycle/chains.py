@@ -1,4 +1,4 @@
-"""Chains of configurations, one of each layer: the least by the sum of the costs of its legs."""
+"""Least chains of configurations, one configuration of every layer, by the sum of the leg costs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from joulepath.models.robot import Array
 
 
 class LeastChain:
-    """The least chain through legs whose costs only rise from one question to the next, but for
-    what `lower` says.
+    """Least chain through legs with costs that rise from one call of `find` to the next.
 
-    `costs` are matrices (n_k, n_k+1) [J] of one leg each. A `closed` chain ends in the node in
-    which it starts: each of these has a least chain of its own, which is looked for again only
-    while what was found for it before is the least.
+    A cost that falls is announced by `lower`. A closed chain ends in its first node, and every
+    first node has a least chain of its own. These chains are computed again only while the value
+    known for them is the least.
+
+    Args:
+        costs: cost matrix of every leg, shape (n_k, n_k+1) [J].
+        closed: whether the chain ends in the node in which it starts.
     """
 
     def __init__(self, costs: Sequence[Array], closed: bool) -> None:
@@ -23,7 +26,7 @@ class LeastChain:
         self._known: Array | None = None
 
     def find(self) -> tuple[float, list[int]]:
-        """The cost [J] of the least chain, and its nodes; inf and no nodes if there is none."""
+        """Cost [J] and nodes of the least chain; inf and no nodes if there is none."""
         if not self.closed:
             return self._through(np.zeros(self.costs[0].shape[0]), None)
         if self._known is None:
@@ -39,7 +42,7 @@ class LeastChain:
                 return value, nodes
 
     def lower(self, by: float) -> None:
-        """Say that one cost fell, by as much [J]: the only way in which costs may do that."""
+        """Announce the fall of one cost `by` an amount [J]; costs may fall in no other way."""
         if self._known is not None:
             self._known -= by
 
@@ -51,7 +54,7 @@ class LeastChain:
     def _through(self, first: Array, last: int | None) -> tuple[float, list[int]]:
         reached = [first]
         for cost in self.costs:
-            # rows that nothing leads to are left out: with one first node, all but one
+            # leave out unreachable rows: with one first node, these are all but one
             rows = np.flatnonzero(np.isfinite(reached[-1]))
             if not len(rows):
                 return np.inf, []
@@ -65,7 +68,6 @@ class LeastChain:
             return np.inf, []
         nodes = [node]
         for before, cost in zip(reached[-2::-1], self.costs[::-1], strict=True):
-            # where each node came from is asked on one chain alone: several times less than for all
-            # of them
+            # backtracking one chain takes a fraction of storing all predecessors
             nodes.append(int((before + cost[:, nodes[-1]]).argmin()))
         return float(reached[-1][node]), nodes[::-1]

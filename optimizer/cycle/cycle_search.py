@@ -1,124 +1,158 @@
-"""The search for the cycle of least energy in its own time, which certifies its moves as `optimize`
-does.
-"""
+"""Search for the cycle of least energy in its own time, with every move certified."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass
 from itertools import accumulate, chain
 
 import numpy as np
 
-from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.cycle.chains import LeastChain
-from joulepath.optimizer.cycle.known_motions import KnownMotion, known_motions
+from joulepath.optimizer.cycle.known_motions import KnownMotion
 from joulepath.optimizer.cycle.layers import Layer
-from joulepath.optimizer.cycle.lazy_search import SAME, SHARE_OF_A_LEG, LazySearch
+from joulepath.optimizer.cycle.lazy_search import LAZY_SEARCH, LazySearch, Pair
 from joulepath.optimizer.cycle.legs import Leg, check_size
 from joulepath.optimizer.cycle.move_problem import problem_of
-from joulepath.optimizer.cycle.passing_leg import LIKELY, PassingLeg, Route
-from joulepath.optimizer.cycle.rests import dwell_costs
-from joulepath.optimizer.cycle.ways import layers_of
+from joulepath.optimizer.cycle.pair_solver import PAIR_SOLVER, PairSolver
+from joulepath.optimizer.cycle.passing_leg import PASSING, PassingLeg
+from joulepath.optimizer.cycle.rest_energy import dwell_costs
+from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import PlannedMove
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Improved,
+    Tell,
+    no_listener,
+)
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.solve.methods.method import SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveStatus
 
-# shares of the deadline that the search leaves to the motions of its answer, and these to certify a
-# simpler cycle that needs less
-RESERVED, KEPT = 0.3, 0.08
-# routes through passes that are tried for a pair at most, and while none has a motion
-MOST_ROUTES, MOST_FAILED = 3, 10
-# stops beyond which the proof that no chain is better is worth less than its time: a pair that is
-# not solved weighs so much more than its bound then, of the 17 % more that motions need in the
-# median
-MANY_STOPS, LIKELY_MORE = 40, 0.1
-# mean times of a first motion that one may take in any case
-MANY_TIMES = 4
+
+@dataclass(frozen=True)
+class CycleSearchSettings:
+    """Settings of the search for a cycle in its own time."""
+
+    reserved_share: float = 0.3
+    """Share of the deadline left to the motions of the answer."""
+    most_routes: int = 3
+    """Routes through passes tried for a pair."""
+    most_failed_routes: int = 10
+    """Routes through passes tried for a pair while none has a motion."""
+    many_stops: int = 40
+    """Number of stops above which unsolved pairs weigh more than their bounds: the proof that no
+    chain is better then takes more time than it is worth."""
+    unsolved_excess: float = 0.1
+    """Share of the bound by which unsolved pairs weigh more then; motions need 17 % more than their
+    bounds in the median."""
+    usual_times: float = 4.0
+    """Multiple of the mean time of a first motion that every first motion may take."""
+
+
+CYCLE_SEARCH = CycleSearchSettings()
 
 
 class CycleSearch(LazySearch):
-    """One search over `moves`, with the certified motions that it has found.
+    """Lazy search over the moves of a cycle, with the certified motions found.
 
-    `tell` gets what is found: the candidates are the kinds of all legs.
+    Args:
+        cycle: the cycle.
+        clock: function that returns the time [s].
+        moves: moves of the search; None for those of the cycle.
+        tell: receives the progress; its candidates are the kinds of all legs.
+
+    Raises:
+        DeadlineExceeded: the deadline passed before the legs were ready.
+        JoulepathError: the errors of `layers_of` and `check_size`.
     """
 
     def __init__(
         self,
-        asked: Cycle,
+        cycle: Cycle,
         clock: Clock,
         moves: Sequence[PlannedMove] | None = None,
-        tell: Tell = nobody,
+        tell: Tell = no_listener,
     ) -> None:
-        self.asked, self.clock = asked, clock
-        self.moves = asked.moves if moves is None else moves
-        self.end = Deadline.after(asked.deadline, clock)
-        self.solutions: dict[tuple[int, int, int], Solution] = {}
-        # searches that have a first motion, to go on with
-        self._runs: dict[tuple[int, int, int], Run] = {}
-        # times [s] that first motions took
-        self._spent = list[float]()
-        # one problem of each arm, whose models its other problems share
-        self._prepared: dict[int, PreparedProblem] = {}
-        self._known_motions = known_motions()
+        self.cycle, self.clock = cycle, clock
+        self.moves = cycle.moves if moves is None else moves
+        self.end = Deadline.after(cycle.deadline, clock)
+        # searches with a first motion, to be continued
+        self._runs: dict[Pair, Run] = {}
+        # times of first motions [s]
+        self._times = list[float]()
+        # models of every arm
+        self._models: list[ArmModels] = []
         try:
             with watch(self.end):
-                layers = layers_of(asked)
+                layers = layers_of(cycle)
                 check_size(self.moves, layers)
                 legs = [self._leg(move, layers) for move in self.moves]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
-        self._is_rough = (
-            asked.rough or len(asked.stops) > MANY_STOPS
-        ) and asked.objective == "electrical"
+        self.solver = PairSolver(cycle, self.moves, legs, clock, self.end)
+        self._overestimates = (
+            cycle.approximate or len(cycle.stops) > CYCLE_SEARCH.many_stops
+        ) and cycle.objective == "electrical"
         for leg in legs:
-            if self._is_rough and not isinstance(leg, PassingLeg):
-                leg.weigh_more(LIKELY_MORE)
-        # motions that rest at the passes of a pair, along one of its routes
-        self.stopping: dict[tuple[int, int, int], tuple[Route, Spline]] = {}
-        # whether a route has a bound below the motion found of its pair
-        self.routes_left = False
-        super().__init__(legs, asked.closed, self.end.earlier_by(RESERVED * asked.deadline))
+            if self._overestimates and not isinstance(leg, PassingLeg):
+                leg.raise_unsolved_costs(CYCLE_SEARCH.unsolved_excess)
+        # whether an untried route has a bound below the motion found of its pair
+        self._skipped_routes = False
+        reserved = CYCLE_SEARCH.reserved_share * cycle.deadline
+        super().__init__(legs, cycle.closed, self.end.earlier_by(reserved))
         self._tell = tell
-        self._first = [0, *accumulate(len(leg.pair) for leg in legs)]
-        tell(CandidatesFound(self._first[-1]))
-        known = all(leg.closed for leg in legs) and tell is not nobody
-        self._proven = (
-            LeastChain([leg.least_costs for leg in legs], asked.closed).find()[0] if known else None
+        self._first_kind = [0, *accumulate(len(leg.pair) for leg in legs)]
+        tell(CandidatesFound(self._first_kind[-1]))
+        known = all(leg.closed for leg in legs) and tell is not no_listener
+        self._proven_bound = (
+            LeastChain([leg.least_costs for leg in legs], cycle.closed).find()[0] if known else None
         )
+
+    @property
+    def solutions(self) -> dict[Pair, Solution]:
+        """Certified motions of the pairs that are finished."""
+        return self.solver.solutions
 
     def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
         start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
-        problem = problem_of(self.asked, move, start.q[0], goal.q[0], self.asked.deadline)
-        known = self._prepared.get(id(move.arm))
-        prepared = PreparedProblem.of(problem) if known is None else known.sharing(problem)
-        self._prepared[id(move.arm)] = prepared
-        dwells = dwell_costs(self.asked, move, goal)
+        problem = problem_of(self.cycle, move, start.q[0], goal.q[0], self.cycle.deadline)
+        prepared = PreparedProblem.of(problem, self._models_of(move.arm))
+        dwells = dwell_costs(self.cycle, move, goal)
         if between:
             return PassingLeg.through(prepared, [start, *between, goal], dwells)
-        return (Leg.of if move.tool_path is None else Leg.of_way)(prepared, start, goal, dwells)
+        return (Leg.of if move.tool_path is None else Leg.along_path)(prepared, start, goal, dwells)
+
+    def _models_of(self, arm: Arm) -> ArmModels:
+        """Models of an arm, shared by all moves with this arm."""
+        for models in self._models:
+            if models.arm is arm:
+                return models
+        self._models.append(ArmModels(arm))
+        return self._models[-1]
 
     def run(self) -> list[int]:
-        """The nodes of the chain of least energy, whose motions are all in `solutions`.
+        """Nodes of the chain of least energy, with all motions in `solutions`.
 
-        Once the time is up, of the chains whose motions are. Raises NoSequence, or DeadlineExceeded
-        if there are none.
+        Once the time is up, of the chains with all motions in `solutions`.
+
+        Raises:
+            NoSequence: there is no chain.
+            DeadlineExceeded: the deadline passed before a chain was finished.
         """
         while True:
             try:
                 nodes = self.explore()
-                if not self._finish(nodes):
+                if not self._finish_chain(nodes):
                     return nodes
             except DeadlineExceeded:
                 self.cut_short = True
@@ -126,24 +160,28 @@ class CycleSearch(LazySearch):
                     return nodes
                 raise
 
-    def _finish(self, nodes: list[int]) -> bool:
-        """Finish the moves of a chain; whether some were not in `solutions`. Raises
-        DeadlineExceeded.
+    def _finish_chain(self, nodes: list[int]) -> bool:
+        """Finish the moves of a chain; returns whether some were not finished before.
+
+        Raises:
+            DeadlineExceeded: no time is left.
         """
-        # what has no motion yet may take all the time that is left, the others a share of it in a
-        # long cycle
+        # moves without a motion come first and may take all the time that is left; in a long cycle
+        # the others get equal shares
         fresh = sorted(
-            (each for each in self.pairs(nodes) if each not in self.solutions),
+            (pair for pair in self.pairs(nodes) if pair not in self.solutions),
             key=self._runs.__contains__,
         )
-        for done, each in enumerate(fresh):
-            shared = self._is_rough and each in self._runs
-            self.finish(*each, share=1 / (len(fresh) - done) if shared else 1.0)
+        for done, pair in enumerate(fresh):
+            shared = self._overestimates and pair in self._runs
+            self.finish(*pair, share=1 / (len(fresh) - done) if shared else 1.0)
         return bool(fresh)
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """Objective [J] of a first motion of a pair, whose run is kept; inf if none is found, None
-        if too late.
+        """Objective [J] of a first motion of a pair, with its run kept.
+
+        Returns:
+            The objective; inf if no motion is found, None if the time is up.
         """
         leg = self.legs[k]
         energy = (
@@ -155,7 +193,7 @@ class CycleSearch(LazySearch):
             kind, solved = int(self.legs[k].kind[s, g]), bool(np.isfinite(energy))
             self._tell(
                 CandidateTried(
-                    self._first[k] + kind,
+                    self._first_kind[k] + kind,
                     "solved" if solved else "failed",
                     float(self.legs[k].bound[kind]),
                     energy if solved else None,
@@ -164,243 +202,136 @@ class CycleSearch(LazySearch):
         return energy
 
     def chain_tried(self, nodes: list[int]) -> None:
-        """Tells the cycle of this chain, if all of it is solved and it takes a time that is asked
-        for.
-        """
-        if self._tell is nobody:
+        """Tell the cycle of a chain if it is solved and its duration is allowed."""
+        if self._tell is no_listener:
             return
-        energy, motions = self.cost(nodes), [self.motion(*each) for each in self.pairs(nodes)]
-        # of a leg that another pair of its kind was solved for, the duration is not known yet
+        energy, motions = self.cost(nodes), [self.motion(*pair) for pair in self.pairs(nodes)]
+        # a pair solved by another pair of its kind has no duration yet
         durations = [motion.duration for motion in motions if motion is not None]
         complete = len(durations) == len(motions)
-        own = sum(durations) + self.asked.dwelling if complete else None
+        own = sum(durations) + self.cycle.dwell_time if complete else None
         if np.isfinite(energy) and (
-            self.asked.any_time or (own is not None and self.asked.nearest_duration(own) == own)
+            self.cycle.has_free_duration
+            or (own is not None and self.cycle.clamped_duration(own) == own)
         ):
-            self._tell(Improved(energy, own, self._proven))
+            self._tell(Improved(energy, own, self._proven_bound))
 
     def _attempt_routes(self, leg: PassingLeg, k: int, s: int, g: int) -> float | None:
-        """The least of `_attempt` over the likeliest routes of a pair, first the one along which a
-        motion is known.
+        """Least result of `_attempt` over the likeliest routes of a pair.
+
+        The route of a known stopping motion is tried first.
         """
-        key, best, kept = (k, s, g), None, None
-        first = [(-np.inf, self.stopping[key][0])] if key in self.stopping else []
-        others = (each for each in leg.best_routes(s, g) if not first or each[1] != first[0][1])
+        pair, best, kept = (k, s, g), None, None
+        stopping = self.solver.stopping_route(pair)
+        first = [] if stopping is None else [(-np.inf, stopping)]
+        others = (other for other in leg.best_routes(s, g) if other[1] != stopping)
         for tried, (bound, route) in enumerate(chain(first, others)):
             known = np.inf if best is None else best
             if np.isfinite(known) and bound >= known:
                 break
-            if (
-                tried >= (MOST_ROUTES if np.isfinite(known) else MOST_FAILED)
-                or LIKELY * bound >= known
-            ):
-                self.routes_left = True
+            solved = np.isfinite(known)
+            most = CYCLE_SEARCH.most_routes if solved else CYCLE_SEARCH.most_failed_routes
+            if tried >= most or PASSING.likely_ratio * bound >= known:
+                self._skipped_routes = True
                 break
-            leg.routes[s, g] = route
-            energy = self._attempt(*key)
+            leg.set_route(s, g, route)
+            energy = self._attempt(*pair)
             if energy is None:
-                self.routes_left = True
+                self._skipped_routes = True
                 break
             if best is None or energy < best:
-                best, kept = energy, (route, self._runs.pop(key, None))
+                best, kept = energy, (route, self._runs.pop(pair, None))
             if self.search_end.passed:
-                self.routes_left = True
+                self._skipped_routes = True
                 break
         if kept is not None:
-            leg.routes[s, g] = kept[0]
+            leg.set_route(s, g, kept[0])
             if kept[1] is not None:
-                self._runs[key] = kept[1]
+                self._runs[pair] = kept[1]
         return best
 
-    def _attempt(self, k: int, s: int, g: int) -> float | None:
+    def _time_of_attempt(self, k: int) -> float:
+        """Time for a first motion of leg `k` [s]."""
         first = isinstance(self.legs[k], PassingLeg) and not self.legs[k].solved
+        left = self.search_end.left
+        usual = CYCLE_SEARCH.usual_times * float(np.mean(self._times or [0.0]))
+        if first:
+            return self.solver.share_of_leg(k, self.search_end).left
         # near the end of the search, a share of what is left is less than any motion takes
-        left, usual = self.search_end.left, MANY_TIMES * float(np.mean(self._spent or [0.0]))
-        time = (
-            self._shared(k, self.search_end).left
-            if first
-            else max(SHARE_OF_A_LEG * left, min(usual, left))
-        )
-        run = self._run(k, self._problem_of(k, s, g, time))
+        return max(LAZY_SEARCH.share_of_leg * left, min(usual, left))
+
+    def _attempt(self, k: int, s: int, g: int) -> float | None:
+        pair, solver = (k, s, g), self.solver
+        run = solver.run(k, solver.problem(pair, self._time_of_attempt(k)))
         try:
             run.prepare()
-            for spline in self._known(k, s, g):
+            for spline in solver.guesses(k, s, g):
                 run.warm_start(spline)
         except DeadlineExceeded:
-            return self.late()
+            return self.out_of_time()
         except JoulepathError:
             return np.inf
-        incumbent, (candidate,) = run.incumbent, run.incumbent.candidates
+        state, (candidate,) = run.state, run.state.candidates
         if candidate.status is CandidateStatus.INFEASIBLE:
             return np.inf
         if candidate.energy is None:
-            motions, key = self._known_motions, self._known_motions.key("tried", run.problem)
+            motions = solver.known_motions
+            key = motions.key("tried", run.problem)
             known = motions.recall(key)
-            candidate.attempt = result = (
-                solve(incumbent, candidate) if known is None else known.result
-            )
-            if result.spline is not None and not incumbent.cut_short:
+            candidate.attempt = result = solve(state, candidate) if known is None else known.result
+            if result.spline is not None and not state.cut_short:
                 motions.keep(key, KnownMotion(result.spline, result.stationarity))
             if result.status is SolveStatus.OUT_OF_TIME:
-                return self.late()
+                return self.out_of_time()
             self.failed |= result.spline is None
-            if settled(incumbent, candidate, result, result.reason) is None:
-                self.causes[k] = result.reason
+            if settled(state, candidate, result, result.message) is None:
+                self.causes[k] = result.message
                 return np.inf
-        self._runs[k, s, g] = run
-        self._spent.append(self.clock() - run.began)
-        incumbent.end = self.end
+        self._runs[pair] = run
+        self._times.append(self.clock() - run.began)
+        state.end = self.end
         assert candidate.energy is not None
         return candidate.energy
 
     @property
     def leaves_better(self) -> bool:
-        """Whether some chain has a bound below the best one, where legs weigh more than their
-        bounds: through passes, and in a rough cycle or one of many stops."""
-        if self.routes_left or not (self.asked.passes or self._is_rough):
-            return self.routes_left
+        """Whether some chain has a bound below the best one.
+
+        This is possible where unsolved legs weigh more than their bounds: with passes, and in
+        approximate or long cycles.
+        """
+        if self._skipped_routes or not (self.cycle.has_passes or self._overestimates):
+            return self._skipped_routes
         return self.leaves_chains
 
     def motion(self, k: int, s: int, g: int) -> Spline | None:
-        """The first motion of a pair; None if there is none."""
+        """First motion of a pair; None if there is none."""
         run = self._runs.get((k, s, g))
-        return None if run is None else run.incumbent.candidates[0].spline
-
-    def confirms(self, k: int, s: int, g: int, spline: Spline) -> bool:
-        """Whether the certificate confirms a motion of a pair."""
-        leg = self.legs[k]
-        problem = self._problem_of(k, s, g, self.asked.deadline)
-        return certify(
-            problem, spline, leg.start.q[s], leg.goal.q[g], leg.prepared.energy(spline)
-        ).valid
-
-    def solve_in(
-        self, k: int, s: int, g: int, duration: float, begin: Sequence[Spline] = ()
-    ) -> Solution:
-        """The certified motion of a pair in a given duration [s], from known motions if there are
-        any to `begin` with.
-
-        Raises the errors of `optimize`.
-        """
-        problem = self._problem_of(k, s, g, self._end_of(k, KEPT * self.asked.deadline).left)
-        fixed = replace(problem, duration_min=duration, duration_max=duration)
-        own, known = self.solutions.get((k, s, g)), [*self._known(k, s, g), *begin]
-        if own is not None and self.moves[k].tool_path is not None:
-            # a path that is followed as fast as it can be is not followed so fast again without a
-            # guess
-            known.append(own.trajectory.spline)
-        key = self._known_motions.key("finished", fixed, known)
-        return self._recalled(k, key, fixed) or self._kept(
-            key, self._run(k, fixed, known).solution()
-        )
+        return None if run is None else run.state.candidates[0].spline
 
     def finish(self, k: int, s: int, g: int, share: float = 1.0) -> None:
-        """Optimise the motion of a pair to the end, in this share of the time that is left, and
-        certify it.
+        """Optimise the motion of a pair to convergence and certify it.
 
-        Raises DeadlineExceeded if no time is left.
+        Args:
+            k: number of the leg.
+            s: node at the start.
+            g: node at the goal.
+            share: share of the time left for this motion.
+
+        Raises:
+            DeadlineExceeded: no time is left.
         """
-        leg, before = self.legs[k], float(self.legs[k].cost[s, g])
-        end = self._end_of(k, 0.0 if self.asked.any_time else KEPT * self.asked.deadline)
+        pair, leg, before = (k, s, g), self.legs[k], float(self.legs[k].cost[s, g])
+        kept = 0.0 if self.cycle.has_free_duration else PAIR_SOLVER.kept_share * self.cycle.deadline
+        end = self.solver.end_of_leg(k, kept)
         if share < 1:
             end = end.within(share * end.left)
-        problem, known = self._problem_of(k, s, g, end.left), self._known(k, s, g)
-        run = self._runs.pop((k, s, g), None)
-        key = self._known_motions.key("finished", problem, known)
         try:
-            if (recalled := self._recalled(k, key, problem)) is not None:
-                found = recalled
-            elif run is None:
-                found = self._kept(key, self._run(k, problem, known).solution())
-            else:
-                run.incumbent.end = end
-                if run.incumbent.cut_short and known:
-                    # its share of the search's time was too short
-                    run.incumbent.cut_short = False
-                    run.warm_start(known[0])
-                found = self._kept(key, run.search())
+            found = self.solver.finish(pair, end, self._runs.pop(pair, None))
         except NoTrajectory:
             self.failed = True
             leg.set_pair(s, g, np.inf)
             return
-        self.solutions[k, s, g] = found
-        leg.set_pair(s, g, found.energy.of(self.asked.objective))
-        self._chain.lower(max(before - float(leg.cost[s, g]), 0.0) + SAME)
-
-    def _kept(self, key: str, found: Solution) -> Solution:
-        """A solution, whose motion is kept if no more time would make it better."""
-        if found.status == "optimal":
-            self._known_motions.keep(
-                key, KnownMotion(found.trajectory.spline, found.solver.stationarity)
-            )
-        return found
-
-    def _recalled(self, k: int, key: str, problem: Problem) -> Solution | None:
-        """The solution that a known motion is; None if none is known, or it is not certified."""
-        known = self._known_motions.recall(key)
-        if known is None:
-            return None
-        try:
-            return self._run(k, problem).as_it_is(known.spline, known.stationarity, is_optimal=True)
-        except NoTrajectory:
-            self._known_motions.forget(key)
-            return None
-
-    def _end_of(self, k: int, kept: float = 0.0) -> Deadline:
-        """The deadline of the motion of a leg, with time [s] kept. Raises DeadlineExceeded if none
-        is left.
-        """
-        end = self.end.earlier_by(kept)
-        if end.passed:
-            raise DeadlineExceeded([])
-        return self._shared(k, end) if isinstance(self.legs[k], PassingLeg) else end
-
-    def _shared(self, k: int, end: Deadline) -> Deadline:
-        """The end of what a leg through passes may take of the time until `end`: it may take all
-        that it gets.
-
-        It leaves as much for each that comes after it, and for the other legs.
-        """
-        return end.within(
-            end.left / (1 + sum(isinstance(leg, PassingLeg) for leg in self.legs[k:]))
-        )
-
-    def _known(self, k: int, s: int, g: int) -> list[Spline]:
-        """The motion that rests at the passes of a pair, if one is known along its route."""
-        leg = self.legs[k]
-        if not isinstance(leg, PassingLeg) or (k, s, g) not in self.stopping:
-            return []
-        route, spline = self.stopping[k, s, g]
-        return [spline] if leg.route(s, g) == route else []
-
-    def as_stopping(self, k: int, s: int, g: int, better: bool) -> Solution:
-        """The motion of a pair that rests at its passes; a `better` one of the same duration if
-        there is one.
-
-        Raises the errors of `optimize`.
-        """
-        leg = self.legs[k]
-        assert isinstance(leg, PassingLeg)
-        leg.routes[s, g], motion = self.stopping[k, s, g]
-        if better:
-            with suppress(DeadlineExceeded):
-                return self.solve_in(k, s, g, motion.duration)
-        return self.as_it_is(k, s, g, motion)
-
-    def as_it_is(self, k: int, s: int, g: int, motion: Spline) -> Solution:
-        """The solution that a motion of a pair is. Raises NoTrajectory if it is not certified, or
-        DeadlineExceeded.
-        """
-        return self._run(k, self._problem_of(k, s, g, self.end.left)).as_it_is(motion)
-
-    def _run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:
-        """The search of a motion of leg `k`."""
-        run = Run(problem, known, self.clock, like=self.legs[k].prepared)
-        run.incumbent.prepared.traces.update(self.legs[k].traces_of(problem))
-        return run
-
-    def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:
-        """The problem of a pair, with `time` [s] for it."""
-        leg = self.legs[k]
-        problem = problem_of(self.asked, self.moves[k], leg.start.q[s], leg.goal.q[g], time)
-        return replace(problem, passes=leg.passes(s, g))
+        leg.set_pair(s, g, found.energy.of(self.cycle.objective))
+        rise = max(before - float(leg.cost[s, g]), 0.0)
+        self.least_chain.lower(rise + LAZY_SEARCH.same_cost)

@@ -1,4 +1,6 @@
-"""The answer to a cycle: its moves, energy, lower bound, baselines and certificate. SI units."""
+"""The solution of a cycle: its moves, energy, lower bound, baselines and certificate, in SI
+units.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from joulepath.optimizer.declared import Internal, Joules, Ratio, Seconds
-from joulepath.optimizer.dynamics.interval import Known, with_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.cycle import (
     CycleCertificate,
@@ -37,13 +39,22 @@ from joulepath.optimizer.result.solution import Solution
 
 @dataclass(frozen=True)
 class CycleMove:
-    """One move as it was `planned`, with its `solution` and its `passes` through stops.
+    """A move of the cycle with the rests after it.
 
-    It begins at `t0` [s] of the cycle. The dwell after it draws `dwell_energy` [J]; then it waits
-    for `wait` [s], which draws `wait_energy` [J]. `pairs` of configurations were possible, of so
-    many `kinds`, of which so many were `solved`. `sensitivity` is that of the energy of all three.
-    `charges` [J] are those of an energy storage on the bus when the move begins, when it ends,
-    after the dwell and after the wait; none without one.
+    Attributes:
+        planned: the move as planned.
+        solution: its motion.
+        t0: start of the move in the cycle [s].
+        dwell_energy: energy of the dwell after the move [J].
+        wait: duration of the wait after the dwell [s].
+        wait_energy: energy of the wait [J].
+        pairs: number of possible pairs of configurations.
+        kinds: number of kinds of pairs.
+        solved: number of kinds with an attempted motion.
+        sensitivity: sensitivity of the energy of move, dwell and wait.
+        passes: stops passed by the move.
+        charges: charge of the energy storage before the move, after it, after the dwell and after
+            the wait [J]; empty without storage.
     """
 
     planned: PlannedMove
@@ -70,7 +81,7 @@ class CycleMove:
         return self.solution.energy.electrical.total + self.dwell_energy + self.wait_energy
 
     def legs(self, objective: Objective) -> list[LegReport]:
-        """The move, and the dwell and the wait after it if they last."""
+        """The move, and its dwell and wait if they have a duration."""
         solution, planned = self.solution, self.planned
         goal = StopConfiguration.at(solution.goal, planned.goal)
         move = LegReport(
@@ -112,16 +123,16 @@ class CycleMove:
 
 
 @dataclass(frozen=True)
-class Needed:
-    """What a cycle needs: electrical energy, how well that is known, and the mechanical work of its
-    moves [J].
+class CycleEnergies:
+    """Electrical energy [J] of a cycle with its uncertainty, and mechanical work [J] of its
+    moves.
     """
 
-    electrical: Known
+    electrical: MotionEnergy
     mechanical: float
 
     def of(self, objective: Objective) -> float:
-        """The part that an objective minimises [J]."""
+        """The energy that an objective minimises [J]."""
         return self.electrical.energy if objective == "electrical" else self.mechanical
 
 
@@ -133,13 +144,16 @@ CycleBaselineName = Literal[
     "fastest_then_wait",
     "given_order",
     "without_storage",
+    "ruckig_slowed",
+    "straight",
 ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class CycleBaseline:
-    """The same stops with the same payloads and dwells, in another way, and in the `time` that is
-    asked for."""
+    """Another cycle over the same stops, with the same payloads and dwells, in the requested
+    `time`.
+    """
 
     name: CycleBaselineName
     """`stopping`: the best cycle that rests at the stops with `via`, too; the others then rest
@@ -150,7 +164,8 @@ class CycleBaseline:
     `fastest_then_wait`, the fastest cycle, in configurations of its own, and a wait. With a free
     order, where it is allowed: `given_order`, the best cycle in the order of `stops`. With an
     energy storage on the bus: `without_storage`, the best cycle on the same bus without it, beside
-    `move_by_move` alone."""
+    `move_by_move` alone. In the configurations and times of the answer: `ruckig_slowed` and
+    `straight`, every move but lines and paths by the motion of this name of `POST /optimize`."""
     duration: Seconds
     """Duration of this cycle."""
     electrical: Joules = field(init=False)
@@ -159,28 +174,32 @@ class CycleBaseline:
     """Mechanical work of its moves."""
     within_limits: bool
     """Whether every move is within the limits; collisions are checked at sample points."""
-    saving: Ratio
-    """1 - energy of the answer / energy of this cycle, of the objective."""
+    saving: Ratio | None
+    """1 - energy of the answer / energy of this cycle, of the objective, in the same cycle time:
+    the shorter one also waits, where the answer waits for least, until the longer one ends. Null
+    where this cycle is not within the limits: it is no way to compare with."""
     saving_interval: SavingInterval | None
-    """How well the saving is known. Null for the objective `mechanical`."""
-    needed: Annotated[Needed, Internal] = field(repr=False)
+    """How well the saving is known. Null without a saving, and for the objective `mechanical`."""
+    energies: Annotated[CycleEnergies, Internal] = field(repr=False)
     """What this cycle needs."""
     moves: Annotated[Sequence[CycleMove], Internal] = field(default=(), repr=False)
     """Its own moves, where another bus may value them."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "electrical", self.needed.electrical.energy)
-        object.__setattr__(self, "mechanical", self.needed.mechanical)
+        object.__setattr__(self, "electrical", self.energies.electrical.energy)
+        object.__setattr__(self, "mechanical", self.energies.mechanical)
 
 
 @dataclass(frozen=True)
 class CycleSolution:
-    """The cycle of least energy. No cycle over these stops, of any configurations and shapes, with
-    rests at the stops that it does not pass, needs less than `lower_bound` [J] of the objective.
+    """The cycle of least energy.
 
-    `status` is `optimal` if no chain of configurations has a bound below what was found, and every
-    move converged. `storage` is what an energy storage on the bus did; None without one.
-    `price_of_time` [W] is what one more second would save; negative where time is left over.
+    `lower_bound` [J] bounds the objective of every cycle over these stops, of any configurations
+    and shapes, with rests at all stops without `via`.
+
+    `status` is `optimal` if no chain of configurations has a bound below the solution, and every
+    move converged. `storage` is the use of an energy storage on the bus; None without storage.
+    `price_of_time` [W] is the saving by one more second; it is negative if time is left over.
     """
 
     status: Literal["optimal", "feasible"]
@@ -200,10 +219,10 @@ class CycleSolution:
 
     @cached_property
     def energy(self) -> Energy:
-        """Energy of the cycle [J], with dwells and waiting."""
+        """Energy of the cycle [J], with dwells and waits."""
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
         energy = summed([move.solution for move in self.moves], resting)
-        known = self.needed.electrical
+        known = self.energies.electrical
         return with_interval(
             replace(energy, storage=self.storage),
             known.sensitivity,
@@ -212,13 +231,13 @@ class CycleSolution:
         )
 
     @property
-    def needed(self) -> Needed:
-        """What the cycle needs."""
-        return needed_by(self.moves)
+    def energies(self) -> CycleEnergies:
+        """Electrical and mechanical energy of the cycle."""
+        return energies_of(self.moves)
 
     @property
     def order(self) -> list[str]:
-        """Names of the stops, as they are visited."""
+        """Names of the stops in order of visit."""
         return [
             name
             for move in self.moves
@@ -236,7 +255,7 @@ class CycleSolution:
 
     @property
     def certificate(self) -> CycleCertificate:
-        """The worst of the certificates of all moves, and how the moves fit together."""
+        """Worst values of the certificates of all moves, and the jumps between the moves."""
         certificates = [move.solution.certificate for move in self.moves]
         worst: dict[str, float] = {}
         for name, ratio in chain.from_iterable(each.worst_ratio.items() for each in certificates):
@@ -276,19 +295,19 @@ class CycleSolution:
         )
 
 
-def needed_by(moves: Sequence[CycleMove]) -> Needed:
-    """What moves and their rests need."""
+def energies_of(moves: Sequence[CycleMove]) -> CycleEnergies:
+    """Energies of moves and their rests."""
     sensitivity = reduce(add, [move.sensitivity for move in moves])
-    known = Known(
+    known = MotionEnergy(
         sum(move.energy for move in moves),
         sensitivity,
         sum(move.solution.duration for move in moves),
     )
-    return Needed(known, sum(move.solution.energy.mechanical.total for move in moves))
+    return CycleEnergies(known, sum(move.solution.energy.mechanical.total for move in moves))
 
 
 def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
-    """The energy of several motions, and of the dwells between them [J]; mean power is that of the
+    """Energy of several motions and of the dwells between them [J]; the mean power is over the
     motions.
     """
     energies = [each.energy for each in solutions]

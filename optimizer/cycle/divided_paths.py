@@ -1,16 +1,16 @@
-"""Paths of stops that no configuration follows whole, divided by reconfigurations where these cost
-least.
+"""Division of paths at stops by reconfigurations, where no configuration follows the whole path.
 
-The parts are as few as possible. Among divisions into as few, that one is taken whose
-reconfigurations have the least lower bounds together, by dynamic programming over places along the
-path and the strands on which the arm may be there (compare IKLink, Y. Wang, C. Sifferman, M.
-Gleicher, 2024). At the places found, the cycle chooses the configurations.
+The number of parts is the least possible. Among divisions into this number of parts, the one with
+the least sum of lower bounds on its reconfigurations is found by dynamic programming over places
+along the path and the segments that the arm can follow there (compare IKLink, Y. Wang, C.
+Sifferman, M. Gleicher, 2024). The search for the cycle then chooses the configurations at these
+places.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,8 @@ import numpy.typing as npt
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.cycle.layers import arms_at
-from joulepath.optimizer.cycle.strands import Strand, strands_of
-from joulepath.optimizer.cycle.ways import layers_of_stop
+from joulepath.optimizer.cycle.path_segments import PathSegment, path_segments
+from joulepath.optimizer.cycle.stop_layers import layers_of_stop
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
@@ -31,34 +31,47 @@ from joulepath.optimizer.problem.tool_path import Section
 from joulepath.optimizer.search.end_feasibility import check_configurations
 from joulepath.optimizer.search.errors import PathInfeasible
 
-# places at which a path may be divided: even fractions of it
-PLACES = np.linspace(0.0, 1.0, 129)
-# J: a reconfiguration costs more than any place can save
-RECONFIGURATION = 1e6
-# rounding, in full turns
-TINY = 1e-9
+
+@dataclass(frozen=True)
+class DivisionSettings:
+    """Settings of the division of paths."""
+
+    spans: int = 128
+    """Even spans of a path, between which it may be divided."""
+    reconfiguration: float = 1e6
+    """Cost of a reconfiguration [J]: more than the choice of its place can save."""
+    turn_rounding: float = 1e-9
+    """Rounding error of a number of full turns [1]."""
 
 
-def with_divided_paths(asked: Cycle) -> Cycle:
-    """The cycle; a stop with a path that is to be divided, and that no configuration follows whole,
-    is one stop for each part. The last one has its name, those before are called NAME/1, NAME/2, …
+DIVISION = DivisionSettings()
+PLACES = np.linspace(0.0, 1.0, DIVISION.spans + 1)
+"""Fractions of a path at which it may be divided."""
 
-    Raises the errors of `layers_of_stop` for such stops.
+
+def with_divided_paths(cycle: Cycle) -> Cycle:
+    """The cycle with every path divided that no configuration follows whole.
+
+    A stop with such a path becomes one stop for every part, named NAME/1, NAME/2, …; the last part
+    has the name of the stop.
+
+    Raises:
+        JoulepathError: the errors of `layers_of_stop` for stops with a divisible path.
     """
     stops, parts_of = list[Stop](), dict[str, list[str]]()
-    for k, stop in enumerate(asked.stops):
-        parts = _parts(asked, k) if stop.path is not None and stop.path.split else [stop]
+    for k, stop in enumerate(cycle.stops):
+        parts = _parts(cycle, k) if stop.path is not None and stop.path.split else [stop]
         parts_of[stop.name] = [part.name for part in parts]
         stops += parts
-    if len(stops) == len(asked.stops):
-        return asked
+    if len(stops) == len(cycle.stops):
+        return cycle
     return replace(
-        asked, stops=stops, order=None if asked.order is None else _order(asked.order, parts_of)
+        cycle, stops=stops, order=None if cycle.order is None else _order(cycle.order, parts_of)
     )
 
 
 def _order(order: FreeOrder, parts_of: dict[str, list[str]]) -> FreeOrder:
-    """The same order, with the parts of a path one directly after the other."""
+    """The order with the parts of a path directly after one another."""
     listed = {name for names in order.together for name in names}
     together = [[part for name in names for part in parts_of[name]] for names in order.together]
     together += [parts for name, parts in parts_of.items() if name not in listed and len(parts) > 1]
@@ -66,15 +79,17 @@ def _order(order: FreeOrder, parts_of: dict[str, list[str]]) -> FreeOrder:
     return FreeOrder(before=before, together=together)
 
 
-def _parts(asked: Cycle, k: int) -> list[Stop]:
-    """The parts of a stop's path; the stop itself if some configuration follows it whole."""
-    stop = asked.stops[k]
+def _parts(cycle: Cycle, k: int) -> list[Stop]:
+    """Parts of the path of stop `k`; the stop itself if some configuration follows the whole
+    path.
+    """
+    stop = cycle.stops[k]
     try:
-        layers_of_stop(asked, k)
+        layers_of_stop(cycle, k)
     except PathInfeasible as error:
         if error.path != f"stops/{stop.name}":
             raise
-        places = _places(asked, stop)
+        places = _places(cycle, stop)
         if places is None:
             raise PathInfeasible(error.length, error.attempts, error.path, in_parts=True) from None
         return _divided(stop, places)
@@ -82,7 +97,7 @@ def _parts(asked: Cycle, k: int) -> list[Stop]:
 
 
 def _divided(stop: Stop, places: Sequence[float]) -> list[Stop]:
-    """One stop for each part between `places`."""
+    """One stop for every part of the path between `places`."""
     assert (
         stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
     )
@@ -102,43 +117,58 @@ def _divided(stop: Stop, places: Sequence[float]) -> list[Stop]:
     return parts
 
 
-def _places(asked: Cycle, stop: Stop) -> list[float] | None:
-    """The fractions at which a stop's path is divided; None if it cannot be followed so either."""
+def _places(cycle: Cycle, stop: Stop) -> list[float] | None:
+    """Fractions at which the path of a stop is divided; None if it cannot be followed in parts
+    either.
+    """
     assert (
         stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
     )
-    (arm, *_) = (move.arm for move in asked.moves if move.goal == stop.name and move.kind == "path")
+    (arm, *_) = (move.arm for move in cycle.moves if move.goal == stop.name and move.kind == "path")
     course = ToolCourse.of(replace(stop.path.path, about=None), stop.target.T, stop.path.goal.T)
-    strands = strands_of(arm, course, stop.branch)
-    if not strands:
+    segments = path_segments(arm, course, stop.branch)
+    if not segments:
         return None
     rests = [
-        Problem(arm=each, start=stop.target, goal=stop.target) for each in arms_at(asked, stop.name)
+        Problem(arm=each, start=stop.target, goal=stop.target) for each in arms_at(cycle, stop.name)
     ]
-    free = PreparedProblem.of(Problem(arm=asked.arm, start=stop.target, goal=stop.target))
-    return _cheapest(strands, *_costs(free, [PreparedProblem.of(each) for each in rests], strands))
+    free = PreparedProblem.of(Problem(arm=cycle.arm, start=stop.target, goal=stop.target))
+    return _cheapest_division(
+        segments,
+        *_reconfiguration_bounds(free, [PreparedProblem.of(each) for each in rests], segments),
+    )
 
 
-def _costs(
-    free: PreparedProblem, rests: Sequence[PreparedProblem], strands: Sequence[Strand]
+def _reconfiguration_bounds(
+    free: PreparedProblem, rests: Sequence[PreparedProblem], segments: Sequence[PathSegment]
 ) -> tuple[Mask, Array]:
-    """Where the arm may follow each strand (p, s); and lower bounds (p, s, s) [J] of
-    reconfigurations from one to another, infinite where the arm cannot rest."""
-    on = np.stack([strand.covers(PLACES) for strand in strands], axis=1)
-    q = np.stack([strand.configurations(PLACES) for strand in strands], axis=1)
+    """Places on the segments, and lower bounds on reconfigurations there.
+
+    Args:
+        free: problem without a path, for the bounds.
+        rests: problems of the arms at rest on the path.
+        segments: segments of the path.
+
+    Returns:
+        Whether the arm may follow every segment at every place, shape (p, s), and lower bounds on
+        changes from one segment to another, shape (p, s, s) [J], infinite where the arm cannot
+        rest.
+    """
+    on = np.stack([segment.covers(PLACES) for segment in segments], axis=1)
+    q = np.stack([segment.configurations(PLACES) for segment in segments], axis=1)
     rest = on.copy()
     for prepared in rests:
         rest[rest] = [cause is None for cause in check_configurations(prepared, q[rest])]
-    both = rest[:, :, None] & rest[:, None, :] & ~np.eye(len(strands), dtype=bool)
+    both = rest[:, :, None] & rest[:, None, :] & ~np.eye(len(segments), dtype=bool)
     cost = np.full(both.shape, np.inf)
     if both.any():
         place, first, second = np.nonzero(both)
         levels = np.zeros(on.shape)
         levels[rest] = [free.potential(each) for each in q[rest]]
         gain = levels[place, second] - levels[place, first]
-        shift = _nearest(
+        shift = _with_nearest_turns(
             q[place, second] - q[place, first],
-            _turns(free.arm.active_limits, strands),
+            _allowed_turns(free.arm.active_limits, segments),
             first,
             second,
         )
@@ -146,50 +176,53 @@ def _costs(
     return on, cost
 
 
-def _turns(limits: Limits, strands: Sequence[Strand]) -> Array:
-    """Least and greatest number (2, s, nq) of full turns by which all of a strand may be turned."""
+def _allowed_turns(limits: Limits, segments: Sequence[PathSegment]) -> Array:
+    """Least and greatest number of full turns (2, s, nq) by which the joints of a segment may be
+    turned.
+    """
     low, high = (
-        np.array([bound(strand.q, axis=0) for strand in strands]) for bound in (np.min, np.max)
+        np.array([bound(segment.q, axis=0) for segment in segments]) for bound in (np.min, np.max)
     )
     turn = 2 * np.pi
     return np.stack(
-        [np.ceil((limits.q_min - low) / turn - TINY), np.floor((limits.q_max - high) / turn + TINY)]
+        [
+            np.ceil((limits.q_min - low) / turn - DIVISION.turn_rounding),
+            np.floor((limits.q_max - high) / turn + DIVISION.turn_rounding),
+        ]
     )
 
 
-def _nearest(
+def _with_nearest_turns(
     shift: Array, turns: Array, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
 ) -> Array:
-    """Displacements (n, nq) [rad] by the full turns that make them least, of those that both
-    strands allow.
-    """
+    """Displacements (n, nq) [rad] between segments, shortened by full turns within their ranges."""
     least, most = turns[0, second] - turns[1, first], turns[1, second] - turns[0, first]
     return np.asarray(shift + 2 * np.pi * np.clip(np.round(-shift / (2 * np.pi)), least, most))
 
 
-def _cheapest(strands: Sequence[Strand], on: Mask, cost: Array) -> list[float] | None:
-    """The places at which the arm changes from one strand to another: as few as possible, and the
-    cheapest of these.
-    """
+def _cheapest_division(
+    segments: Sequence[PathSegment], on: Mask, cost: Array
+) -> list[float] | None:
+    """Places at which the arm changes the segment: fewest changes first, then least cost."""
     reached = np.where(on[0], 0.0, np.inf)
     changed: list[npt.NDArray[np.intp]] = []
     for place in range(1, len(PLACES)):
-        # from the place before to this one along a strand, then perhaps to another one
+        # along a segment to this place, then perhaps to another segment
         reached = np.where(on[place] & on[place - 1], reached, np.inf)
-        by_change = reached[:, None] + cost[place] + RECONFIGURATION
+        by_change = reached[:, None] + cost[place] + DIVISION.reconfiguration
         best = by_change.argmin(axis=0)
-        cheaper = by_change[best, np.arange(len(strands))] < reached
-        # at the end there is nothing to go on to
+        cheaper = by_change[best, np.arange(len(segments))] < reached
+        # no reconfiguration at the end
         cheaper &= place < len(PLACES) - 1
-        changed.append(np.where(cheaper, best, np.arange(len(strands))))
-        reached = np.where(cheaper, by_change[best, np.arange(len(strands))], reached)
-    strand = int(reached.argmin())
-    if not np.isfinite(reached[strand]):
+        changed.append(np.where(cheaper, best, np.arange(len(segments))))
+        reached = np.where(cheaper, by_change[best, np.arange(len(segments))], reached)
+    segment = int(reached.argmin())
+    if not np.isfinite(reached[segment]):
         return None
     places = list[float]()
     for place in range(len(PLACES) - 1, 0, -1):
-        before = int(changed[place - 1][strand])
-        if before != strand:
+        before = int(changed[place - 1][segment])
+        if before != segment:
             places.append(float(PLACES[place]))
-        strand = before
+        segment = before
     return places[::-1]

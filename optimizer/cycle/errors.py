@@ -13,7 +13,8 @@ from joulepath.optimizer.search.errors import rounded_up
 @dataclass(eq=False)
 class NoSequence(JoulepathError):
     """Every stop of the cycle can be reached, but no chain of motions within the limits was found
-    through all of them."""
+    through all of them.
+    """
 
     title = "No sequence of arm configurations"
     remedy = (
@@ -43,9 +44,7 @@ class NoSequence(JoulepathError):
 
 @dataclass(eq=False)
 class CycleTooShort(JoulepathError):
-    """No cycle was found that is as fast as `time` asks for: the fastest one found takes
-    `shortest`.
-    """
+    """No cycle as fast as `time` asks for was found: the fastest one found takes `shortest`."""
 
     title = "Dwell too short"
     remedy = "Allow at least `shortest`."

@@ -1,35 +1,43 @@
 """Cycles with stops, or ends of their paths, that leave the orientation or the posture free.
 
-At given orientations a cycle is one of stops with several targets; a path leads from each of them
-to a pose of its own. So the orientations are chosen with the configurations, for the whole cycle.
-Near those that are found, others are tried in the same way, so that no answer needs more than the
-one before.
+With given orientations, such a stop has several targets, and its path leads from every target to a
+pose of its own. The orientations are thus chosen with the configurations of the whole cycle. Others
+near the chosen ones are then tried in the same way, so that no cycle needs more energy than the one
+before.
 
-Every orientation at a stop brings all its full turns with it. So that they do not multiply, the
-orientations of stops without a path are looked for without full turns first; these come with the
-orientations found. Then the configurations at these stops move (`configurations_beside`). So do
-those at poses that leave the posture free: they begin from what moves by themselves choose, or from
-the samples of a cycle.
+Every orientation at a stop brings along all full turns of its configurations. To keep their number
+small, orientations of stops without a path are first searched without full turns, and the found
+ones again with full turns. Then the configurations at these stops are varied
+(`neighbouring_configurations`), as are configurations at poses that leave the posture free: these
+start from the choice of single moves, or from the samples of a cycle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from itertools import product
+from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.configurations_beside import beside, has_free_postures
-from joulepath.optimizer.cycle.cycle_baselines import compared_again
+from joulepath.optimizer.cycle.cycle_baselines import recompared
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
 from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.known_motions import knowing, known_motions
-from joulepath.optimizer.cycle.move_problem import LEAST_TIME
+from joulepath.optimizer.cycle.move_problem import MOVE
+from joulepath.optimizer.cycle.neighbouring_configurations import (
+    has_free_postures,
+    with_neighbours,
+)
 from joulepath.optimizer.cycle.successive_moves import successively_chosen
+from joulepath.optimizer.cycle.tool_turns import (
+    Turns,
+    evenly_from,
+    turns_all_around,
+    turns_near,
+    turns_of_solution,
+    with_turns,
+)
 from joulepath.optimizer.deadline import Clock, Deadline
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
@@ -39,179 +47,195 @@ from joulepath.optimizer.exceptions import (
     UnreachablePose,
     UnreachableTargets,
 )
-from joulepath.optimizer.kinematics.orientation_tolerance import (
-    nearest_orientation,
-    sample_orientations,
-)
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.targets import AnyOf, PosesAround
-
-# angles [rad] about an axis at first, and orientations that are free otherwise
-ALL_AROUND, SPREAD = tuple(np.arange(12) * (np.pi / 6)), 24
-# steps [rad] between the orientations that are tried near the best ones; and more of them where no
-# path is free, each of which takes long to solve
-STEPS, MORE = (np.pi / 12, np.pi / 24), (np.pi / 6, np.pi / 12, np.pi / 24, np.pi / 48, np.pi / 96)
-# shares of the deadline: for the orientations without full turns, and of what is left for the first
-# cycle with them
-ROUGH, FIRST = 0.35, 0.6
-# share of what is left then for the moves that are chosen one after the other
-FEW = 0.4
-# orientations of a stop that are tried with full turns
-TURNED = 3
-# so many steps are made; further ones as long as the last one gained more than this share of the
-# energy
-AT_LEAST, LITTLE = 2, 2e-4
+from joulepath.optimizer.problem.targets import AnyOf
 
 Search = Callable[[Cycle], CycleSolution]
-# rotation vectors (3,) [rad], in the TCP frame, by which the tool is turned at a stop, or at the
-# start of its path, and at the end of the path
-Turns = tuple[Array, Array]
-NONE = np.zeros(3)
 
 
-def with_free_orientations(asked: Cycle, search: Search, clock: Clock) -> CycleSolution:
-    """The cycle of least energy at orientations that are chosen; `search` finds a cycle whose
-    orientations are given in full.
+@dataclass(frozen=True)
+class FreeOrientationSettings:
+    """Settings of the search over free orientations and postures."""
 
-    Raises the errors of `search`; UnreachablePose for a stop, or a path whose start, is out of
-    reach at every orientation that is tried.
+    steps_on_paths: tuple[float, ...] = (np.pi / 12, np.pi / 24)
+    """Steps of the tool tried near the best orientations, if some path is free [rad]: cycles with
+    free paths take long to solve."""
+    steps: tuple[float, ...] = (np.pi / 6, np.pi / 12, np.pi / 24, np.pi / 48, np.pi / 96)
+    """Steps of the tool tried near the best orientations, if no path is free [rad]."""
+    share_without_turns: float = 0.35
+    """Share of the deadline for the search without full turns."""
+    share_of_first: float = 0.6
+    """Share of the time left then for the first cycle with full turns."""
+    share_of_successive: float = 0.4
+    """Share of the time left then for successively chosen moves."""
+    least_steps: int = 2
+    """Number of steps made in any case."""
+    least_gain: float = 2e-4
+    """Relative gain of the last step above which further steps are made."""
+
+
+FREE_ORIENTATIONS = FreeOrientationSettings()
+
+
+def with_free_orientations(cycle: Cycle, search: Search, clock: Clock) -> CycleSolution:
+    """The cycle of least energy over the orientations tried.
+
+    Args:
+        cycle: cycle whose orientations and postures may be free.
+        search: finds the cycle of least energy with given orientations.
+        clock: function that returns the time [s].
+
+    Raises:
+        UnreachablePose: a stop, or the start of its path, is out of reach at every orientation.
+        JoulepathError: the errors of `search`.
     """
-    end = Deadline.after(asked.deadline, clock)
-    free = {stop.name: stop for stop in asked.stops if any(stop.free_ends)}
-    tried, best = dict[str, list[Turns]](), None if free else search(asked)
-    # one that is optimal has no samples of postures
-    if best is not None and (best.status == "optimal" or not has_free_postures(asked)):
+    end = Deadline.after(cycle.deadline, clock)
+    free = {stop.name: stop for stop in cycle.stops if any(stop.free_ends)}
+    tried, best = dict[str, list[Turns]](), None if free else search(cycle)
+    # an optimal cycle has no samples of postures
+    if best is not None and (best.status == "optimal" or not has_free_postures(cycle)):
         return best
     with knowing(known_motions()):
         try:
             if best is None:
-                tried, best = _first(asked, free, search, end)
+                tried, best = _first_cycle(cycle, free, search, end)
         except UnreachableTargets as error:
             raise _at_any_angle(error, [f"stops/{stop.entry}" for stop in free.values()]) from None
-        compared, at_paths = best.baselines, _found_at(best, tried)
+        baselines, turns = best.baselines, turns_of_solution(best, tried)
         plain = all(
-            len(stop.places) == 1 and not isinstance(stop.target, AnyOf) for stop in asked.stops
+            len(stop.places) == 1 and not isinstance(stop.target, AnyOf) for stop in cycle.stops
         )
-        if _is_compared_once(asked) and plain:
-            best, compared = _with_successive_moves(
-                asked, best, search, end.within(FEW * end.left), clock
-            )
-        steps = MORE if all(stop.path is None for stop in free.values()) else STEPS
-        gained = True
-        for k, step in enumerate(steps):
-            if end.left < LEAST_TIME or not (gained or k < AT_LEAST):
-                break
-            before, gained = best.needed.of(asked.objective), False
-            tried = {
-                name: _near(free[name], turns, step)
-                for name, turns in at_paths.items()
-                if free[name].path
-            }
-            near = beside(_at(asked, tried), best, step)
-            # in too short a time there may be none
-            with suppress(JoulepathError):
-                near = replace(
-                    near,
-                    deadline=end.left / (len(steps) - k),
-                    compared=not _is_compared_once(asked),
-                )
-                found = search(near)
-                if found.needed.of(asked.objective) < before:
-                    best = _better(found, best)
-                    at_paths |= _found_at(found, tried)
-                    gained = found.needed.of(asked.objective) < before * (1 - LITTLE)
-    if _is_compared_once(asked):
-        best = replace(
-            best, baselines=[compared_again(asked, each, best.needed) for each in compared]
-        )
+        if _is_compared_once(cycle) and plain:
+            time = end.within(FREE_ORIENTATIONS.share_of_successive * end.left)
+            best, baselines = _with_successive_moves(cycle, best, search, time, clock)
+        best = _improved(cycle, free, best, turns, search, end)
+    if _is_compared_once(cycle):
+        compared = [recompared(cycle, baseline, best.energies) for baseline in baselines]
+        best = replace(best, baselines=compared)
     places = {
-        place for stop in asked.stops if not isinstance(stop.target, AnyOf) for place in stop.places
+        place for stop in cycle.stops if not isinstance(stop.target, AnyOf) for place in stop.places
     }
-    return replace(best, moves=[_of_one_target(move, places) for move in best.moves])
+    return replace(best, moves=[_with_single_targets(move, places) for move in best.moves])
 
 
-def _first(
-    asked: Cycle, free: Mapping[str, Stop], search: Search, end: Deadline
-) -> tuple[dict[str, list[Turns]], CycleSolution]:
-    """The cycle with full turns at some orientations of each stop, which has the bound over all of
-    them, and these.
+def _improved(
+    cycle: Cycle,
+    free: Mapping[str, Stop],
+    best: CycleSolution,
+    turns: dict[str, Turns],
+    search: Search,
+    end: Deadline,
+) -> CycleSolution:
+    """The cycle after steps of its orientations and postures, as long as they save energy.
 
-    If there is no time for it, the one without full turns.
+    Args:
+        cycle: cycle with free orientations.
+        free: stops with free orientations, by their names.
+        best: its best solution.
+        turns: turns of this solution, by the names of the stops.
+        search: finds the cycle of least energy with given orientations.
+        end: deadline.
     """
-    all_around = {name: _all_around(stop) for name, stop in free.items()}
-    # many orientations need nearly the same energy: that none of those tried is better would take
-    # long to prove
-    asked = replace(asked, rough=any(stop.path is None for stop in free.values()))
-    if not asked.windings or not asked.rough:
-        return all_around, _bounded(asked, all_around, search, FIRST * end.left)
+    settings, gained = FREE_ORIENTATIONS, True
+    on_paths = any(stop.path is not None for stop in free.values())
+    steps = settings.steps_on_paths if on_paths else settings.steps
+    for k, step in enumerate(steps):
+        if end.left < MOVE.least_time or not (gained or k < settings.least_steps):
+            break
+        before, gained = best.energies.of(cycle.objective), False
+        tried = {
+            name: turns_near(free[name], at, step) for name, at in turns.items() if free[name].path
+        }
+        near = with_neighbours(with_turns(cycle, tried), best, step)
+        # in too short a time there may be no cycle
+        with suppress(JoulepathError):
+            near = replace(
+                near,
+                deadline=end.left / (len(steps) - k),
+                with_baselines=not _is_compared_once(cycle),
+            )
+            found = search(near)
+            if found.energies.of(cycle.objective) < before:
+                best = _better(found, best)
+                turns = turns | turns_of_solution(found, tried)
+                gained = found.energies.of(cycle.objective) < before * (1 - settings.least_gain)
+    return best
+
+
+def _first_cycle(
+    cycle: Cycle, free: Mapping[str, Stop], search: Search, end: Deadline
+) -> tuple[dict[str, list[Turns]], CycleSolution]:
+    """The cycle with full turns at some orientations of every stop, and these orientations.
+
+    Its bound holds for all orientations. Without time for it, the cycle without full turns.
+    """
+    all_around = {name: turns_all_around(stop) for name, stop in free.items()}
+    # many orientations need nearly the same energy: a proof that none is better would take long
+    cycle = replace(cycle, approximate=any(stop.path is None for stop in free.values()))
+    settings = FREE_ORIENTATIONS
+    if not cycle.windings or not cycle.approximate:
+        return all_around, _bounded(cycle, all_around, search, settings.share_of_first * end.left)
     found, found_at = None, {name: turns[0] for name, turns in all_around.items()}
-    # what has no cycle without full turns, or none in so short a time, may have one with them
+    # a cycle may need full turns, or more time than this
     with suppress(NoSequence, NoTrajectory, DeadlineExceeded):
-        rough = replace(_at(asked, all_around), windings=False, compared=False)
-        found = search(replace(rough, deadline=max(ROUGH * end.left, LEAST_TIME)))
-        found_at = _found_at(found, all_around)
-    share = 1.0 if found is None else FIRST
-    tried = {name: _evenly_from(turns, found_at[name]) for name, turns in all_around.items()}
+        unturned = replace(with_turns(cycle, all_around), windings=False, with_baselines=False)
+        time = max(settings.share_without_turns * end.left, MOVE.least_time)
+        found = search(replace(unturned, deadline=time))
+        found_at = turns_of_solution(found, all_around)
+    share = 1.0 if found is None else settings.share_of_first
+    tried = {name: evenly_from(turns, found_at[name]) for name, turns in all_around.items()}
     try:
         try:
-            whole = _bounded(asked, tried, search, share * end.left)
+            whole = _bounded(cycle, tried, search, share * end.left)
         except InvalidProblem:
-            # the configurations are too many
+            # too many configurations
             tried = {name: turns[:1] for name, turns in tried.items()}
-            whole = _bounded(asked, tried, search, share * end.left)
+            whole = _bounded(cycle, tried, search, share * end.left)
     except DeadlineExceeded:
         if found is None:
             raise
         return all_around, found
-    if found is None or whole.needed.of(asked.objective) <= found.needed.of(asked.objective):
+    if found is None or whole.energies.of(cycle.objective) <= found.energies.of(cycle.objective):
         return tried, whole
     # in so short a time, the full turns may have led to a worse cycle
     better = _better(found, whole)
-    baselines = [compared_again(asked, each, better.needed) for each in whole.baselines]
+    baselines = [recompared(cycle, baseline, better.energies) for baseline in whole.baselines]
     return all_around, replace(better, baselines=baselines)
 
 
 def _bounded(
-    asked: Cycle, tried: Mapping[str, Sequence[Turns]], search: Search, time: float
+    cycle: Cycle, tried: Mapping[str, Sequence[Turns]], search: Search, time: float
 ) -> CycleSolution:
-    """The cycle at some orientations of each stop, with the bound over all of them, in so much time
-    [s].
-    """
-    return search(replace(_at(asked, tried, bounded=True), deadline=max(time, LEAST_TIME)))
-
-
-def _evenly_from(turns: Sequence[Turns], at: Turns) -> list[Turns]:
-    """TURNED of them, evenly spread over their list, `at` first."""
-    first = next(k for k, each in enumerate(turns) if each is at)
-    return [turns[(first + (k * len(turns)) // TURNED) % len(turns)] for k in range(TURNED)]
+    """The cycle at given orientations, with the bound over all orientations, within `time` [s]."""
+    deadline = max(time, MOVE.least_time)
+    return search(replace(with_turns(cycle, tried, bounded=True), deadline=deadline))
 
 
 def _with_successive_moves(
-    asked: Cycle, best: CycleSolution, search: Search, end: Deadline, clock: Clock
+    cycle: Cycle, best: CycleSolution, search: Search, end: Deadline, clock: Clock
 ) -> tuple[CycleSolution, list[CycleBaseline]]:
-    """The better one of a cycle and the one that moves choose one after the other, and the
-    baselines: this one is that of choosing move by move."""
-    chosen = successively_chosen(asked, end, clock)
+    """The better one of a cycle and the cycle of successively chosen moves, and the baselines.
+
+    The latter cycle also gives the baseline `move_by_move`.
+    """
+    chosen = successively_chosen(cycle, end, clock)
     if chosen is None:
         return best, best.baselines
     try:
-        found = search(replace(chosen, deadline=max(end.left, LEAST_TIME)))
+        found = search(replace(chosen, deadline=max(end.left, MOVE.least_time)))
     except JoulepathError:
         return best, best.baselines
-    by_moves = [each for each in found.baselines if each.name == "move_by_move"]
-    baselines = {each.name: each for each in (*best.baselines, *by_moves)}
-    better = found.needed.of(asked.objective) < best.needed.of(asked.objective)
+    by_moves = [baseline for baseline in found.baselines if baseline.name == "move_by_move"]
+    baselines = {baseline.name: baseline for baseline in (*best.baselines, *by_moves)}
+    better = found.energies.of(cycle.objective) < best.energies.of(cycle.objective)
     return _better(found, best) if better else best, list(baselines.values())
 
 
 def _better(found: CycleSolution, than: CycleSolution) -> CycleSolution:
-    """A better cycle than the one that has the bound over all orientations."""
-    # the configurations that it chose among are some of infinitely many
-    bound = min(than.lower_bound, found.needed.of(found.objective))
-    # nor do they tell how large the search was
+    """A better cycle, with the bound and the effort of the cycle bounded over all orientations."""
+    # its own bound holds only for some of infinitely many configurations
+    bound = min(than.lower_bound, found.energies.of(found.objective))
     moves = [
         replace(move, pairs=before.pairs, kinds=before.kinds, solved=before.solved + move.solved)
         for move, before in zip(found.moves, than.moves, strict=True)
@@ -219,98 +243,14 @@ def _better(found: CycleSolution, than: CycleSolution) -> CycleSolution:
     return replace(found, moves=moves, lower_bound=bound, status="feasible", complete=than.complete)
 
 
-def _is_compared_once(asked: Cycle) -> bool:
-    """Whether other ways to go round do not depend on the orientations near the best ones: they are
-    those of the first cycle."""
-    plain = asked.order is None and asked.any_time and not asked.passes
-    return plain and asked.arm.bus.mode != "storage"
-
-
-def _all_around(stop: Stop) -> list[Turns]:
-    """Turns at a stop, all around; where both ends of a path are free, the tool keeps its angle."""
-    start, _ = stop.free_ends
-    if stop.path is not None:
-        axis = _axis_of(stop)
-        return [(angle * axis, NONE) if start else (NONE, angle * axis) for angle in ALL_AROUND]
-    assert isinstance(stop.target, ConeOrientedPose)
-    if stop.target.freedom == 1:
-        return [(angle * stop.target.axis, NONE) for angle in ALL_AROUND]
-    reference, *others = sample_orientations(stop.target, SPREAD)
-    return [(np.asarray(pin.log3(reference.T @ R)), NONE) for R in (reference, *others)]
-
-
-def _near(stop: Stop, at: Turns, step: float) -> list[Turns]:
-    """These turns at the ends of a stop's path, and those a step away at each end that is free."""
-    axis = _axis_of(stop)
-    turns = [(0.0, -step, step) if free else (0.0,) for free in stop.free_ends]
-    # opposite turns of both ends do more than either alone: the tool turns on the way
-    return [(at[0] + a * axis, at[1] + b * axis) for a, b in product(*turns) if a * b >= 0]
-
-
-def _axis_of(stop: Stop) -> Array:
-    """The axis (3,) of the tool about which it may turn on the path of a stop, of length 1."""
-    assert stop.path is not None and stop.path.path.about is not None
-    axis = np.array(stop.path.path.about)
-    return np.asarray(axis / np.linalg.norm(axis))
-
-
-def _found_at(found: CycleSolution, tried: Mapping[str, Sequence[Turns]]) -> dict[str, Turns]:
-    """The turns at each stop of a cycle."""
-    goals = {move.planned.goal: move.solution.goal.target for move in found.moves}
-    passed = {each.stop: each.target for move in found.moves for each in move.passes}
-    return {name: turns[(goals | passed)[name]] for name, turns in tried.items()}
-
-
-def _at(asked: Cycle, tried: Mapping[str, Sequence[Turns]], bounded: bool = False) -> Cycle:
-    """The cycle with some turns at each stop; `bounded`: with a bound over all orientations."""
-    stops = [
-        _stop_at(stop, tried[stop.name], bounded) if stop.name in tried else stop
-        for stop in asked.stops
-    ]
-    return replace(asked, stops=stops)
-
-
-def _stop_at(stop: Stop, tried: Sequence[Turns], bounded: bool) -> Stop:
-    if stop.path is None:
-        pose = stop.target
-        assert isinstance(pose, ConeOrientedPose)
-        (reference,) = sample_orientations(pose, 1)
-        poses = tuple(_turned(pose, reference, turn) for turn, _ in tried)
-        return replace(stop, target=PosesAround(poses, pose if bounded else None))
-    ends = [_ends(stop, *turns) for turns in tried]
-    start, goal = (
-        ConeOrientedPose.about(end, _axis_of(stop)) if bounded else None for end in ends[0]
-    )
-    goals = PosesAround(tuple(goal for _, goal in ends), goal)
-    path = replace(stop.path, goal=ends[0][1], goals=goals)
-    return replace(stop, target=PosesAround(tuple(start for start, _ in ends), start), path=path)
-
-
-def _ends(stop: Stop, at_start: Array, at_goal: Array) -> tuple[Pose, Pose]:
-    """The poses at both ends of a stop's path.
-
-    At the start the tool is turned from an orientation that is always the same; at the goal from
-    the one nearest to that of the pose before.
-    """
-    start, path = stop.target, stop.path
-    assert path is not None and isinstance(start, Pose | ConeOrientedPose)
-    if isinstance(start, ConeOrientedPose):
-        (reference,) = sample_orientations(start, 1)
-        start = _turned(start, reference, at_start)
-    goal = path.goal
-    if isinstance(goal, ConeOrientedPose):
-        before = [start, *path.path.via][-1]
-        goal = _turned(goal, nearest_orientation(goal, before.T[:3, :3]), at_goal)
-    return start, goal
-
-
-def _turned(pose: ConeOrientedPose, reference: Array, turn: Array) -> Pose:
-    """The pose with an orientation (3, 3), turned."""
-    return pose.with_orientation(reference @ pin.exp3(turn))
+def _is_compared_once(cycle: Cycle) -> bool:
+    """Whether the baselines of the first cycle serve for all orientations."""
+    plain = cycle.order is None and cycle.has_free_duration and not cycle.has_passes
+    return plain and cycle.arm.bus.mode != "storage"
 
 
 def _at_any_angle(error: UnreachableTargets, stops: Sequence[str]) -> JoulepathError:
-    """The error for what is out of reach at every orientation, if it is one of the `stops`."""
+    """The error for a stop out of reach at every orientation, if it is one of the `stops`."""
     if error.target not in stops:
         return error
     reason = error.unreachable[0].reason
@@ -322,15 +262,13 @@ def _at_any_angle(error: UnreachableTargets, stops: Sequence[str]) -> JoulepathE
     )
 
 
-def _of_one_target(move: CycleMove, places: set[str]) -> CycleMove:
-    """The move, of which `places` have one target: its orientations are no targets that were asked
-    for.
-    """
+def _with_single_targets(move: CycleMove, places: set[str]) -> CycleMove:
+    """The move with target 0 at `places`: the orientations tried are not targets of the request."""
     ends = {"start": move.planned.start, "goal": move.planned.goal}
-    told = {
+    single = {
         name: replace(getattr(move.solution, name), target=0)
         for name, place in ends.items()
         if place in places
     }
-    passes = [replace(each, target=0) if each.stop in places else each for each in move.passes]
-    return replace(move, solution=replace(move.solution, **told), passes=passes)
+    passes = [replace(at, target=0) if at.stop in places else at for at in move.passes]
+    return replace(move, solution=replace(move.solution, **single), passes=passes)

@@ -1,8 +1,7 @@
-"""Motions of moves that were found before, by what was asked: a cycle of which one stop has changed
-does not solve its other moves again.
+"""Memo of found motions by their problems, so that a changed cycle solves only its changed moves.
 
-A motion is found again for exactly the same question only. So it changes no answer but the time
-until it is there; and every motion of an answer is certified anew.
+A motion is found again for exactly the same question only. The memo thus changes the computing time
+but no answer, and every motion of an answer is certified anew.
 """
 
 from __future__ import annotations
@@ -21,69 +20,78 @@ import pinocchio as pin
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
-# how a motion was looked for: as the search of a cycle tries it, to the end, at a price of time, or
-# for its duration
+# question that a motion answers: first motion, converged motion, at a price of time, or fastest
 Stage = Literal["tried", "finished", "priced", "fastest"]
-# fields of a problem on which its best motion does not hang
-_ASIDE = ("arm", "sample_period", "deadline")
+# fields of a problem without influence on its best motion
+_IGNORED_FIELDS = ("arm", "sample_period", "deadline")
 
 
 @dataclass(frozen=True)
 class KnownMotion:
-    """A motion, and the stationarity in which its optimisation ended."""
+    """A motion, with the stationarity at the end of its optimisation."""
 
     spline: Spline
     stationarity: float | None
 
     @property
     def result(self) -> SolveResult:
-        """The result of having solved for it."""
+        """The result of a solve that ended in this motion."""
         return SolveResult(
-            SolveStatus.SOLVED, "converged", spline=self.spline, stationarity=self.stationarity
+            SolveStatus.SOLVED,
+            SolveReason.CONVERGED,
+            spline=self.spline,
+            stationarity=self.stationarity,
         )
 
 
 class KnownMotions:
-    """Motions by the keys of the questions that they answer. `used` are those that were asked for
-    or found since.
-    """
+    """Motions by the keys of their questions; `used` has the motions recalled or found since."""
 
     def __init__(self, before: Mapping[str, KnownMotion] | None = None) -> None:
         self._before = dict(before or {})
         self.used: dict[str, KnownMotion] = {}
-        # a scene may be large: an arm is read once, and kept, so that no other one gets its id
-        self._arms: dict[int, tuple[Arm, bytes]] = {}
+        # a scene may be large: every arm is read once
+        self._arms: list[tuple[Arm, bytes]] = []
 
     def recall(self, key: str) -> KnownMotion | None:
-        """The motion that answers a question; None if none is known."""
+        """Motion for a key; None if none is known."""
         known = self.used.get(key) or self._before.get(key)
         if known is not None:
             self.used[key] = known
         return known
 
     def keep(self, key: str, motion: KnownMotion) -> None:
-        """Keep the answer to a question: one that more time would not change."""
+        """Store a motion that more time would not improve."""
         self.used[key] = motion
 
     def forget(self, key: str) -> None:
-        """Drop a motion that did not stand the test."""
+        """Drop a motion that failed its certificate."""
         self._before.pop(key, None)
         self.used.pop(key, None)
 
+    def _digest_of(self, arm: Arm) -> bytes:
+        known = next((digest for other, digest in self._arms if other is arm), None)
+        if known is None:
+            known = _digest(arm)
+            self._arms.append((arm, known))
+        return known
+
     def key(self, stage: Stage, problem: Problem, *more: Any) -> str:
-        """What tells a question from others: what is asked, and `more`; deadline and samples do not
-        matter.
+        """Key of a question.
+
+        Args:
+            stage: kind of the question.
+            problem: problem to be solved; its deadline and sample period do not matter.
+            more: further values that distinguish questions.
         """
-        if id(problem.arm) not in self._arms:
-            self._arms[id(problem.arm)] = problem.arm, _digest(problem.arm)
         own = {
             each.name: getattr(problem, each.name)
             for each in fields(problem)
-            if each.name not in _ASIDE
+            if each.name not in _IGNORED_FIELDS
         }
-        return _digest([stage, self._arms[id(problem.arm)][1], own, more]).hex()
+        return _digest([stage, self._digest_of(problem.arm), own, more]).hex()
 
 
 _in_use: ContextVar[KnownMotions | None] = ContextVar("known motions", default=None)
@@ -91,7 +99,7 @@ _in_use: ContextVar[KnownMotions | None] = ContextVar("known motions", default=N
 
 @contextmanager
 def knowing(motions: KnownMotions) -> Iterator[None]:
-    """Within the context, cycles use these motions, and add those that they find."""
+    """Context in which cycles recall and store motions."""
     before = _in_use.set(motions)
     try:
         yield
@@ -100,7 +108,7 @@ def knowing(motions: KnownMotions) -> Iterator[None]:
 
 
 def known_motions() -> KnownMotions:
-    """The motions in use; without any, none is known, and what is kept is lost."""
+    """The motions of the context; outside any context a new, empty memo."""
     return _in_use.get() or KnownMotions()
 
 
@@ -112,13 +120,12 @@ def _digest(value: Any) -> bytes:
 
 
 def _content(value: Any) -> Iterator[bytes]:
-    """Everything that a value is made of. Two values with the same content are the same
-    question."""
+    """Bytes of everything a value consists of; equal for equal questions only."""
     match value:
         case None | bool() | int() | float() | str() | bytes():
             yield repr(value).encode() + b";"
         case np.generic():
-            # numbers that a caller took from an array
+            # scalars taken from an array
             yield from _content(value.item())
         case np.ndarray():
             yield (

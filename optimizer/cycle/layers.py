@@ -1,6 +1,4 @@
-"""The layers of a cycle: the configurations in which the arm may rest at the start and at each
-stop.
-"""
+"""Layers of a cycle: the configurations at rest at the start and at every stop."""
 
 from __future__ import annotations
 
@@ -12,6 +10,7 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -23,20 +22,38 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target, members
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from joulepath.optimizer.search.ends import EndConfiguration, ends_of
+from joulepath.optimizer.search.ends import ends_of
 
-# configurations of one layer, full turns included: 64 poses of a UR arm with all of theirs
-MOST_NODES = 20_000
+
+@dataclass(frozen=True)
+class LayerSettings:
+    """Limits of a layer."""
+
+    most_nodes: int = 20_000
+    """Most configurations of a layer with full turns: 64 poses of a UR arm with all full turns."""
+
+
+LAYER = LayerSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """Configurations `q` (n, nq) [rad] of one stop. Each is one of `ends`, `end` (n,) says which,
-    and `turns` (n, nq) full turns away from this one's joint positions. `complete`: no branch of
-    any pose may be missing. `some`: their poses are some of infinitely many. Where these are those
-    of one pose `around`, which leaves the orientation free in part, all of its configurations
-    count, known or not; of a `given` one, if the angle is given. `traces` are the ways that lead to
-    the `ends`, as the arm follows them, one for each; none where no way leads there."""
+    """Configurations of the arm at one place.
+
+    Attributes:
+        name: name of the place: `start`, or `stops/` and its name.
+        ends: configurations up to full turns.
+        q: all configurations, shape (n, nq) [rad].
+        end: index into `ends` for every configuration, shape (n,).
+        turns: full turns from the joint positions of its end, shape (n, nq).
+        complete: whether no branch of any pose can be missing.
+        sampled_poses: whether the poses are samples of infinitely many.
+        free_pose: pose with a free orientation that the sampled poses belong to; all of its
+            configurations count for a bound. None if the layer has no such pose.
+        fixed_pose: the pose of `free_pose` with its angle, if the angle is given.
+        traces: trace of the path that leads to every end, as the arm follows it; empty without a
+            path.
+    """
 
     name: str
     ends: list[EndConfiguration]
@@ -44,86 +61,94 @@ class Layer:
     end: npt.NDArray[np.intp]
     turns: npt.NDArray[np.intp]
     complete: bool
-    some: bool = False
-    around: ConeOrientedPose | None = None
-    given: Pose | None = None
+    sampled_poses: bool = False
+    free_pose: ConeOrientedPose | None = None
+    fixed_pose: Pose | None = None
     traces: tuple[Trace, ...] = ()
 
     @property
     def sampled(self) -> bool:
-        """Whether some of them stand for infinitely many."""
-        return self.some or any(end.sampled for end in self.ends)
+        """Whether some configurations are samples of infinitely many."""
+        return self.sampled_poses or any(end.sampled for end in self.ends)
 
 
 def layer_of(
-    asked: Cycle,
+    cycle: Cycle,
     place: str,
     field: str,
     target: Target,
     branch: BranchFilter | None,
     windings: bool,
 ) -> Layer:
-    """The layer of a target, held with every arm that comes to this place or leaves it, with
-    `windings` or without.
+    """Layer of a target, feasible with every arm that comes to this place or leaves it.
 
-    Raises the errors of `optimize` for an end, which name `start` or `stops/NAME`; InvalidProblem,
-    with `field` named, for too many configurations.
+    Args:
+        cycle: the cycle.
+        place: name of the place.
+        field: field of the request, for errors.
+        target: target at the place.
+        branch: allowed branches; None for all.
+        windings: whether to include every full turn within the limits.
+
+    Raises:
+        InvalidProblem: there are too many configurations.
+        JoulepathError: the errors of `optimize` for an end; they name the place.
     """
     name = place if place == START else f"stops/{place}"
     problems = [
-        Problem(arm=arm, start=target, goal=target, branch=branch) for arm in arms_at(asked, place)
+        Problem(arm=arm, start=target, goal=target, branch=branch) for arm in arms_at(cycle, place)
     ]
     problem = problems[0]
     found, _ = ends_of(PreparedProblem.of(problem), name, problem.goal)
     q = np.array([end.q for end in found])
-    ruled = [check_configurations(PreparedProblem.of(each), q) for each in problems]
+    causes_of_arms = [check_configurations(PreparedProblem.of(each), q) for each in problems]
     either = [
-        next((each for each in causes if each is not None), None)
-        for causes in zip(*ruled, strict=True)
+        next((cause for cause in causes if cause is not None), None)
+        for causes in zip(*causes_of_arms, strict=True)
     ]
     raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in found], either)
-    held = [end for end, cause in zip(found, either, strict=True) if cause is None]
-    middle = (asked.arm.active_limits.q_min + asked.arm.active_limits.q_max) / 2
+    feasible = [end for end, cause in zip(found, either, strict=True) if cause is None]
+    middle = (cycle.arm.active_limits.q_min + cycle.arm.active_limits.q_max) / 2
     nodes = [
-        (k, np.array(node)) for k, end in enumerate(held) for node in _nodes(end, windings, middle)
+        (k, np.array(node))
+        for k, end in enumerate(feasible)
+        for node in _nodes(end, windings, middle)
     ]
-    if len(nodes) > MOST_NODES:
+    if len(nodes) > LAYER.most_nodes:
         raise InvalidProblem(
             field,
-            f"{name} has {len(nodes)} arm configurations, of at most {MOST_NODES}: give fewer "
-            "targets, a `branch`, or "
-            "`windings` false.",
+            f"{name} has {len(nodes)} arm configurations, of at most {LAYER.most_nodes}: give "
+            "fewer targets, a `branch`, or `windings` false.",
         )
     end = np.array([k for k, _ in nodes])
     positions = np.array([node for _, node in nodes])
-    turns = np.round((positions - np.array([each.q for each in held])[end]) / (2 * np.pi)).astype(
-        np.intp
-    )
-    kinematics = inverse_kinematics_for(asked.arm.robot)
+    of_ends = np.array([each.q for each in feasible])[end]
+    turns = np.round((positions - of_ends) / (2 * np.pi)).astype(np.intp)
+    kinematics = inverse_kinematics_for(cycle.arm.robot)
     given = all(isinstance(member, np.ndarray) for member in members(problem.goal))
-    return Layer(
-        name, held, positions, end, turns, given or (kinematics is not None and kinematics.complete)
-    )
+    complete = given or (kinematics is not None and kinematics.complete)
+    return Layer(name, feasible, positions, end, turns, complete)
 
 
-def arms_at(asked: Cycle, place: str) -> list[Arm]:
+def arms_at(cycle: Cycle, place: str) -> list[Arm]:
     """The different arms that come to a place, rest at it, or leave it."""
     arms = [
         arm
-        for move in asked.moves
+        for move in cycle.moves
         for arm in (
             [move.arm] * (place in (move.start, *move.through, move.goal))
             + [move.arm_after] * (place == move.goal)
         )
     ]
-    return list({id(arm): arm for arm in arms}.values())
+    return [arm for k, arm in enumerate(arms) if all(arm is not other for other in arms[:k])]
 
 
 def _nodes(end: EndConfiguration, windings: bool, middle: Array) -> list[tuple[float, ...]]:
-    """Joint positions (nq,) of a configuration: with every full turn, or the ones nearest to the
+    """Joint positions (nq,) of an end: with every full turn, or only the nearest ones to the
     middle.
 
-    A sample of infinitely many has one: as many samples as there are turns would add little.
+    A sample of infinitely many configurations has one node, as further samples serve better than
+    turns.
     """
     if windings and not end.sampled:
         return list(product(*end.choices))

@@ -1,16 +1,16 @@
-"""The lazy search of a least chain: bounds of all legs first, then a motion where the least chain
-goes.
+"""Lazy search for a least chain: bounds of all legs first, motions only along the least chain.
 
-All legs weigh their proven bounds. The least chain through them is found, its legs are solved and
-weigh what was found, and so on until every leg of the least chain is solved: then no chain has a
-bound below it. After Dellin and Srinivasa, "A unifying formalism for shortest path problems with
-expensive edge evaluations" (2016).
+All legs weigh their proven bounds at first. The least chain is found, its legs are solved and weigh
+the energies of their motions, and so on until every leg of the least chain is solved. Then no chain
+has a bound below it. After Dellin and Srinivasa, "A unifying formalism for shortest path problems
+with expensive edge evaluations" (2016).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,41 +21,59 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.motion.spline import Spline
 
-# share of the search's time left that one leg may take: among obstacles, one without a way would
-# take all of it
-SHARE_OF_A_LEG = 1 / 8
-# J: a chain is no better than another one by less
-SAME = 1e-9
+Pair = tuple[int, int, int]
+"""Leg, start node and goal node of a move."""
+
+
+@dataclass(frozen=True)
+class LazySearchSettings:
+    """Settings of the lazy search."""
+
+    share_of_leg: float = 1 / 8
+    """Share of the time left that one leg may take; a leg without a motion among obstacles would
+    take all of it."""
+    same_cost: float = 1e-9
+    """Difference below which two chains cost the same [J]."""
+
+
+LAZY_SEARCH = LazySearchSettings()
 
 
 class LazySearch(ABC):
-    """A search over `legs`, whose time is up at `search_end`.
+    """A lazy search over the legs of a cycle.
 
-    `failed`: some leg has no motion and is not proven to have none. `cut_short`: for some leg the
-    time was too short. `causes` say why a leg's last attempt failed, by the number of the leg.
+    `failed`: some leg has no motion, without a proof. `cut_short`: the time was too short for some
+    leg. `causes` are the reasons of the last failure of a leg, by its number.
+
+    Args:
+        legs: the legs.
+        closed: whether a chain ends in its first node.
+        search_end: deadline of the search.
     """
 
     def __init__(self, legs: Sequence[Leg], closed: bool, search_end: Deadline) -> None:
         self.legs, self.closed, self.search_end = list(legs), closed, search_end
         self.failed = self.cut_short = False
         self.causes: dict[int, str] = {}
-        self._chain = LeastChain([leg.cost for leg in self.legs], closed)
+        self.least_chain = LeastChain([leg.cost for leg in self.legs], closed)
 
     @abstractmethod
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """What a motion of a pair needs [J], the dwell left out: inf if none is found, None once
-        the time is up.
+        """Cost [J] of a motion of a pair, without the dwell.
+
+        Returns:
+            The cost; inf if no motion is found, None if the time is up.
         """
 
     @abstractmethod
     def motion(self, k: int, s: int, g: int) -> Spline | None:
-        """The motion that `attempt` found for a pair; None if it found none."""
+        """Motion found by `attempt`; None if there is none."""
 
     def try_kind(self, k: int, s: int, g: int) -> None:
-        """Give the kind of a pair what its motion needs; leave it as it is once the time is up.
+        """Attempt a motion for the kind of a pair, and set its cost unless the time is up.
 
-        Where the range of a joint is in the way of a pair, the pair of its kind that is farthest
-        from the limits is tried, too: the first one has a value of its own then.
+        If the range of a joint limits the motion, the pair of the kind farthest from the limits is
+        tried too, and the first pair keeps a value of its own.
         """
         leg = self.legs[k]
         kind, before = int(leg.kind[s, g]), float(leg.cost[s, g])
@@ -71,48 +89,49 @@ class LazySearch(ABC):
             value = self.attempt(k, centre_s, centre_g)
         if value is not None:
             leg.set_kind(kind, value)
-        # some legs weigh more than their bounds before they are solved; the pair may have a value
-        # of its own
+        # an unsolved pair may weigh more than its bound, and a pair may have a value of its own
         least = min(float(leg.cost[s, g]), np.inf if value is None else value + float(leg.dwell[g]))
-        self._chain.lower(max(before - least, 0.0))
+        self.least_chain.lower(max(before - least, 0.0))
 
-    def late(self) -> float | None:
-        """What a leg for which the time was too short is worth: without its share of it, no other
-        is tried.
-        """
+    def out_of_time(self) -> float | None:
+        """Cost of a leg without enough time: inf, or None if the whole search is out of time."""
         self.cut_short = True
         return None if self.search_end.passed else np.inf
 
-    def pairs(self, nodes: list[int]) -> Iterator[tuple[int, int, int]]:
-        """Leg, start node and goal node of each move of a chain."""
+    def pairs(self, nodes: list[int]) -> Iterator[Pair]:
+        """Leg, start node and goal node of every move of a chain."""
         return ((k, nodes[k], nodes[k + 1]) for k in range(len(self.legs)))
 
     def cost(self, nodes: list[int]) -> float:
-        """What a chain needs as far as it is known, dwells included."""
+        """Cost [J] of a chain by known motions and bounds, with dwells."""
         return float(sum(self.legs[k].cost[s, g] for k, s, g in self.pairs(nodes)))
 
     def dwells(self, nodes: list[int]) -> float:
         """Energy [J] of the dwells of a chain."""
         return sum(float(self.legs[k].dwell[g]) for k, _, g in self.pairs(nodes))
 
-    def least(self) -> list[int]:
-        """The nodes of the least chain, as far as motions and bounds tell by now; none if there is
-        no chain.
-        """
-        return self._chain.find()[1]
+    def least_nodes(self) -> list[int]:
+        """Nodes of the least chain by known motions and bounds; empty if there is no chain."""
+        return self.least_chain.find()[1]
 
     def explore(self) -> list[int]:
-        """The nodes of the least chain, all of its legs solved; once the time is up, of the least
-        solved one.
+        """Search until all legs of the least chain are solved.
 
-        If none is solved by then, those of the least chain. Raises NoSequence, or DeadlineExceeded
-        if some leg that might close the gap was given too little time.
+        Returns:
+            The nodes of the least chain; once the time is up, of the least solved chain if there is
+            one.
+
+        Raises:
+            NoSequence: there is no chain.
+            DeadlineExceeded: there is no chain, and some leg had too little time.
         """
         while True:
-            nodes = self.least()
+            nodes = self.least_nodes()
             if not nodes:
-                raise self._no_chain()
-            open_ = [(k, s, g) for k, s, g in self.pairs(nodes) if not self.legs[k].known(s, g)]
+                raise self._no_chain_error()
+            open_ = [
+                (k, s, g) for k, s, g in self.pairs(nodes) if not self.legs[k].is_pair_solved(s, g)
+            ]
             if not open_:
                 return nodes
             for each in open_:
@@ -124,31 +143,34 @@ class LazySearch(ABC):
 
     @property
     def leaves_chains(self) -> bool:
-        """Whether some chain has a bound below the least one found: if unsolved legs weigh more
-        than their bounds.
+        """Whether some chain has a bound below the least chain found.
+
+        This is possible where unsolved legs weigh more than their bounds.
         """
         costs = [np.where(leg.is_solved, leg.cost, leg.least_costs) for leg in self.legs]
-        return LeastChain(costs, self.closed).find()[0] < self._chain.find()[0] - SAME
+        return (
+            LeastChain(costs, self.closed).find()[0]
+            < self.least_chain.find()[0] - LAZY_SEARCH.same_cost
+        )
 
     @abstractmethod
     def chain_tried(self, nodes: list[int]) -> None:
-        """Takes note that every leg of a chain has been tried."""
+        """Called when every leg of a chain has been tried."""
 
     def _least_solved(self) -> list[int]:
-        """The least chain of pairs that are all solved; no nodes if there is none."""
+        """Nodes of the least chain of solved pairs; empty if there is none."""
         costs = [np.where(leg.is_solved, leg.cost, np.inf) for leg in self.legs]
         return LeastChain(costs, self.closed).find()[1]
 
-    def least_through(self, pairs: Iterable[tuple[int, int, int]]) -> list[int]:
-        """The least chain of these pairs (leg, start node, goal node); no nodes if there is
-        none."""
+    def least_through(self, pairs: Iterable[Pair]) -> list[int]:
+        """Nodes of the least chain of the given pairs; empty if there is none."""
         costs = [np.full(leg.cost.shape, np.inf) for leg in self.legs]
         for k, s, g in pairs:
             costs[k][s, g] = self.legs[k].cost[s, g]
         return LeastChain(costs, self.closed).find()[1]
 
-    def _no_chain(self) -> JoulepathError:
-        """The error for no chain; it names the first stop to which none leads."""
+    def _no_chain_error(self) -> JoulepathError:
+        """Error that names the first stop no chain reaches."""
         if self.cut_short:
             return DeadlineExceeded([])
         reached = np.zeros(len(self.legs[0].start.q))

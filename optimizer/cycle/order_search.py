@@ -1,17 +1,15 @@
-"""The best order of the stops of a cycle: a tour of least energy over groups of stops, by dynamic
-programming.
+"""Best order of the stops of a cycle: a tour of least energy over groups of stops.
 
-Between two groups the arm carries the same whatever their order, so the cost of a move depends on
-its two ends alone. A tour is extended by one group at a time, from every subset of the groups and
-every configuration in which the last one is left (Held and Karp, "A dynamic programming approach to
-sequencing problems", 1962). As in `LazySearch`, moves weigh their proven bounds first; those of the
-least tour are solved, until no tour has a bound below it.
+Between two groups the arm carries the same payload in every order, so the cost of a move depends on
+its two ends alone. The best tour is found by dynamic programming (`held_karp`). As in `LazySearch`,
+moves weigh their proven bounds first, and the moves of the least tour are solved until no tour has
+a bound below it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
 
@@ -21,41 +19,59 @@ import numpy.typing as npt
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
+from joulepath.optimizer.cycle.held_karp import HeldKarp
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.proven_bound import bounded_costs
-from joulepath.optimizer.cycle.tours import Tours
 from joulepath.optimizer.deadline import Clock, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.free_order import earlier_groups, groups_of
 from joulepath.optimizer.problem.stops import PlannedMove, Stop, moves_over
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
-# share of the deadline that the search for the order may take
-SHARE = 0.7
+
+@dataclass(frozen=True)
+class OrderSearchSettings:
+    """Settings of the search for the order of the stops."""
+
+    deadline_share: float = 0.7
+    """Share of the deadline for this search."""
+
+
+ORDER_SEARCH = OrderSearchSettings()
 
 
 class OrderSearch:
-    """The search for the order of the stops of a cycle; `bound` [J] holds for every order once it
-    has `run`.
+    """Search for the order of the stops of a cycle.
 
-    `exact`: no other order can be better. `tell` gets what is found of single moves.
+    After `run`, `bound` [J] holds for every order, and `exact` tells whether no other order can be
+    better.
+
+    Args:
+        cycle: cycle with a free order.
+        clock: function that returns the time [s].
+        tell: receives the progress of single moves.
     """
 
-    def __init__(self, asked: Cycle, clock: Clock, tell: Tell = nobody) -> None:
-        assert asked.order is not None
-        self.asked, self.order = asked, asked.order
-        self.groups = groups_of(asked.order, asked.stops)
-        self.moves, self.blocks = _all_moves(asked, self.groups)
+    def __init__(self, cycle: Cycle, clock: Clock, tell: Tell = no_listener) -> None:
+        assert cycle.order is not None
+        self.cycle, self.order = cycle, cycle.order
+        self.groups = groups_of(cycle.order, cycle.stops)
+        self.moves, self.blocks = _all_moves(cycle, self.groups)
         self.search = CycleSearch(
-            replace(asked, deadline=SHARE * asked.deadline), clock, self.moves, tell
+            replace(cycle, deadline=ORDER_SEARCH.deadline_share * cycle.deadline),
+            clock,
+            self.moves,
+            tell,
         )
         self.exact, self.bound, self.best = True, -np.inf, list[int]()
 
     def run(self) -> Cycle:
-        """The cycle with its stops in the best order; once the time is up, in the best one known.
+        """The cycle with its stops in the best order known.
 
-        Raises NoTrajectory if there is none, or DeadlineExceeded if none is known.
+        Raises:
+            NoTrajectory: there is no tour.
+            DeadlineExceeded: the deadline passed before a tour was known.
         """
         search = self.search
         try:
@@ -66,19 +82,19 @@ class OrderSearch:
         if not self.best:
             raise DeadlineExceeded([])
         stops = [stop for k in self.best for stop in self.groups[k]]
-        return replace(self.asked, stops=stops, order=None)
+        return replace(self.cycle, stops=stops, order=None)
 
     def _explore(self) -> None:
-        """Find the least tour, all of its moves solved; `best` are its groups so far. The first one
-        is the `bound`.
+        """Find the least tour with all moves solved; `best` has its groups, `bound` the cost of the
+        first.
         """
         search, costs = self.search, [leg.cost for leg in self.search.legs]
-        known = self.asked.objective == "electrical" and all(leg.closed for leg in search.legs)
+        known = self.cycle.objective == "electrical" and all(leg.closed for leg in search.legs)
         if not known:
-            # moves weigh more than their bounds, or there are configurations that no node is
+            # moves weigh more than their bounds, or some configurations are no nodes
             legs = zip(self.moves, search.legs, strict=True)
             self.bound = self._tours(
-                [bounded_costs(self.asked, *leg, search.end) for leg in legs]
+                [bounded_costs(self.cycle, *leg, search.end) for leg in legs]
             ).least()[0]
         tours = self._tours(costs)
         while True:
@@ -90,43 +106,50 @@ class OrderSearch:
             open_ = [
                 each
                 for each in self._moves_of(groups, ends)
-                if not search.legs[each[0]].known(*each[1:])
+                if not search.legs[each[0]].is_pair_solved(*each[1:])
             ]
             if not open_ or search.search_end.passed:
                 self.exact = not (open_ or search.failed or search.cut_short)
                 return
             for each in open_:
                 search.try_kind(*each)
-            self._put(tours, costs, {k for k, _, _ in open_})
+            self._update(tours, costs, {k for k, _, _ in open_})
 
-    def _tours(self, costs: Sequence[Array]) -> Tours:
-        """The tours with the costs (n, n) [J] of all moves."""
+    def _tours(self, costs: Sequence[Array]) -> HeldKarp:
+        """Dynamic program over tours with the costs (n, n) [J] of all moves."""
         ends: dict[int | None, npt.NDArray[np.intp]] = {}
         for (origin, to), legs in self.blocks.items():
             if origin is None:
-                ends[None] = _ends(self.search.legs[legs[0]].start, len(costs[legs[0]]))
-                ends[to] = _ends(self.search.legs[legs[-1]].goal, costs[legs[-1]].shape[1])
-        tours = Tours(ends, earlier_groups(self.order, self.groups), self.asked.closed)
-        self._put(tours, costs, set(range(len(costs))))
+                ends[None] = _end_numbers(self.search.legs[legs[0]].start, len(costs[legs[0]]))
+                ends[to] = _end_numbers(self.search.legs[legs[-1]].goal, costs[legs[-1]].shape[1])
+        tours = HeldKarp(ends, earlier_groups(self.order, self.groups), self.cycle.closed)
+        self._update(tours, costs, set(range(len(costs))))
         return tours
 
-    def _put(self, tours: Tours, costs: Sequence[Array], changed: set[int]) -> None:
-        """Give the tours the costs of all blocks that have a move of which they changed."""
-        # all ways to a group go on by the same moves
+    def _update(self, tours: HeldKarp, costs: Sequence[Array], changed: set[int]) -> None:
+        """Set the costs of all blocks with a changed move."""
+        # moves inside a group are the same whatever the group before it
         inner = dict[int | None, Array | None]()
         for (origin, to), (first, *others) in self.blocks.items():
             if not changed.isdisjoint((first, *others)):
                 if to not in inner:
-                    inner[to] = reduce(_through, [costs[k] for k in others]) if others else None
+                    inner[to] = (
+                        reduce(_joined_costs, [costs[k] for k in others]) if others else None
+                    )
                 rest = inner[to]
-                tours.put(
-                    origin, to, costs[first] if rest is None else _through(costs[first], rest)
+                tours.set_costs(
+                    origin, to, costs[first] if rest is None else _joined_costs(costs[first], rest)
                 )
 
     def _moves_of(self, groups: list[int], ends: list[int]) -> list[tuple[int, int, int]]:
-        """Leg, start node and goal node of each move of a tour, which leaves the start and the
-        groups by the nodes `ends`, and comes to the last of these."""
-        places: list[int | None] = [None, *groups, *([None] if self.asked.closed else [])]
+        """Leg, start node and goal node of every move of a tour.
+
+        Args:
+            groups: groups in order of visit.
+            ends: nodes at the start and at the exit of every group, and at the end of a closed
+                tour.
+        """
+        places: list[int | None] = [None, *groups, *([None] if self.cycle.closed else [])]
         found = list[tuple[int, int, int]]()
         for k, (first, last) in enumerate(pairwise(places)):
             legs = self.blocks[first, last]
@@ -140,15 +163,17 @@ class OrderSearch:
 
 
 def _all_moves(
-    asked: Cycle, groups: list[list[Stop]]
+    cycle: Cycle, groups: list[list[Stop]]
 ) -> tuple[list[PlannedMove], dict[tuple[int | None, int | None], list[int]]]:
-    """Every move that some order has; and their numbers from the exit of a group, None for the
-    start, to that of another one."""
+    """Every move of any order, and the moves of every block.
+
+    A block leads from the exit of a group, or the start (None), to the exit of another group.
+    """
     moves = list[PlannedMove]()
     blocks: dict[tuple[int | None, int | None], list[int]] = {}
     inside, exits = list[list[int]](), list[str]()
     for group in groups:
-        own, arm, place = list[PlannedMove](), asked.arm, START
+        own, arm, place = list[PlannedMove](), cycle.arm, START
         for stop in group:
             after = arm if stop.payload is None else replace(arm, payload=stop.payload)
             own += moves_over(stop, place, arm, after)
@@ -162,26 +187,26 @@ def _all_moves(
             if origin != to:
                 blocks[origin, to] = [len(moves), *own_moves[1:]]
                 moves.append(replace(moves[own_moves[0]], start=exit_))
-    if asked.closed:
+    if cycle.closed:
         for origin, exit_ in enumerate(exits):
             blocks[origin, None] = [len(moves)]
-            moves.append(PlannedMove(exit_, START, asked.arm, asked.arm))
+            moves.append(PlannedMove(exit_, START, cycle.arm, cycle.arm))
     return moves, blocks
 
 
-def _ends(layer: Layer, nodes: int) -> npt.NDArray[np.intp]:
-    """The end (n,) of each node of a layer, ascending from 0; one more for a node that stands for
-    those not known.
+def _end_numbers(layer: Layer, nodes: int) -> npt.NDArray[np.intp]:
+    """Number (n,) of the end of every node, ascending from 0; an extra node stands for unknown
+    ones.
     """
     ends = np.unique(layer.end, return_inverse=True)[1]
     return np.append(ends, np.full(nodes - len(ends), ends[-1] + 1))
 
 
-def _through(one: Array, other: Array) -> Array:
-    """The least cost (a, c) [J] over all nodes between, from costs (a, b) and (b, c)."""
+def _joined_costs(one: Array, other: Array) -> Array:
+    """Least costs (a, c) [J] over the nodes between, from costs (a, b) and (b, c)."""
     rows, columns = np.nonzero(np.isfinite(other))
     if len(np.unique(columns)) == len(columns):
-        # a line or a path, which leads to each node from one other
+        # a line or path leads to every node from a single node
         total = np.full((len(one), other.shape[1]), np.inf)
         total[:, columns] = one[:, rows] + other[rows, columns]
         return total

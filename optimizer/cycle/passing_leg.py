@@ -1,9 +1,8 @@
-"""The legs that pass through stops: motions from one layer to another through the layers of the
-stops between them.
+"""Legs that pass through stops: motions between two layers through the layers of the stops between.
 
-Such a motion depends on the configurations at all of its stops, a route. Its bound is the sum of
-the bounds on the travel from each to the next, or that of the motion from rest to rest between its
-ends if this is greater. The bound of a pair of ends is the least of all routes between them.
+Such a motion depends on its configurations at all stops, its route. The bound of a route is the
+greater one of the sum of bounds on the travel between successive stops, and the bound of the motion
+from rest to rest between its ends. The bound of a pair of ends is the least one of all its routes.
 """
 
 from __future__ import annotations
@@ -17,80 +16,99 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import travel_bounds
+from joulepath.optimizer.cycle.kinds import displacements_between, kinds_of
 from joulepath.optimizer.cycle.layers import Layer
-from joulepath.optimizer.cycle.legs import Leg, between, bounds_of, kinds_of
+from joulepath.optimizer.cycle.legs import Leg, bounds_of
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.result.cycle import Pass
 
-# pairs of ends of one leg, each of which has routes of its own
-MOST_PASSING_PAIRS = 500_000
-# what a motion needs is some quarter above its bound: a route that is not solved weighs so much
-# more than its bound
-LIKELY = 1.15
+
+@dataclass(frozen=True)
+class PassingLegSettings:
+    """Settings of legs that pass through stops."""
+
+    most_pairs: int = 500_000
+    """Most pairs of ends of one leg; every pair has routes of its own."""
+    likely_ratio: float = 1.15
+    """Ratio of the weight of an unsolved route to its bound; energies are about a quarter above
+    their bounds."""
+
+
+PASSING = PassingLegSettings()
 
 Route = tuple[int, ...]
+"""Nodes of a motion at the stops it passes through."""
 
 
 @dataclass(eq=False)
 class PassingLeg(Leg):
-    """All motions from one layer to the next through the layers `between`; every pair is a kind of
-    its own.
+    """All motions between two layers through others; every pair is a kind of its own.
 
-    `direct` is the leg without passes, and `travel` the bounds [J] on the parts, a matrix from each
-    layer to the next. Bounds are far below what is found, so that an unsolved pair weighs more than
-    its bound in `cost`: by `beyond` (s, g) [J]. `routes` are the best ones found, by pair.
+    Attributes:
+        between: layers of the passed stops.
+        direct: leg without passes.
+        travel: bounds of the travel from every layer to the next, shape (n_k, n_k+1) [J].
+        excess: excess of the weight of unsolved pairs over their bounds, shape (s, g) [J].
+        routes: best routes found, by pair.
     """
 
     between: list[Layer] = field(default_factory=list)
     direct: Leg | None = None
     travel: list[Array] = field(default_factory=list)
-    beyond: Array = field(default_factory=lambda: np.zeros(0))
+    excess: Array = field(default_factory=lambda: np.zeros(0))
     routes: dict[tuple[int, int], Route] = field(default_factory=dict)
 
     @classmethod
     def through(
         cls, prepared: PreparedProblem, layers: Sequence[Layer], dwell: Array
     ) -> PassingLeg:
-        """The leg from the first layer through the others to the last. Raises InvalidProblem if it
-        has many pairs.
+        """The leg through the given layers.
+
+        Raises:
+            InvalidProblem: there are too many pairs.
         """
         start, *between, goal = layers
         if (
             max(len(a.q) * len(b.q) for a, b in [*pairwise(layers), (start, goal)])
-            > MOST_PASSING_PAIRS
+            > PASSING.most_pairs
         ):
             raise InvalidProblem(
                 "stops",
                 f"From {start.name} through {between[0].name} to {goal.name} there are more than "
-                f"{MOST_PASSING_PAIRS} "
-                "pairs of arm configurations: give fewer targets, a `branch`, or `windings` false.",
+                f"{PASSING.most_pairs} pairs of arm configurations: give fewer targets, a "
+                "`branch`, or `windings` false.",
             )
-        return cls._of(Leg.of(prepared, start, goal, dwell), between, 0.0, LONGEST_DURATION)
+        return cls._of_direct(Leg.of(prepared, start, goal, dwell), between, 0.0, DURATIONS.longest)
 
     @classmethod
-    def _of(
+    def _of_direct(
         cls,
         direct: Leg,
         between: list[Layer],
         price: float,
         longest: float,
-        beyond: Array | None = None,
+        excess: Array | None = None,
     ) -> PassingLeg:
-        """The leg at a price of time [W], with motions of at most `longest` [s].
+        """The leg at a price of time.
 
-        They are likely to need so much more than their bounds, `beyond` (s, g) [J].
+        Args:
+            direct: leg without passes.
+            between: layers of the passed stops.
+            price: price of time [W].
+            longest: longest duration of a motion [s].
+            excess: likely excess over the bounds, shape (s, g) [J]; None for a share of the bounds.
         """
         prepared, start, goal = direct.prepared, direct.start, direct.goal
         layers = [start, *between, goal]
-        travel = [_travel(prepared, a, b, price, longest) for a, b in pairwise(layers)]
+        travel = [_travel_bounds(prepared, a, b, price, longest) for a, b in pairwise(layers)]
         least = np.maximum(_least_sums(travel), direct.least_costs - direct.dwell)
         kind = np.arange(least.size).reshape(least.shape)
-        beyond = (LIKELY - 1) * np.abs(least) if beyond is None else beyond
+        excess = (PASSING.likely_ratio - 1) * np.abs(least) if excess is None else excess
         return cls(
             prepared,
             start,
@@ -101,37 +119,37 @@ class PassingLeg(Leg):
             np.zeros((0, 2)),
             least.ravel(),
             direct.dwell,
-            least + beyond + direct.dwell,
+            least + excess + direct.dwell,
             between=between,
             direct=direct,
             travel=travel,
-            beyond=beyond,
+            excess=excess,
         )
 
     def priced(self, price: float, longest: float) -> PassingLeg:
-        """The same leg with what energy + price · duration needs, along the routes that are known;
-        none solved.
+        """The same leg, unsolved, with the energy + price · duration as cost, along the known
+        routes.
         """
         assert self.direct is not None
-        priced = self._of(
-            self.direct.priced(price, longest), self.between, price, longest, self.beyond
+        priced = self._of_direct(
+            self.direct.priced(price, longest), self.between, price, longest, self.excess
         )
         priced.routes = self.routes
         return priced
 
     @property
     def layers(self) -> list[Layer]:
-        """The layers of all places of its motions, in their order."""
+        """Layers of all places of the motions, in order."""
         return [self.start, *self.between, self.goal]
 
     def best_routes(self, s: int, g: int) -> Iterator[tuple[float, Route]]:
-        """Bound [J] and nodes between them of each route of a pair, in the order of the bounds."""
+        """Bound [J] and nodes of the routes of a pair, by ascending bound."""
         assert self.direct is not None
         onward = [self.travel[-1][:, g]]
         for matrix in reversed(self.travel[1:-1]):
             onward.insert(0, (matrix + onward[0]).min(axis=1))
         least = float(self.direct.least_costs[s, g] - self.direct.dwell[g])
-        # least sum over all ways on, sum so far, nodes so far
+        # least sum over all continuations, sum so far, nodes so far
         heap: list[tuple[float, float, Route]] = [(0.0, 0.0, ())]
         while heap:
             total, gone, route = heappop(heap)
@@ -144,13 +162,17 @@ class PassingLeg(Leg):
                 heappush(heap, (float(ahead[node]), gone + float(row[node]), (*route, node)))
 
     def route(self, s: int, g: int) -> Route:
-        """The best route found of a pair; if none is, the one of the least bound."""
+        """Best known route of a pair; without one, the route of least bound."""
         if (s, g) not in self.routes:
             self.routes[s, g] = next(self.best_routes(s, g))[1]
         return self.routes[s, g]
 
+    def set_route(self, s: int, g: int, route: Route) -> None:
+        """Let the motion of a pair take a route."""
+        self.routes[s, g] = route
+
     def passes(self, s: int, g: int) -> list[Array]:
-        """Joint positions (nq,) [rad] that the motion of a pair passes through."""
+        """Joint positions (nq,) [rad] passed by the motion of a pair."""
         return self.configurations(self.route(s, g))
 
     def configurations(self, route: Route) -> list[Array]:
@@ -158,7 +180,7 @@ class PassingLeg(Leg):
         return [layer.q[node] for layer, node in zip(self.between, route, strict=True)]
 
     def prepared_for(self, s: int, g: int) -> PreparedProblem:
-        """The problem of a pair's motion."""
+        """Problem of a pair's motion."""
         problem = replace(
             self.prepared.problem,
             start=self.start.q[s],
@@ -168,12 +190,12 @@ class PassingLeg(Leg):
         return PreparedProblem.of(problem)
 
 
-def _travel(
+def _travel_bounds(
     prepared: PreparedProblem, start: Layer, goal: Layer, price: float, longest: float
 ) -> Array:
-    """Bounds (s, g) [J] on the travel from one layer to the next; see `travel_bounds`."""
+    """Bounds (s, g) [J] of the travel from one layer to the next; see `travel_bounds`."""
     kind, pair = kinds_of(start, goal, prepared)
-    displacement, levels = between(prepared, start, goal, pair)
+    displacement, levels = displacements_between(prepared, start, goal, pair)
     gain = levels[:, 1] - levels[:, 0]
     bounds = bounds_of(
         lambda x, own: travel_bounds(prepared, x, own, price, longest), displacement, gain
@@ -182,7 +204,7 @@ def _travel(
 
 
 def _least_sums(matrices: Sequence[Array]) -> Array:
-    """The least sum (n_0, n_m) over all chains through matrices (n_k, n_k+1)."""
+    """Least sums (n_0, n_m) over all chains through matrices (n_k, n_k+1)."""
     total = matrices[0]
     for matrix in matrices[1:]:
         rows = []
@@ -194,7 +216,7 @@ def _least_sums(matrices: Sequence[Array]) -> Array:
 
 
 def passes_of(leg: Leg, s: int, g: int, motion: Spline) -> list[Pass]:
-    """Where the motion of a pair passes through stops."""
+    """Passes of the motion of a pair, with their times."""
     if not isinstance(leg, PassingLeg):
         return []
     route = leg.route(s, g)

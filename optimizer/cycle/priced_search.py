@@ -1,4 +1,4 @@
-"""Motions and chains at a price of time: what needs the least objective + price · duration."""
+"""Motions and chains of least objective + price · duration, at a price of time."""
 
 from __future__ import annotations
 
@@ -9,32 +9,34 @@ import numpy as np
 
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.cycle.known_motions import KnownMotion, known_motions
-from joulepath.optimizer.cycle.lazy_search import SHARE_OF_A_LEG, LazySearch
+from joulepath.optimizer.cycle.lazy_search import LAZY_SEARCH, LazySearch, Pair
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, sampled
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods import solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.solve.methods.fastest_motion import FastestMotion
-from joulepath.optimizer.solve.methods.method import Method, SolveResult
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 
 @dataclass(frozen=True)
 class PricedMotion:
-    """A motion with its objective, `energy` [J]."""
+    """A motion with its objective `energy` [J]."""
 
     spline: Spline
     energy: float
 
     @property
     def duration(self) -> float:
-        """Its duration [s]."""
+        """Duration [s]."""
         return self.spline.duration
 
     def value(self, price: float) -> float:
-        """Objective + price · duration [J], at a price [W]."""
+        """Objective + price · duration [J] at a price of time [W]."""
         return self.energy + price * self.duration
 
 
@@ -47,22 +49,36 @@ def priced_motion(
     deadline: Deadline,
     guess: Spline | None = None,
 ) -> PricedMotion | None:
-    """The motion of a pair of least objective + price · duration; None if none is found before the
-    deadline.
+    """Motion of a pair with least objective + price · duration.
 
-    `price` [W], `longest` [s]; `guess` is a motion of the same pair, of another duration perhaps.
+    Args:
+        leg: leg of the pair.
+        s: node at the start.
+        g: node at the goal.
+        price: price of time [W].
+        longest: longest duration of the motion [s].
+        deadline: end of the computation.
+        guess: motion of the pair, of any duration, to start from.
+
+    Returns:
+        The motion; None if none is found before the deadline.
     """
     weights = {leg.prepared.problem.objective: 1.0}
     p = leg.prepared.parameters(**weights, time=price)
-    interval = DurationInterval(p, LEAST_DURATION, longest, price=price)
-    return _solved(leg, s, g, interval, deadline, guess)
+    interval = DurationInterval(p, DURATIONS.least, longest, price=price)
+    return _recalled_or_solved(leg, s, g, interval, deadline, guess)
 
 
-class MoveOfALeg:
-    """The move of a pair, nodes `s` and `g` of a leg, at several prices of time; it lasts `longest`
-    [s] at most.
+class PricedPair:
+    """Motions of one pair at several prices of time.
 
-    It begins with the motions `known`, to which it puts those that it finds.
+    Args:
+        leg: leg of the pair.
+        s: node at the start.
+        g: node at the goal.
+        longest: longest duration of a motion [s].
+        deadline: end of the computation.
+        known: known motions of the pair; found ones are appended.
     """
 
     def __init__(
@@ -78,11 +94,14 @@ class MoveOfALeg:
         self.known = known
 
     def at(self, price: float) -> PricedMotion:
-        """The motion of least objective + price · duration. Raises NoTrajectory, or
-        DeadlineExceeded.
+        """Motion of least objective + price · duration, among the found and the known ones.
 
-        A solve begins from the best motion that is known, and may end in a worse one: where motions
-        are long, a change of duration hardly changes the objective + price · duration.
+        A solve starts from the best known motion and may still end in a worse one: where motions
+        are long, the duration hardly changes the objective + price · duration.
+
+        Raises:
+            NoTrajectory: no motion is found.
+            DeadlineExceeded: no motion is found before the deadline.
         """
         pair = (self.leg, self.s, self.g, price, self.longest, self.deadline)
         guess = min(self.known, key=lambda motion: motion.value(price), default=None)
@@ -97,7 +116,7 @@ class MoveOfALeg:
 
 
 class _FastestOfPair(FastestMotion):
-    """The search for the fastest motion of a pair, nodes `s` and `g` of a leg."""
+    """Search for the fastest motion of a pair, nodes `s` and `g` of a leg."""
 
     def __init__(
         self, leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline]
@@ -114,7 +133,9 @@ class _FastestOfPair(FastestMotion):
         return self._deadline
 
     def solver(self, interval: DurationInterval) -> Method:
-        return solver_for(self.prepared, self.q_start, self.q_goal, self.deadline, interval)
+        return solver_for(
+            SolveContext(self.prepared, self.q_start, self.q_goal, self.deadline, interval)
+        )
 
     def confirms(self, spline: Spline) -> bool:
         return certify(
@@ -125,9 +146,10 @@ class _FastestOfPair(FastestMotion):
 def fastest_motion(
     leg: Leg, s: int, g: int, deadline: Deadline, known: Sequence[Spline] = ()
 ) -> PricedMotion | None:
-    """The motion of a pair of least duration, certified; None if none is found before the deadline.
+    """Certified motion of a pair of least duration, no slower than the `known` motions of the pair.
 
-    It is no slower than the motions `known` of this pair.
+    Returns:
+        The motion; None if none is found before the deadline.
     """
     search, motions = _FastestOfPair(leg, s, g, deadline, known), known_motions()
     key = motions.key("fastest", search.problem, list(known))
@@ -140,7 +162,7 @@ def fastest_motion(
     return PricedMotion(spline, leg.prepared.cost_of(spline))
 
 
-def _solved(
+def _recalled_or_solved(
     leg: Leg,
     s: int,
     g: int,
@@ -154,9 +176,7 @@ def _solved(
     motions, asked = known_motions(), (interval, None if guess is None else sampled(guess))
     key = motions.key("priced", problem, *asked)
     known = motions.recall(key)
-    result = (
-        known.result if known is not None else _looked_for(leg, s, g, interval, deadline, guess)
-    )
+    result = known.result if known is not None else _solve(leg, s, g, interval, deadline, guess)
     if result is None or result.spline is None:
         return None
     if not result.cut_short:
@@ -164,11 +184,14 @@ def _solved(
     return PricedMotion(result.spline, leg.prepared.cost_of(result.spline))
 
 
-def _looked_for(
+def _solve(
     leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None
 ) -> SolveResult | None:
-    """What a solver makes of a pair; None if the time is up."""
-    solver = solver_for(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], deadline, interval)
+    """Result of the solver for a pair; None if the time is up."""
+    context = SolveContext(
+        leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], deadline, interval
+    )
+    solver = solver_for(context)
     try:
         with watch(deadline):
             return solver.solve() if guess is None else solver.solve_from(*sampled(guess), False)
@@ -177,8 +200,16 @@ def _looked_for(
 
 
 class PricedSearch(LazySearch):
-    """The search of the least chain at a price of time [W]; `motions` are those found, by leg,
-    start and goal node.
+    """Lazy search for the chain of least objective + price · duration.
+
+    `motions` are the motions found, by leg, start node and goal node.
+
+    Args:
+        legs: legs of the cycle.
+        closed: whether a chain ends in its first node.
+        price: price of time [W].
+        longest: longest duration of a motion [s].
+        search_end: deadline of the search.
     """
 
     def __init__(
@@ -186,16 +217,16 @@ class PricedSearch(LazySearch):
     ) -> None:
         super().__init__([leg.priced(price, longest) for leg in legs], closed, search_end)
         self.price, self.longest = price, longest
-        self.motions: dict[tuple[int, int, int], PricedMotion] = {}
+        self.motions: dict[Pair, PricedMotion] = {}
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """Objective + price · duration of a pair's motion [J]; inf if none is found, None once the
+        """Objective + price · duration [J] of a pair's motion; inf if none is found, None if the
         time is up.
         """
-        deadline = self.search_end.within(SHARE_OF_A_LEG * self.search_end.left)
+        deadline = self.search_end.within(LAZY_SEARCH.share_of_leg * self.search_end.left)
         found = priced_motion(self.legs[k], s, g, self.price, self.longest, deadline)
         if found is None and deadline.passed:
-            return self.late()
+            return self.out_of_time()
         if found is None:
             self.failed = True
             return np.inf
@@ -203,11 +234,9 @@ class PricedSearch(LazySearch):
         return found.value(self.price)
 
     def chain_tried(self, nodes: list[int]) -> None:
-        """Takes no note: at a price of time, what was found is no cycle of the time that is asked
-        for.
-        """
+        """No-op: at a price of time, a found chain has no duration to be told."""
 
     def motion(self, k: int, s: int, g: int) -> Spline | None:
-        """The motion of a pair; None if none was found."""
+        """Motion of a pair; None if none was found."""
         found = self.motions.get((k, s, g))
         return None if found is None else found.spline

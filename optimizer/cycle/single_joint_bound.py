@@ -1,9 +1,9 @@
-"""A quick bound on many moves: of the joint that has farthest to go, the others left out.
+"""Quick lower bound of many moves: the greatest bound of a single moving joint.
 
-`LeastBound` rises with the displacement of every joint and with the gain of potential energy. So
-its value where one joint alone moves, by no more than it does, and at no more than the gain, is a
-bound. These values are looked up in a table with even steps, at the step below; the greatest over
-all joints counts.
+`LeastBound` is monotone in the displacement of every joint and in the gain of potential energy. Its
+value with one joint moving alone, by at most its displacement and at most the gain, is therefore a
+bound. The values are looked up in a table with even steps, at the step below. The greatest value
+over the joints counts.
 """
 
 from __future__ import annotations
@@ -17,16 +17,32 @@ from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.deadline import end_if_stopped
 from joulepath.optimizer.kinematics.angles import wrapped
 
-# steps of displacement, up to so much [rad], and of gain
-AWAY, FARTHEST, GAINS = 48, 4 * np.pi, 48
-# joints that are looked up: those that make the greatest difference
-JOINTS = 3
+
+@dataclass(frozen=True)
+class SingleJointSettings:
+    """Settings of the table of single-joint bounds."""
+
+    displacements: int = 48
+    """Number of displacements."""
+    farthest: float = 4 * np.pi
+    """Greatest displacement [rad]."""
+    gains: int = 48
+    """Number of gains of potential energy."""
+    joints: int = 3
+    """Number of joints with a table: those with the greatest bounds."""
+
+
+TABLE = SingleJointSettings()
 
 
 @dataclass(frozen=True)
 class Boxes:
-    """Boxes of middles and half sides (n, nq) [rad], and which joints (n, nq) have no other full
-    turns.
+    """Boxes of joint positions.
+
+    Attributes:
+        centre: middle of every box, shape (n, nq) [rad].
+        half: half sides, shape (n, nq) [rad].
+        placed: joints with a definite full turn, shape (n, nq).
     """
 
     centre: Array
@@ -35,30 +51,33 @@ class Boxes:
 
 
 class SingleJointBound:
-    """The bounds for gains of potential energy from `low` to `high` [J]; less than `low` has
-    none."""
+    """Bounds for gains of potential energy from `low` to `high` [J]; below `low` there is no
+    bound.
+    """
 
     def __init__(self, bound: LeastBound, low: float, high: float) -> None:
         nq = bound.prepared.arm.robot.nq
-        self.low, self.step = low, max(high - low, 1e-9) / (GAINS - 1)
-        self.away = FARTHEST / (AWAY - 1)
+        self.low, self.step = low, max(high - low, 1e-9) / (TABLE.gains - 1)
+        self.away = TABLE.farthest / (TABLE.displacements - 1)
         away, gain = np.meshgrid(
-            self.away * np.arange(AWAY), low + self.step * np.arange(GAINS), indexing="ij"
+            self.away * np.arange(TABLE.displacements),
+            low + self.step * np.arange(TABLE.gains),
+            indexing="ij",
         )
         alone = [away.reshape(-1, 1) * (np.arange(nq) == j) for j in range(nq)]
         tables = [bound.of(each, gain.ravel()).reshape(away.shape) for each in alone]
         order = np.argsort([-float(each.sum()) for each in tables])
-        self.tables = {j: tables[j] for j in order[:JOINTS].tolist()}
+        self.tables = {j: tables[j] for j in order[: TABLE.joints].tolist()}
 
     def between(self, start: Boxes, goal: Boxes, gain: Array) -> Array:
-        """Bounds (s, g) [J] on moves from boxes to others, with least gains of potential energy (s,
-        g) [J].
+        """Bounds (s, g) [J] of moves between boxes, with least gains (s, g) [J] of potential
+        energy.
         """
         found, level = (
             np.full(gain.shape, -np.inf),
             np.floor((gain - self.low) / self.step).astype(np.intp),
         )
-        known, level = level >= 0, np.clip(level, 0, GAINS - 1)
+        known, level = level >= 0, np.clip(level, 0, TABLE.gains - 1)
         for j, table in self.tables.items():
             end_if_stopped()
             apart = goal.centre[:, j] - start.centre[:, j][:, None]
@@ -68,6 +87,6 @@ class SingleJointBound:
                 - start.half[:, j][:, None]
                 - goal.half[:, j]
             )
-            row = np.clip(np.floor(apart / self.away), 0, AWAY - 1).astype(np.intp)
+            row = np.clip(np.floor(apart / self.away), 0, TABLE.displacements - 1).astype(np.intp)
             found = np.maximum(found, table[row, level])
         return np.where(known, found, -np.inf)

@@ -1,8 +1,8 @@
-"""The configurations that moves choose one after the other, at stops that leave some freedom.
+"""Configurations chosen move by move, at stops that leave some freedom.
 
-A cycle chooses among orientations and postures that are given; a move by itself looks for its own.
-So the cycle that chooses move by move, and what is saved against it, are what successive calls of
-`optimize` make of it. Their motions are known then.
+A cycle chooses among given orientations and postures, a single move searches its own. The baseline
+of a cycle chosen move by move is therefore built from successive calls of `optimize`, whose motions
+are kept as known motions.
 """
 
 from __future__ import annotations
@@ -19,25 +19,32 @@ from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.run import Run
 
 
-def successively_chosen(asked: Cycle, end: Deadline, clock: Clock) -> Cycle | None:
-    """The cycle whose stops have the joint positions that the moves choose; None if one of them has
-    no motion in its share of the time.
+def successively_chosen(cycle: Cycle, end: Deadline, clock: Clock) -> Cycle | None:
+    """The cycle with the joint positions chosen by successive moves as targets.
 
-    It is for cycles in their own time and order, with moves from stop to stop alone.
+    Only for cycles in their own time and order, with moves from stop to stop alone.
+
+    Args:
+        cycle: the cycle.
+        end: deadline of all moves.
+        clock: function that returns the time [s].
+
+    Returns:
+        The cycle; None if a move has no motion in its share of the time.
     """
-    start, stops = asked.start, list[Stop]()
-    for k, (stop, move) in enumerate(zip(asked.stops, asked.moves, strict=False)):
+    start, stops = cycle.start, list[Stop]()
+    for k, (stop, move) in enumerate(zip(cycle.stops, cycle.moves, strict=False)):
         if end.passed:
             return None
-        left, share = end.left, end.left / (len(asked.stops) - k)
+        left, share = end.left, end.left / (len(cycle.stops) - k)
         problem = Problem(
             arm=move.arm,
             start=start,
             goal=stop.target,
             branch=stop.branch,
-            method=asked.method,
-            windings=asked.windings,
-            sample_period=asked.sample_period,
+            method=cycle.method,
+            windings=cycle.windings,
+            sample_period=cycle.sample_period,
             deadline=share,
         )
         try:
@@ -45,12 +52,12 @@ def successively_chosen(asked: Cycle, end: Deadline, clock: Clock) -> Cycle | No
         except JoulepathError:
             return None
         if k == 0:
-            asked = replace(asked, start=found.start.q)
+            cycle = replace(cycle, start=found.start.q)
         start = found.goal.q
         if end.left > left - share / 2:
-            # more time would not make it better
-            own, motions = problem_of(asked, move, found.start.q, start, share), known_motions()
+            # not limited by the deadline: more time would not improve the motion
+            own, motions = problem_of(cycle, move, found.start.q, start, share), known_motions()
             motion = KnownMotion(found.trajectory.spline, found.solver.stationarity)
             motions.keep(motions.key("finished", own, []), motion)
         stops.append(replace(stop, target=start))
-    return replace(asked, stops=stops)
+    return replace(cycle, stops=stops)

@@ -1,97 +1,117 @@
-"""A cycle in a given time: the best chain at the price of time, its time shared, and a bound by the
-price.
+"""Search for the cycle of least energy in a given time.
 
-For any price λ of time, a cycle of duration D needs at least min Σ (E + λ T) - λ (D - dwells), the
-minimum over all chains and durations: so says Lagrangian duality. A wait is one more part of it, of
-power P: λ is not below -P then. At the price that shares the time exactly, the least chain is the
-best cycle of all.
+At the price of time at which the allocation of a chain is exact, the least chain is the best cycle
+of all (Lagrangian duality, see `timed_bound`). Chains are therefore tried one after another: the
+next one is the least chain at the price of the present one.
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from operator import attrgetter
 
 import numpy as np
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.errors import CycleTooShort, NoSequence
+from joulepath.optimizer.cycle.lazy_search import Pair
 from joulepath.optimizer.cycle.priced_search import (
-    MoveOfALeg,
     PricedMotion,
+    PricedPair,
     PricedSearch,
     fastest_motion,
 )
-from joulepath.optimizer.cycle.rests import holding_powers, long_wait_powers, rest_energy
-from joulepath.optimizer.cycle.time_sharing import PRICES, Shared, TimeSharing, duration_of
+from joulepath.optimizer.cycle.rest_energy import holding_powers, long_wait_powers, rest_energy
+from joulepath.optimizer.cycle.time_allocation import (
+    ALLOCATION,
+    Allocation,
+    TimeAllocation,
+    total_duration,
+)
+from joulepath.optimizer.cycle.timed_bound import TimedBound
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-
-# chains that are tried, each better than the one before at the price of time that shares this one's
-MOST_CHAINS = 5
-# relative: a chain is better only by more
-BETTER = 1e-4
-
-# leg, start node and goal node of a move
-Pair = tuple[int, int, int]
-_duration = attrgetter("duration")
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
-class Timed:
-    """A chain whose time is shared. It waits after move `at`, which draws `wait_energy` [J] beside
-    the dwell there.
+class TimedSearchSettings:
+    """Settings of the search for a cycle in a given time."""
 
-    The objective of the cycle is `energy` [J], nearly. However the time is shared, this chain needs
-    `least` [J] or more: see `Shared`.
+    most_chains: int = 5
+    """Most chains tried."""
+    improvement: float = 1e-4
+    """Relative improvement above which a chain is better."""
+
+
+TIMED_SEARCH = TimedSearchSettings()
+
+
+@dataclass(frozen=True)
+class TimedChain:
+    """A chain with its time allocated to moves and a wait.
+
+    Attributes:
+        nodes: nodes of the chain.
+        allocation: durations of its moves.
+        wait_after: number of the move before the wait.
+        wait_energy: energy of the wait beside the dwell there [J].
+        energy: objective of the cycle, nearly [J].
+        least: lower bound of the objective of this chain in this time [J]; see `Allocation`.
     """
 
     nodes: list[int]
-    shared: Shared
-    at: int
+    allocation: Allocation
+    wait_after: int
     wait_energy: float
     energy: float
     least: float = -np.inf
 
 
 class TimedSearch:
-    """The search for the cycle of least energy in a time [s], from the `search` of the cycle in its
-    own time.
+    """Search for the cycle of least energy in a given time.
 
-    `exact`: no other chain can be better, as far as the price tells. `sought` are the kinds of each
-    leg for which a motion was sought at some price.
+    `exact`: no other chain can be better, as far as the price of time tells. `sought` are the kinds
+    of every leg with an attempted motion at some price.
+
+    Args:
+        search: search of the cycle in its own time.
+        duration: duration of the cycle with dwells [s].
     """
 
     def __init__(self, search: CycleSearch, duration: float) -> None:
-        self.search, self.asked, self.legs = search, search.asked, search.legs
-        self.time = duration - self.asked.dwelling
-        self.longest = min(max(self.time, LEAST_DURATION), LONGEST_DURATION)
-        # of the routes through passes, only those found in the cycle's own time are followed
-        self.exact = not self.asked.passes
-        # moves after which it may wait
-        self.places = [
-            k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)
+        self.search, self.cycle, self.legs = search, search.cycle, search.legs
+        self.time = duration - self.cycle.dwell_time
+        self.longest = min(max(self.time, DURATIONS.least), DURATIONS.longest)
+        # only the routes through passes found in the cycle's own time are followed
+        self.exact = not self.cycle.has_passes
+        # moves before a possible wait
+        self._before_wait = [
+            k for k, move in enumerate(self.cycle.moves) if self.cycle.may_wait_after(move)
         ]
         self.sought = [set[int]() for _ in self.legs]
+        self._fast: PricedSearch | None = None
         self._fastest: dict[Pair, PricedMotion | None] = {}
         self._motions: dict[Pair, list[PricedMotion]] = {}
 
-    def run(self, nodes: list[int] | None) -> Timed:
-        """The best cycle found from that of a chain on, whose motions are known, or from the
-        fastest one.
+    def run(self, nodes: list[int] | None) -> TimedChain:
+        """The best cycle found.
 
-        Raises CycleTooShort, NoTrajectory or DeadlineExceeded.
+        Args:
+            nodes: chain with known motions to start from; None for the fastest chain.
+
+        Raises:
+            CycleTooShort: the fastest cycle found takes longer.
+            NoTrajectory: a move has no motion.
+            DeadlineExceeded: the time is up.
         """
-        best = self._of_the_own(nodes) if nodes is not None else None
+        best = self._from_own_motions(nodes) if nodes is not None else None
         if best is None:
-            best = self._of_the_fastest()
+            best = self._from_fastest()
         with suppress(DeadlineExceeded, NoSequence):
-            for _ in range(MOST_CHAINS):
-                priced = self._priced(best.shared.price, self.longest)
+            for _ in range(TIMED_SEARCH.most_chains):
+                priced = self._priced(best.allocation.price, self.longest)
                 chain = self._explored(priced)
                 unsure = (
                     priced.cut_short
@@ -101,69 +121,65 @@ class TimedSearch:
                 self.exact &= not unsure
                 if chain == best.nodes:
                     return best
-                other = self._of(chain)
-                if other is None or other.energy > best.energy * (1 - BETTER):
+                other = self._allocated(chain)
+                if other is None or other.energy > best.energy * (1 - TIMED_SEARCH.improvement):
                     # another chain is as good at this price, and worse in this time
                     break
                 best = other
         self.exact = False
         return best
 
-    def _of_the_own(self, nodes: list[int]) -> Timed | None:
-        """A chain whose motions are known, with its time shared; as they are, if that is not done
-        in time.
-        """
-        if self.search.search_end.passed and (known := self.as_it_is(nodes)) is not None:
+    def _from_own_motions(self, nodes: list[int]) -> TimedChain | None:
+        """A chain with its time allocated, or with its known motions if there is no time for it."""
+        if self.search.search_end.passed and (known := self.with_known_motions(nodes)) is not None:
             return known
         try:
-            found = self._of(nodes)
+            found = self._allocated(nodes)
         except DeadlineExceeded:
             found = None
-        return self.as_it_is(nodes) if found is None else found
+        return self.with_known_motions(nodes) if found is None else found
 
-    def as_it_is(self, nodes: list[int]) -> Timed | None:
-        """The motions of a chain as they are known, the time left over waited out; None if they
-        take too long.
-        """
-        found = [self.search.solutions[each] for each in self.search.pairs(nodes)]
-        lengths, needed = (
-            [each.duration for each in found],
-            sum(each.energy.of(self.asked.objective) for each in found),
-        )
-        waited = self.time - sum(lengths)
+    def with_known_motions(self, nodes: list[int]) -> TimedChain | None:
+        """A chain with its known motions and a wait; None if the motions take too long."""
+        found = [self.search.solutions[pair] for pair in self.search.pairs(nodes)]
+        durations = [solution.duration for solution in found]
+        moving = sum(solution.energy.of(self.cycle.objective) for solution in found)
+        waited = self.time - sum(durations)
         if waited < 0 or not self._rests_count:
             return None
         self.exact = False
-        at, wait = self.cheapest_wait(nodes, waited)
-        price = -self.waiting_power(nodes, at)
-        energy = needed + wait + self.search.dwells(nodes)
-        return Timed(nodes, Shared(price, lengths, needed, waited), at, wait, energy)
+        wait_after, wait = self.cheapest_wait(nodes, waited)
+        price = -self.waiting_power(nodes, wait_after)
+        energy = moving + wait + self.search.dwells(nodes)
+        allocation = Allocation(price, durations, moving, waited)
+        return TimedChain(nodes, allocation, wait_after, wait, energy)
 
-    @cached_property
+    @property
     def _fast_search(self) -> PricedSearch:
-        """The search at a price at which motions are nearly as fast as they can be."""
-        return self._priced(PRICES[-1], LONGEST_DURATION)
+        """Search at a price at which motions are nearly as fast as possible."""
+        if self._fast is None:
+            self._fast = self._priced(ALLOCATION.prices[-1], DURATIONS.longest)
+        return self._fast
 
     def _priced(self, price: float, longest: float) -> PricedSearch:
-        return PricedSearch(self.legs, self.asked.closed, price, longest, self.search.search_end)
+        return PricedSearch(self.legs, self.cycle.closed, price, longest, self.search.search_end)
 
     def _explored(self, priced: PricedSearch) -> list[int]:
+        """Nodes of the least chain at a price; its motions are kept."""
         chain = priced.explore()
         for sought, leg in zip(self.sought, priced.legs, strict=True):
             sought.update(leg.solved)
-        for each in self.search.pairs(chain):
-            found, known = priced.motions.get(each), self.in_hand(each)
+        for pair in self.search.pairs(chain):
+            found, known = priced.motions.get(pair), self.motions_of(pair)
             if found is not None and all(found is not motion for motion in known):
                 known.append(found)
         return chain
 
-    def in_hand(self, pair: Pair) -> list[PricedMotion]:
-        """The motions of a pair that are known, of any duration; what is found later is put to
-        them.
-        """
+    def motions_of(self, pair: Pair) -> list[PricedMotion]:
+        """Known motions of a pair, of any duration; motions found later are appended."""
         if pair not in self._motions:
             own = self.search.solutions.get(pair)
-            objective = self.asked.objective
+            objective = self.cycle.objective
             self._motions[pair] = (
                 []
                 if own is None
@@ -171,17 +187,23 @@ class TimedSearch:
             )
         return self._motions[pair]
 
-    def _of_the_fastest(self) -> Timed:
-        """The chain that is nearly the fastest, with its time shared. Raises CycleTooShort or
-        NoTrajectory.
+    def _from_fastest(self) -> TimedChain:
+        """The nearly fastest chain, with its time allocated.
+
+        Raises:
+            CycleTooShort: the fastest cycle found takes longer.
+            NoTrajectory: a move has no motion.
+            DeadlineExceeded: the time is up.
         """
         priced = self._fast_search
         chain = self._explored(priced)
         fast = self.fastest(chain)
-        if fast is None or duration_of(fast) > self.time:
-            # the motions by which the chain was found may be far slower than the fastest ones
+        if fast is None or total_duration(fast) > self.time:
+            # the motions of the search may be far slower than the fastest ones
             other = self.fastest_cycle()
-            if other is not None and (fast is None or duration_of(other[1]) < duration_of(fast)):
+            if other is not None and (
+                fast is None or total_duration(other[1]) < total_duration(fast)
+            ):
                 chain, fast = other
         if fast is None:
             raise (
@@ -189,27 +211,29 @@ class TimedSearch:
                 if priced.cut_short or self.search.search_end.passed
                 else NoTrajectory([])
             )
-        if duration_of(fast) > self.time:
+        if total_duration(fast) > self.time:
             if priced.cut_short:
                 raise DeadlineExceeded([])
-            raise CycleTooShort(duration_of(fast) + self.asked.dwelling, self.asked.dwelling)
-        found = self._of(chain)
+            raise CycleTooShort(total_duration(fast) + self.cycle.dwell_time, self.cycle.dwell_time)
+        found = self._allocated(chain)
         if found is None:
             raise NoTrajectory([])
         return found
 
     def fastest_cycle(self) -> tuple[list[int], list[PricedMotion]] | None:
-        """The chain that is nearly the fastest of all, and its moves as fast as they can be; None
-        if it is not found.
+        """The nearly fastest chain of all, with its fastest motions.
 
-        It is that by bounds; where one of its moves has no motion, as among obstacles, that of a
-        search.
+        The chain is found by bounds, or by a search if one of its moves has no motion.
+
+        Returns:
+            The nodes and motions; None if no chain is found.
         """
-        if self.search.search_end.passed and "_fast_search" not in vars(self):
-            # its bounds alone take the time that cycles in hand need for their certificates
+        if self.search.search_end.passed and self._fast is None:
+            # its bounds alone take the time that the certificates of known cycles need
             return None
         with suppress(DeadlineExceeded, NoSequence):
-            for find in (self._fast_search.least, partial(self._explored, self._fast_search)):
+            fast_search = self._fast_search
+            for find in (fast_search.least_nodes, partial(self._explored, fast_search)):
                 nodes = find()
                 fast = self.fastest(nodes) if nodes else None
                 if fast is not None:
@@ -217,126 +241,76 @@ class TimedSearch:
         return None
 
     def fastest(self, nodes: list[int]) -> list[PricedMotion] | None:
-        """The moves of a chain as fast as they can be, each no slower than any motion of it that is
-        known.
-
-        None if some are not found.
-        """
+        """Fastest motions of a chain, no slower than known motions; None if some are not found."""
         found = list[PricedMotion]()
-        for each in self.search.pairs(nodes):
-            if each not in self._fastest:
-                self._fastest[each] = self._fastest_of(each)
-            motion = self._fastest[each]
+        for pair in self.search.pairs(nodes):
+            if pair not in self._fastest:
+                self._fastest[pair] = self._fastest_of(pair)
+            motion = self._fastest[pair]
             if motion is None:
                 return None
             found.append(motion)
         return found
 
     def _fastest_of(self, pair: Pair) -> PricedMotion | None:
-        """The motion of a pair of least duration."""
-        known = self.in_hand(pair)
-        splines = [each.spline for each in known]
+        known = self.motions_of(pair)
+        splines = [motion.spline for motion in known]
         found = fastest_motion(self.legs[pair[0]], *pair[1:], self.search.search_end, splines)
-        return min([*known, *([] if found is None else [found])], key=_duration, default=None)
+        motions = [*known, *([] if found is None else [found])]
+        return min(motions, key=attrgetter("duration"), default=None)
 
-    def _of(self, nodes: list[int]) -> Timed | None:
-        """A chain with its time shared; None if no motions that fast are found."""
+    def _allocated(self, nodes: list[int]) -> TimedChain | None:
+        """A chain with its time allocated; None if no motions that fast are found."""
         fast = self.fastest(nodes)
-        if fast is None or duration_of(fast) > self.time:
+        if fast is None or total_duration(fast) > self.time:
             return None
-        beside = (self.longest, self.search.search_end)
-        sharing = TimeSharing(
+        limits = (self.longest, self.search.search_end)
+        moves = TimeAllocation(
             [
-                MoveOfALeg(self.legs[k], s, g, *beside, self.in_hand((k, s, g)))
+                PricedPair(self.legs[k], s, g, *limits, self.motions_of((k, s, g)))
                 for k, s, g in self.search.pairs(nodes)
             ]
         )
         try:
             if self._rests_count:
-                waiting = min(self.waiting_power(nodes, k) for k in self.places)
-                shared = sharing.fill(self.time, waiting, fast)
+                waiting = min(self.waiting_power(nodes, k) for k in self._before_wait)
+                allocation = moves.allocate(self.time, waiting, fast)
             else:
-                shared = sharing.fill_for_work(self.time, fast)
+                allocation = moves.allocate_for_work(self.time, fast)
         except NoTrajectory:
             return None
-        at, wait = self.cheapest_wait(nodes, shared.waited)
-        dwelling, waiting = self.search.dwells(nodes), wait if self._rests_count else 0.0
-        return Timed(
-            nodes, shared, at, wait, shared.energy + dwelling + waiting, shared.least + dwelling
-        )
+        wait_after, wait = self.cheapest_wait(nodes, allocation.waited)
+        dwells, waiting = self.search.dwells(nodes), wait if self._rests_count else 0.0
+        energy = allocation.energy + dwells + waiting
+        return TimedChain(nodes, allocation, wait_after, wait, energy, allocation.least + dwells)
 
     @property
     def _rests_count(self) -> bool:
-        """Whether what the arm draws at rest is in the objective."""
-        return self.asked.objective == "electrical"
+        """Whether the energy at rest is part of the objective."""
+        return self.cycle.objective == "electrical"
 
     def cheapest_wait(self, nodes: list[int], waited: float) -> tuple[int, float]:
-        """The move after which a wait [s] draws least, and its energy [J] beside the dwell
-        there."""
-        energies = {k: self._wait_energy(nodes, k, waited) for k in self.places}
-        at = min(energies, key=energies.__getitem__)
-        return at, energies[at]
+        """Move before the cheapest wait, and energy [J] of this wait beside the dwell there."""
+        energies = {k: self._wait_energy(nodes, k, waited) for k in self._before_wait}
+        wait_after = min(energies, key=energies.__getitem__)
+        return wait_after, energies[wait_after]
 
     def _wait_energy(self, nodes: list[int], move: int, waited: float) -> float:
         """Energy [J] of a wait beside the dwell after a move."""
         if waited <= 0:
             return 0.0
-        node, leg, planned = nodes[move + 1], self.legs[move], self.asked.moves[move]
+        node, leg, planned = nodes[move + 1], self.legs[move], self.cycle.moves[move]
         hold = float(holding_powers(planned, leg.goal)[node])
-        dwell = rest_energy(self.asked, planned, planned.dwell, hold)
-        return rest_energy(self.asked, planned, planned.dwell + waited, hold) - dwell
+        dwell = rest_energy(self.cycle, planned, planned.dwell, hold)
+        return rest_energy(self.cycle, planned, planned.dwell + waited, hold) - dwell
 
     def waiting_power(self, nodes: list[int], move: int) -> float:
-        """What every further second of a long wait after a move adds to the objective [W]."""
-        return float(self._powers(move)[nodes[move + 1]]) if self._rests_count else 0.0
-
-    def _powers(self, move: int) -> Array:
-        return long_wait_powers(self.asked, self.asked.moves[move], self.legs[move].goal)
-
-    def bound(self, price: float, ours: float) -> float:
-        """Lower bound [J] on all rounds in the time that is asked for, by a price [W] of time: not
-        above what we found, `ours` [J].
-
-        At a price below 0 it holds for every longer time, too, and above 0 for every shorter one.
-        -inf where some configurations are not known.
-        """
-        if not all(leg.closed for leg in self.legs):
-            return -np.inf
-        price = max(price, -self._least_waiting())
-        longest = self._longest_below(ours)
-        return min(self._least(price, longest) - price * self.time, ours)
-
-    def _least_waiting(self) -> float:
-        """What a second of waiting adds to the objective at least [W]: neither on motors nor on
-        brakes may a wait gain by the price of time."""
+        """Increase of the objective by a further second of a long wait after a move [W]."""
         if not self._rests_count:
             return 0.0
-        return min(
-            float(power.min())
-            for move, leg in zip(self.asked.moves, self.legs, strict=True)
-            for power in (
-                holding_powers(move, leg.goal),
-                long_wait_powers(self.asked, move, leg.goal),
-            )
-        )
+        goal = self.legs[move].goal
+        return float(long_wait_powers(self.cycle, self.cycle.moves[move], goal)[nodes[move + 1]])
 
-    def _longest_below(self, ours: float) -> float:
-        """Longest duration [s] of a move in any cycle that needs less than `ours` [J] and takes no
-        longer than asked.
-
-        Every second draws at least what the electronics do: a cycle with a move of duration T needs
-        base · T more than the least chain of Σ (E - base · T).
-        """
-        longest = self.asked.longest_move
-        base = self.asked.arm.base_power if self._rests_count else 0.0
-        if longest <= self.longest or base <= 0:
-            return longest
-        beside = self._least(-base, longest)
-        return float(np.clip((ours - beside) / base, LEAST_DURATION, longest))
-
-    def _least(self, price: float, longest: float) -> float:
-        """Least sum [J] of bounds on energy + price · duration of a chain's moves, each of at most
-        `longest` [s].
-        """
-        costs = [leg.priced(price, longest).least_costs for leg in self.legs]
-        return LeastChain(costs, self.asked.closed).find()[0]
+    def bound(self, price: float, known: float) -> float:
+        """Lower bound [J] of all cycles in this time; see `TimedBound.at`."""
+        return TimedBound(self.cycle, self.legs, self.time, self.longest).at(price, known)

@@ -1,1 +1,1 @@
-"""Given motions: their energy, and the limits that they violate."""
+"""Evaluation of given motions: their energy, and their use of the limits."""

@@ -3,8 +3,7 @@ motion.
 
 At a velocity step, acceleration, torque and power are infinite, and no model gives the power drawn.
 Energy is therefore summed over the open intervals between the steps. `kinetic` is the change of
-kinetic energy within these intervals, so that the parts add up to the total as they do for a smooth
-motion.
+kinetic energy within these intervals, so the parts add up to the total as for a smooth motion.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from joulepath.optimizer.dynamics.interval import arm_spread, with_interval
 from joulepath.optimizer.dynamics.losses import breakdown, power_flow
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.dynamics.sensitivity import energy_sensitivity
-from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy, joined
+from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy, join_intervals
 from joulepath.optimizer.evaluate.limit_report import LimitMonitor, LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import ClearanceMonitor, LeastClearance
 from joulepath.optimizer.evaluate.piecewise_motion import (
@@ -32,7 +31,7 @@ from joulepath.optimizer.evaluate.piecewise_motion import (
     PiecewiseMotion,
     piecewise_motion,
 )
-from joulepath.optimizer.evaluate.recording import BLOCK
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.evaluate.sampler import Sampler
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.linear_algebra import one_thread
@@ -43,23 +42,32 @@ from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.result.energy import Energy, Sensitivity
 from joulepath.optimizer.result.solution import Samples, Solution
 
-# quadrature panels: their greatest length [s], unless a polynomial piece would have more than
-# MOST_PANELS of them
-LONGEST_PANEL, MOST_PANELS = 0.2, 256
-MOST_SEGMENTS = 10_000
-"""Most segments of a motion that are listed one by one."""
-# segments between two looks at the deadline: some ten milliseconds
-SEGMENTS_PER_CHECK = 64
+
+@dataclass(frozen=True)
+class QuadratureSettings:
+    """Settings of the quadrature of powers."""
+
+    max_panel: float = 0.2
+    """Largest length of a quadrature panel [s]."""
+    max_panels: int = 256
+    """Largest number of panels of a polynomial piece, which takes precedence over their length."""
+    segments_per_check: int = 64
+    """Segments between two checks of the deadline: some ten milliseconds."""
+
+
+QUADRATURE = QuadratureSettings()
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Energy and limits of a given motion. `segments` is empty if `segment_count` exceeds
-    MOST_SEGMENTS.
+    """Energy of a given motion, and its use of the limits.
 
-    `speed_jumps` counts the velocity steps inside the motion. `nearest` has the margins subtracted;
-    it is None if collisions are not checked. `close_pass` has none subtracted; it is None unless it
-    is below 2 mm. `unmodelled` is that of a `Solution`.
+    Attributes:
+        segments: energy of each segment; empty if there are more than are listed.
+        speed_jumps: number of velocity steps inside the motion.
+        nearest: least clearance with margins subtracted; None if collisions are not checked.
+        close_pass: least distance without margins; None unless it is below 2 mm.
+        unmodelled: as of a `Solution`.
     """
 
     total: IntervalEnergy
@@ -81,21 +89,21 @@ def evaluate(
     deadline: float = np.inf,
     clock: Clock = time.perf_counter,
 ) -> Evaluation:
-    """Compute the energy of a given motion, and how far it uses every limit of the arm.
+    """Compute the energy of a given motion, and its use of every limit of the arm.
 
-    Nothing is optimised, and the motion may violate the limits. It is processed in blocks of some
-    two thousand polynomial pieces, so that memory does not grow with its length.
+    Nothing is optimised, and the motion may exceed the limits. It is processed in blocks of some
+    two thousand polynomial pieces, so memory does not grow with its length.
 
     Args:
-        arm: arm that makes the motion. It may be another one than a solution was found for.
+        arm: arm of the motion; it may differ from the arm that a solution was found for.
         motion: joint positions with times, a recording, a spline, or the motion of a solution
             (without the time that the arm waits after it).
-        sample_period: period of the samples in the result [s]; without one there are no samples.
+        sample_period: period of the samples in the result [s]; None for no samples.
         deadline: wall time after which the computation is given up [s].
-        clock: function that returns the time [s].
+        clock: function for the current time [s].
 
     Returns:
-        Energy of the whole motion and of each segment [J], the worst use of each limit, and the
+        Energy of the whole motion and of each segment [J], the largest use of each limit, and the
         least clearance.
 
     Raises:
@@ -118,12 +126,13 @@ def evaluate(
 
 @dataclass(frozen=True)
 class _Nodes:
-    """Quadrature nodes (k,) of a block in order of time. The first and the last node of each piece
-    are its ends.
+    """Quadrature nodes (k,) of a block in order of time, among them the ends of each piece.
 
-    `piece` (k,) is the index of the polynomial piece, t and `weights` (k,) are in seconds; q, v, a,
-    jerk, tau (k, nq) describe the motion there, with tau [N·m] the torque of rigid bodies and
-    rotors.
+    Attributes:
+        piece: index of the polynomial piece (k,).
+        t: time (k,) [s].
+        weights: weights of the quadrature (k,) [s].
+        tau: torque of rigid bodies and rotors (k, nq) [N·m].
     """
 
     piece: Indices
@@ -139,10 +148,10 @@ class _Nodes:
     def of(plant: Plant, motion: PiecewiseMotion) -> _Nodes:
         lengths = np.diff(motion.breakpoints)
         # more panels per piece if there are few pieces
-        least = max(BLOCK // len(lengths), 1)
-        panels = np.clip(np.ceil(lengths / LONGEST_PANEL), least, max(MOST_PANELS, least)).astype(
-            np.int64
-        )
+        least = max(MOTION_LIMITS.block_rows // len(lengths), 1)
+        panels = np.clip(
+            np.ceil(lengths / QUADRATURE.max_panel), least, max(QUADRATURE.max_panels, least)
+        ).astype(np.int64)
         piece, offset, weights = lobatto_panels(motion.breakpoints, panels)
         q, v, a, jerk = motion.at(piece, offset)
         tau = plant.torques(q, v, a)
@@ -150,7 +159,7 @@ class _Nodes:
 
 
 class _Evaluator:
-    """Sums of a motion that is processed block after block."""
+    """Sums over the blocks of a motion."""
 
     def __init__(self, arm: Arm, motion: Motion, period: float | None) -> None:
         self._arm, self._plant = arm, Plant(arm)
@@ -163,6 +172,7 @@ class _Evaluator:
         self._speed_jumps = 0
         self._spread = arm_spread(arm)
         self._sensitivity = Sensitivity(np.zeros_like(self._spread.mean), 0.0)
+        self._sensitivities: dict[int, Sensitivity] = {}
         self._charge = arm.bus.initial
         self._last: PiecewiseMotion | None = None
 
@@ -174,23 +184,27 @@ class _Evaluator:
             self._clearance.update(block)
         steps = self._limits.update_breakpoints(block, self._last)
         self._speed_jumps += len(steps)
-        charge = self._charge_course(nodes)
+        charge = self._charge_at_nodes(nodes)
         if self._sampler is not None:
             known = np.append(0.0, nodes.weights.cumsum()) + block.breakpoints[0]
             self._sampler.update(block, lambda t: np.interp(t, known, charge))
         self._add_energies(block, nodes, steps, charge)
-        charged = self._charged(float(charge[0]))
-        parts = nodes.weights, nodes.q, nodes.v, nodes.a, nodes.tau
-        self._sensitivity += energy_sensitivity(*parts, charged, self._spread)
+        if self._segment_count > MOTION_LIMITS.max_intervals:
+            self._sensitivity += self._sensitivity_of(nodes, slice(None), float(charge[0]))
         self._last = block
 
     def finish(self) -> Evaluation:
         """The evaluation of all blocks."""
         assert self._last is not None  # motions without a block are refused
         segments = [self._intervals[k] for k in sorted(self._intervals)]
+        total = self._with_interval(join_intervals(segments), self._sensitivity)
+        segments = [
+            self._with_interval(segment, self._sensitivities[k]) if self._sensitivities else segment
+            for k, segment in zip(sorted(self._intervals), segments, strict=True)
+        ]
         return Evaluation(
-            total=self._total(segments),
-            segments=segments if self._segment_count <= MOST_SEGMENTS else [],
+            total=total,
+            segments=segments if self._segment_count <= MOTION_LIMITS.max_segments else [],
             segment_count=self._segment_count,
             speed_jumps=self._speed_jumps,
             limits=self._limits.report(),
@@ -202,14 +216,21 @@ class _Evaluator:
             unmodelled=[] if self._clearance is None else self._clearance.unmodelled,
         )
 
-    def _total(self, segments: list[IntervalEnergy]) -> IntervalEnergy:
-        """The whole motion, with the interval of its energy."""
-        total = joined(segments)
-        return replace(
-            total, energy=with_interval(total.energy, self._sensitivity, total.duration, self._arm)
+    def _with_interval(self, part: IntervalEnergy, sensitivity: Sensitivity) -> IntervalEnergy:
+        """A part of the motion with the interval of its energy."""
+        energy = with_interval(part.energy, sensitivity, part.duration, self._arm)
+        return replace(part, energy=energy)
+
+    def _sensitivity_of(self, nodes: _Nodes, inside: slice, charge: float) -> Sensitivity:
+        """Sensitivity of the energy of some nodes, with the initial charge [J] of a storage."""
+        weights, q, v, a, tau = (
+            part[inside] for part in (nodes.weights, nodes.q, nodes.v, nodes.a, nodes.tau)
+        )
+        return energy_sensitivity(
+            weights, q, v, a, tau, self._arm_with_charge(charge), self._spread
         )
 
-    def _charge_course(self, nodes: _Nodes) -> Array:
+    def _charge_at_nodes(self, nodes: _Nodes) -> Array:
         """Charge (k + 1,) [J] of the energy storage before each node and after the last."""
         joints = power_flow(
             nodes.tau, nodes.v, nodes.a, self._arm.drives, self._arm.friction_law
@@ -222,17 +243,24 @@ class _Evaluator:
     def _add_energies(
         self, block: PiecewiseMotion, nodes: _Nodes, steps: Indices, charge: Array
     ) -> None:
-        """Add the energy of each segment in a block; `steps` are the pieces that begin with a
-        velocity step.
+        """Add the energies of the segments of a block.
+
+        Args:
+            block: the block.
+            nodes: its quadrature nodes.
+            steps: pieces with a velocity step at their start.
+            charge: charge of the energy storage at the nodes [J].
         """
         # the first node of every piece, and the end
         first = np.searchsorted(nodes.piece, np.arange(len(block.segment) + 1))
         segment = (
-            block.segment if self._segment_count <= MOST_SEGMENTS else np.zeros_like(block.segment)
+            block.segment
+            if self._segment_count <= MOTION_LIMITS.max_segments
+            else np.zeros_like(block.segment)
         )
         edges = np.append(np.flatnonzero(np.diff(segment, prepend=-1)), len(segment))
         for k, (low, high) in enumerate(pairwise(edges.tolist()), 1):
-            if k % SEGMENTS_PER_CHECK == 0:
+            if k % QUADRATURE.segments_per_check == 0:
                 checkpoint()
             inside = first[steps[(steps > low) & (steps < high)]]
             energy = self._energy(
@@ -245,14 +273,26 @@ class _Evaluator:
             part = IntervalEnergy(
                 float(block.breakpoints[low]), float(block.breakpoints[high]), energy, *kinetic
             )
+            if self._segment_count <= MOTION_LIMITS.max_intervals:
+                nodes_inside = slice(int(first[low]), int(first[high]))
+                own = self._sensitivity_of(nodes, nodes_inside, float(charge[first[low]]))
+                known = self._sensitivities.get(int(segment[low]))
+                self._sensitivities[int(segment[low])] = own if known is None else known + own
+                self._sensitivity += own
             before = self._intervals.get(int(segment[low]))
-            self._intervals[int(segment[low])] = part if before is None else joined([before, part])
+            self._intervals[int(segment[low])] = (
+                part if before is None else join_intervals([before, part])
+            )
 
     def _energy(self, nodes: _Nodes, begin: int, end: int, steps: Indices, charge: float) -> Energy:
-        """Energy from node `begin` to before node `end`; `steps` are the nodes in between just
-        after a velocity step.
+        """Energy from node `begin` to before node `end`.
 
-        `charge` [J] is that of the energy storage at the beginning.
+        Args:
+            nodes: the quadrature nodes.
+            begin: first node.
+            end: node behind the last one.
+            steps: nodes in between that follow a velocity step.
+            charge: charge of the energy storage at the beginning [J].
         """
         plant, inside, last = self._plant, slice(begin, end), end - 1
         at_steps = sum(
@@ -264,7 +304,7 @@ class _Evaluator:
             nodes.a[inside],
             nodes.tau[inside],
             plant.potential(nodes.q[last]) - plant.potential(nodes.q[begin]),
-            self._charged(charge),
+            self._arm_with_charge(charge),
             kinetic=self._kinetic(nodes, last) - self._kinetic(nodes, begin) - at_steps,
         )
 
@@ -274,7 +314,7 @@ class _Evaluator:
             pin.computeKineticEnergy(self._plant.model, self._data, nodes.q[k], nodes.v[k])
         )
 
-    def _charged(self, charge: float) -> Arm:
+    def _arm_with_charge(self, charge: float) -> Arm:
         """The arm with a charge [J] of its energy storage, if it has one."""
         bus = self._arm.bus
         return (

@@ -1,4 +1,4 @@
-"""Energy of an interval of a given motion, and the sum over consecutive intervals."""
+"""Energy of an interval of a given motion, and sums over consecutive intervals."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class IntervalEnergy:
         return self.end - self.start
 
 
-def joined(parts: Sequence[IntervalEnergy]) -> IntervalEnergy:
-    """Consecutive intervals as one."""
+def join_intervals(parts: Sequence[IntervalEnergy]) -> IntervalEnergy:
+    """Energy of consecutive intervals together."""
     first, last = parts[0], parts[-1]
     duration = last.end - first.start
     energies = [part.energy for part in parts]
@@ -73,9 +73,8 @@ def _storage_use(uses: Sequence[StorageUse]) -> StorageUse | None:
 
 
 def _sum(one: Sum, other: Sum) -> Sum:
-    """Sum of two numbers or arrays, or of two dataclasses of them, field by field; None plus None
-    is None.
-    """
+    """Sum of two numbers or arrays, or of two dataclasses field by field; None plus None is
+    None."""
     if one is None:
         return one
     if is_dataclass(one) and not isinstance(one, type):

@@ -1,4 +1,5 @@
-"""The limits of a given motion: for each, the instant with the largest ratio value / limit."""
+"""Use of the limits by a given motion: for each limit, the instant with the largest value /
+limit."""
 
 from __future__ import annotations
 
@@ -26,9 +27,18 @@ LimitName = Literal[
     "elbow_speed",
 ]
 
-# a step where pieces meet, as a fraction of the limit: far above rounding, and too small to matter
-# to an arm
-SPEED_STEP, ACCELERATION_STEP = 1e-6, 1e-4
+
+@dataclass(frozen=True)
+class StepSettings:
+    """Sizes of steps between two pieces, over the limit: above rounding errors, and harmless."""
+
+    speed: float = 1e-6
+    """Velocity step over the limit of the velocity [1]."""
+    acceleration: float = 1e-4
+    """Acceleration step over the limit of the acceleration [1]."""
+
+
+STEPS = StepSettings()
 
 
 @dataclass(frozen=True)
@@ -58,7 +68,7 @@ class LimitReport:
 
 
 class LimitMonitor:
-    """Updates the worst ratio of every limit of an arm, block after block."""
+    """Largest ratio of value to limit for every limit of an arm, updated block after block."""
 
     def __init__(self, arm: Arm) -> None:
         self._limits, self._joints, self._arm = arm.active_limits, arm.robot.joint_names, arm
@@ -75,11 +85,18 @@ class LimitMonitor:
         }
 
     def update(self, t: Array, q: Array, v: Array, a: Array, jerk: Array, tau: Array) -> None:
-        """Add samples at times t (k,) [s]; the others are (k, nq), tau [N·m] is rigid body and
-        rotor torque.
+        """Add samples of a motion.
+
+        Args:
+            t: times (k,) [s].
+            q: positions (k, nq) [rad].
+            v: velocities (k, nq) [rad/s].
+            a: accelerations (k, nq) [rad/s²].
+            jerk: jerks (k, nq) [rad/s³].
+            tau: torques (k, nq) of rigid bodies and rotors [N·m].
         """
         limits, tau_limited = self._limits, limited_torque(self._arm, tau, v, a)
-        nearer = np.where(q > (limits.q_max + limits.q_min) / 2, limits.q_max, limits.q_min)
+        nearer_end = np.where(q > (limits.q_max + limits.q_min) / 2, limits.q_max, limits.q_min)
         values = {
             "position": q,
             "velocity": v,
@@ -95,8 +112,8 @@ class LimitMonitor:
         }
         for name, ratio in ratios(limits, q, v, a, jerk, tau_limited).items():
             k, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
-            bound = nearer[k, j] if name == "position" else bounds[name][j]
-            self._note(
+            bound = nearer_end[k, j] if name == "position" else bounds[name][j]
+            self._update_worst(
                 name,  # type: ignore[arg-type]
                 float(ratio[k, j]),
                 int(j),
@@ -109,15 +126,19 @@ class LimitMonitor:
             for c, path_name in enumerate(self._path.names):
                 at, bound = int(path_ratios[:, c].argmax()), self._path_bounds[path_name]
                 worst = float(path_ratios[at, c])
-                self._note(path_name, worst, None, float(t[at]), worst * bound, bound)  # type: ignore[arg-type]
+                self._update_worst(path_name, worst, None, float(t[at]), worst * bound, bound)  # type: ignore[arg-type]
 
     def update_breakpoints(
         self, motion: PiecewiseMotion, before: PiecewiseMotion | None
     ) -> Indices:
-        """Add the steps at the breakpoints of a block; `before` is the block before it, None for
-        the first.
+        """Add the steps at the breakpoints of a block.
 
-        Returns the indices (k,) of the pieces that begin with a velocity step.
+        Args:
+            motion: the block.
+            before: the previous block; None for the first block.
+
+        Returns:
+            Indices (k,) of the pieces that begin with a velocity step.
         """
         piece = np.arange(len(motion.segment))
         _, v_end, a_end, _ = motion.at(piece, np.diff(motion.breakpoints))
@@ -128,23 +149,25 @@ class LimitMonitor:
             last = np.array([len(before.segment) - 1])
             _, v_before, a_before, _ = before.at(last, np.diff(before.breakpoints)[last])
         t, limits = motion.breakpoints, self._limits
-        speed_step = np.abs(v - np.concatenate([v_before, v_end[:-1]])) / limits.v_max > SPEED_STEP
-        step = np.abs(a - np.concatenate([a_before, a_end[:-1]])) / limits.a_max > ACCELERATION_STEP
-        self._note_step("acceleration", speed_step, t, limits.a_max)
-        self._note_step("jerk", speed_step | step, t, limits.j_max)
+        speed_step = np.abs(v - np.concatenate([v_before, v_end[:-1]])) / limits.v_max > STEPS.speed
+        step = (
+            np.abs(a - np.concatenate([a_before, a_end[:-1]])) / limits.a_max > STEPS.acceleration
+        )
+        self._update_step("acceleration", speed_step, t, limits.a_max)
+        self._update_step("jerk", speed_step | step, t, limits.j_max)
         return np.flatnonzero(speed_step.any(axis=1))
 
     def report(self) -> list[LimitReport]:
-        """The worst ratio of every limit."""
+        """The largest ratio of every limit."""
         return list(self._worst.values())
 
-    def _note_step(self, name: LimitName, steps: Mask, t: Array, bounds: Array) -> None:
+    def _update_step(self, name: LimitName, steps: Mask, t: Array, bounds: Array) -> None:
         steps = steps & np.isfinite(bounds)  # a step violates no limit that is infinite
         if steps.any():
             k, j = np.argwhere(steps)[0].tolist()
-            self._note(name, np.inf, j, float(t[k]), np.inf, float(bounds[j]))
+            self._update_worst(name, np.inf, j, float(t[k]), np.inf, float(bounds[j]))
 
-    def _note(
+    def _update_worst(
         self, name: LimitName, ratio: float, joint: int | None, t: float, value: float, bound: float
     ) -> None:
         known = self._worst.get(name)

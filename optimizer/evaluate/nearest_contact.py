@@ -1,4 +1,4 @@
-"""The least clearance of a given motion, by samples."""
+"""Least clearance of a given motion, by samples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.close_pass import CLOSE, model_without_margins
+from joulepath.optimizer.collision.close_pass import CLOSE_PASS, model_without_margins
 from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from joulepath.optimizer.collision.stand_ins import StandIns
 from joulepath.optimizer.deadline import checkpoint
@@ -17,12 +17,22 @@ from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.certificate import Clearance
 
-# greatest time between samples [s], unless a block would have more than MOST_INTERVALS of them
-PERIOD, MOST_INTERVALS = 0.01, 16384
-# samples of a block that are checked first, with exact distances of every pair
-COARSE = 16
-# pairs times configurations that are checked at once
-CHECKS = 100_000
+
+@dataclass(frozen=True)
+class ClearanceSettings:
+    """Settings of the sampling of clearances."""
+
+    period: float = 0.01
+    """Largest time between two samples [s]."""
+    max_intervals: int = 16384
+    """Largest number of intervals of a block, which takes precedence over the period."""
+    coarse_samples: int = 16
+    """Samples of a block with exact distances of all pairs, checked first."""
+    checks_at_once: int = 100_000
+    """Pairs times configurations that are checked at once."""
+
+
+CLEARANCE = ClearanceSettings()
 
 
 @dataclass(frozen=True)
@@ -42,11 +52,13 @@ class LeastClearance:
 
 
 class ClearanceMonitor:
-    """Updates the least clearance of a motion, block after block.
+    """Least clearance of a motion, updated block after block.
 
-    `nearest` has the margins subtracted; None if no pair is checked. `close_pass` is the least
-    distance without margins; None unless it is below CLOSE at a sample. `unmodelled` are the
-    deepest contacts of the bodies that stand in for a tool and a payload without a shape.
+    Attributes:
+        nearest: the least clearance with margins subtracted; None if no pair is checked.
+        close_pass: the least distance without margins; None unless below `CLOSE_PASS.distance`
+            at a sample.
+        unmodelled: the deepest contacts of the stand-ins for a tool and a payload without a shape.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -63,10 +75,14 @@ class ClearanceMonitor:
     def update(self, motion: PiecewiseMotion) -> None:
         """Add the next block."""
         begin, end = float(motion.breakpoints[0]), float(motion.breakpoints[-1])
-        t = np.linspace(begin, end, min(int(np.ceil((end - begin) / PERIOD)), MOST_INTERVALS) + 1)
+        t = np.linspace(
+            begin,
+            end,
+            min(int(np.ceil((end - begin) / CLEARANCE.period)), CLEARANCE.max_intervals) + 1,
+        )
         self._spacing = max((end - begin) / (len(t) - 1), self._spacing)
         q = motion.at_times(t)[0]
-        if self._beyond_margins.add(t, q) < CLOSE:
+        if self._beyond_margins.add(t, q) < CLOSE_PASS.distance:
             self._without_margins.add(t, q)
         for contact in () if self._stand_ins is None else self._stand_ins.contacts(t, q):
             known = self._contacts.get(contact.pair[1])
@@ -85,15 +101,15 @@ class ClearanceMonitor:
 
     @property
     def close_pass(self) -> LeastClearance | None:
-        """The least distance of all blocks, if below CLOSE."""
-        if self.nearest is None or self.nearest.distance >= CLOSE:
+        """The least distance of all blocks, if below CLOSE_PASS.distance."""
+        if self.nearest is None or self.nearest.distance >= CLOSE_PASS.distance:
             return None
         least = self._without_margins.least(self._spacing)
-        return least if least is not None and least.distance < CLOSE else None
+        return least if least is not None and least.distance < CLOSE_PASS.distance else None
 
 
 class _LeastSampled:
-    """The least distance of a collision model over samples."""
+    """Least distance of a collision model over samples."""
 
     def __init__(self, model: CollisionModel) -> None:
         self._model = model
@@ -101,8 +117,10 @@ class _LeastSampled:
         self._time = 0.0
 
     def least(self, spacing: float) -> LeastClearance | None:
-        """The least distance of all samples, which are at most `spacing` [s] apart; None if no pair
-        is checked.
+        """The least distance of all samples; None if no pair is checked.
+
+        Args:
+            spacing: largest time between two samples [s].
         """
         found = self._closest
         return (
@@ -112,15 +130,21 @@ class _LeastSampled:
         )
 
     def add(self, t: Array, q: Array) -> float:
-        """Check samples q (k, nq) [rad] at times t (k,) [s].
+        """Check samples.
 
-        Returns their least distance [m], or a lower bound of it if an earlier sample was nearer.
+        Args:
+            t: times (k,) [s].
+            q: positions (k, nq) [rad].
+
+        Returns:
+            The least distance of these samples [m], or a lower bound of it if an earlier sample was
+            nearer.
         """
-        # for bodies farther apart than the least distance known, the distance of their enclosing
-        # balls is enough
-        coarse = self._model.closest_pairs(q[:: max(len(q) // COARSE, 1)])
+        # bodies farther apart than the least known distance are checked by their enclosing balls
+
+        coarse = self._model.closest_pairs(q[:: max(len(q) // CLEARANCE.coarse_samples, 1)])
         within = min((closest.distance for closest in coarse), default=np.inf)
-        at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
+        at_once = max(CLEARANCE.checks_at_once // max(len(self._model.pairs), 1), 1)
         least = np.inf
         for low in range(0, len(q), at_once):
             if low:

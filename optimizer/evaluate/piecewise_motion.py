@@ -1,17 +1,14 @@
-"""A given motion as piecewise polynomials in time, block after block, so that memory does not grow
-with its length.
+"""A given motion as piecewise polynomials in time, in blocks of limited memory.
 
-- `linear`: constant velocity of every joint within a segment; velocity steps where segments meet
+- `linear`: constant velocity of every joint within a segment, with velocity steps between segments
 - `trapezoid`: trapezoidal velocity from standstill to standstill in every segment, with the
-  acceleration times of the
-  baseline `trapezoid`; acceleration steps
+  acceleration times of the baseline `trapezoid`, and acceleration steps
 - `quintic`: 10 τ³ - 15 τ⁴ + 6 τ⁵ from standstill to standstill in every segment
-- `spline`: one curve of degree 5 through all configurations, with standstill (v = a = 0) at the
-  start and at the end
+- `spline`: one curve of degree 5 through all configurations, at rest (v = a = 0) at both ends
 - a spline: its own polynomials
 - a recording: a cubic spline (not-a-knot) through q, and others through v and a if these were
-  recorded; if not, they are the derivatives of the spline before. Nothing is smoothed: an error e
-  in q, with rows h apart, becomes an error of up to 12 e / h² in the acceleration
+  recorded; otherwise the derivatives of the previous spline. Nothing is smoothed: an error e in q,
+  with rows h apart, becomes an error of up to 12 e / h² in the acceleration
 """
 
 from __future__ import annotations
@@ -26,7 +23,7 @@ from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.evaluate.recording import (
-    BLOCK,
+    MOTION_LIMITS,
     RecordedRows,
     Recording,
     Waypoints,
@@ -39,33 +36,42 @@ from joulepath.optimizer.problem.arm import Arm
 
 Indices = npt.NDArray[np.int64]
 
-# rows on either side of a block that its spline also passes through: the influence of a row on a
-# cubic spline falls by a factor of 3.7 from row to row, and 1e-27 of it is left after 48 rows
-OVERLAP = 48
-# fraction of a segment's duration below which a phase of its trapezoid is left out
-SHORTEST_PHASE = 1e-12
+
+@dataclass(frozen=True)
+class PieceSettings:
+    """Settings of the polynomial pieces."""
+
+    overlap_rows: int = 48
+    """Rows on either side of a block on its spline. The influence of a row on a cubic spline falls
+    by a factor of 3.7 from row to row; 1e-27 of it is left after 48 rows."""
+    min_phase: float = 1e-12
+    """Duration of a phase of a trapezoid over that of the segment, up to which the phase is left
+    out [1]."""
+
+
+PIECES = PieceSettings()
 
 
 @dataclass(frozen=True)
 class PiecewiseMotion:
-    """A block of m consecutive polynomial pieces, between `breakpoints` (m + 1,) [s] after the
-    start of the motion.
+    """A block of m consecutive polynomial pieces.
 
-    `segment` (m,) is the segment of the motion that each piece belongs to. `q`, `v`, `a`, `jerk`
-    are coefficients (degree + 1, m, nq) as in scipy's PPoly: highest power first, of the time since
-    the start of the piece. If a log has its own v, that is not the derivative of q.
+    Coefficients (degree + 1, m, nq) are as in scipy's PPoly: highest power first, of the time since
+    the start of the piece. A recorded v is not the derivative of q.
     """
 
     breakpoints: Array
+    """Ends of the pieces (m + 1,), after the start of the motion [s]."""
     segment: Indices
     q: Array
     v: Array
     a: Array
     jerk: Array
+    """Coefficients of the jerk."""
 
     @staticmethod
     def of(curve: PPoly, segment: Indices) -> PiecewiseMotion:
-        """The motion of a curve and its derivatives."""
+        """Pieces of a curve and its derivatives; `segment` (m,) is the segment of each piece."""
         return PiecewiseMotion(
             curve.x, segment, *(curve.derivative(k).c if k else curve.c for k in range(4))
         )
@@ -90,26 +96,31 @@ Motion = Waypoints | Recording | Spline
 
 
 def piecewise_motion(arm: Arm, motion: Motion) -> Iterator[PiecewiseMotion]:
-    """The blocks of a motion in order of time. Raises InvalidTable or InvalidProblem."""
+    """The blocks of a motion in order of time.
+
+    Raises:
+        InvalidTable: a row of the motion is wrong.
+        InvalidProblem: the motion does not fit the arm.
+    """
     if isinstance(motion, Recording):
-        yield from _log(arm, motion)
+        yield from _pieces_of_log(arm, motion)
         return
     if isinstance(motion, Spline):
         check_joints(arm, motion.control_points)
-        yield _spline(motion)
+        yield _pieces_of_spline(motion)
         return
     motion.check(arm)
     ends = np.concatenate([[0.0], np.cumsum(motion.times)])
     if motion.interpolation == "spline":
-        yield _smooth(motion, ends)
+        yield _pieces_of_curve(motion, ends)
         return
-    for low in range(0, motion.segments, BLOCK):
-        rows = slice(low, min(low + BLOCK, motion.segments))
-        yield _segments(motion, arm.active_limits, rows, ends[low])
+    for low in range(0, motion.segments, MOTION_LIMITS.block_rows):
+        rows = slice(low, min(low + MOTION_LIMITS.block_rows, motion.segments))
+        yield _pieces_of_segments(motion, arm.active_limits, rows, ends[low])
 
 
-def _spline(motion: Spline) -> PiecewiseMotion:
-    """The polynomials of a spline: one segment with a piece for each knot span."""
+def _pieces_of_spline(motion: Spline) -> PiecewiseMotion:
+    """Polynomials of a spline: one segment with a piece for each knot span."""
     edges = np.unique(motion.knots)
     powers = [
         motion.curve(edges[:-1], order) / math.factorial(order)
@@ -120,7 +131,7 @@ def _spline(motion: Spline) -> PiecewiseMotion:
     )
 
 
-def _smooth(motion: Waypoints, ends: Array) -> PiecewiseMotion:
+def _pieces_of_curve(motion: Waypoints, ends: Array) -> PiecewiseMotion:
     """The curve of degree 5 through all waypoints, at the times `ends` (n,) [s]."""
     standstill = [(order, np.zeros(motion.q.shape[1])) for order in (1, 2)]
     # its knots are these times; scipy's type stubs know no list of derivatives
@@ -129,10 +140,11 @@ def _smooth(motion: Waypoints, ends: Array) -> PiecewiseMotion:
     return PiecewiseMotion.of(PPoly(np.stack(powers), ends), np.arange(motion.segments))
 
 
-def _segments(motion: Waypoints, limits: Limits, rows: slice, start: float) -> PiecewiseMotion:
-    """Segments on straight lines in joint space, q_start + s(t) · displacement, the first at
-    `start` [s].
-    """
+def _pieces_of_segments(
+    motion: Waypoints, limits: Limits, rows: slice, start: float
+) -> PiecewiseMotion:
+    """Segments on straight lines in joint space, q_start + s(t) · displacement, from `start` [s]
+    on."""
     q, T = motion.q[rows], motion.times[rows]
     displacement = motion.q[rows.start + 1 : rows.stop + 1] - q
     segment = np.arange(rows.start, rows.stop)
@@ -142,7 +154,7 @@ def _segments(motion: Waypoints, limits: Limits, rows: slice, start: float) -> P
         law, lengths = quintic.coefficients(T), T
     else:
         law, lengths = _trapezoid(T, blend_time(limits, displacement, T))
-        kept = lengths > SHORTEST_PHASE * np.repeat(T, 3)
+        kept = lengths > PIECES.min_phase * np.repeat(T, 3)
         law, lengths = [part[kept] for part in law], lengths[kept]
         q, displacement, segment = (
             np.repeat(each, 3, axis=0)[kept] for each in (q, displacement, segment)
@@ -155,52 +167,56 @@ def _segments(motion: Waypoints, limits: Limits, rows: slice, start: float) -> P
 
 
 def _trapezoid(T: Array, blend: Array) -> tuple[list[Array], Array]:
-    """Coefficients of s(t) in the three phases of n trapezoids of velocity, and the durations (3
-    n,) [s] of the phases.
+    """Three phases of each of n trapezoids of velocity.
 
-    T (n,) [s] is the duration, `blend` (n,) [s] the time of acceleration, and of deceleration.
+    Args:
+        T: durations (n,) [s].
+        blend: times of acceleration, and of deceleration (n,) [s].
+
+    Returns:
+        Coefficients of s(t) in the phases, and the durations (3 n,) of the phases [s].
     """
     speed = 1 / (T - blend)
     bend = speed / (2 * blend)
-    none = 0 * T
+    zero = 0 * T
     law = [
-        np.stack([bend, none, -bend], axis=1).ravel(),
-        np.stack([none, speed, speed], axis=1).ravel(),
-        np.stack([none, speed * blend / 2, 1 - speed * blend / 2], axis=1).ravel(),
+        np.stack([bend, zero, -bend], axis=1).ravel(),
+        np.stack([zero, speed, speed], axis=1).ravel(),
+        np.stack([zero, speed * blend / 2, 1 - speed * blend / 2], axis=1).ravel(),
     ]
     return law, np.stack([blend, np.maximum(T - 2 * blend, 0.0), blend], axis=1).ravel()
 
 
-def _log(arm: Arm, log: Recording) -> Iterator[PiecewiseMotion]:
-    """A log in blocks. The spline of each also passes through OVERLAP rows on either side."""
+def _pieces_of_log(arm: Arm, log: Recording) -> Iterator[PiecewiseMotion]:
+    """Blocks of a log; the spline of each also passes through rows on either side."""
     rows: RecordedRows | None = None
     begin = 0
     for block in log.checked(arm):
-        rows = block if rows is None else _joined(rows, block)
-        if len(rows.t) - begin > BLOCK + OVERLAP:
-            end = len(rows.t) - 1 - OVERLAP
+        rows = block if rows is None else _concatenated(rows, block)
+        if len(rows.t) - begin > MOTION_LIMITS.block_rows + PIECES.overlap_rows:
+            end = len(rows.t) - 1 - PIECES.overlap_rows
             yield _between(log, rows, begin, end)
-            keep = max(end - OVERLAP, 0)
+            keep = max(end - PIECES.overlap_rows, 0)
             rows, begin = _from(rows, keep), end - keep
     assert rows is not None  # logs of fewer than two rows are refused
     yield _between(log, rows, begin, len(rows.t) - 1)
 
 
 def _between(log: Recording, rows: RecordedRows, begin: int, end: int) -> PiecewiseMotion:
-    """The pieces from row `begin` to row `end` of the splines through all `rows` of a log."""
+    """Pieces from row `begin` to row `end` of the splines through all rows."""
     q = CubicSpline(rows.t, rows.q)
     v = q.derivative() if rows.v is None else CubicSpline(rows.t, rows.v)
     a = v.derivative() if rows.a is None else CubicSpline(rows.t, rows.a)
     inside = (slice(None), slice(begin, end))
     curves = (curve.c[inside] for curve in (q, v, a, a.derivative()))
-    # by their middles: an edge is the time of a row but for rounding
+    # by the middles of the pieces, because an edge is the time of a row up to rounding errors
     segment = np.searchsorted(
         log.edges, (rows.t[begin:end] + rows.t[begin + 1 : end + 1]) / 2, side="right"
     )
     return PiecewiseMotion(rows.t[begin : end + 1], segment, *curves)
 
 
-def _joined(first: RecordedRows, second: RecordedRows) -> RecordedRows:
+def _concatenated(first: RecordedRows, second: RecordedRows) -> RecordedRows:
     def join(one: Array | None, other: Array | None) -> Array | None:
         return None if one is None or other is None else np.concatenate([one, other])
 
@@ -213,14 +229,17 @@ def _joined(first: RecordedRows, second: RecordedRows) -> RecordedRows:
 
 
 def _from(block: RecordedRows, row: int) -> RecordedRows:
-    """The rows of a block from `row` on."""
+    """Rows of a block from `row` on."""
     v, a = (None if part is None else part[row:] for part in (block.v, block.a))
     return RecordedRows(block.t[row:], block.q[row:], v, a)
 
 
 def _horner(coefficients: Array, x: Array) -> Array:
-    """Values (k, nq) at x (k, 1) of polynomials with coefficients (degree + 1, k, nq), highest
-    power first.
+    """Values (k, nq) of polynomials by Horner's method.
+
+    Args:
+        coefficients: coefficients (degree + 1, k, nq), highest power first.
+        x: arguments (k, 1).
     """
     value = coefficients[0]
     for c in coefficients[1:]:

@@ -16,33 +16,56 @@ from joulepath.optimizer.problem.arrays import frozen
 
 Interpolation = Literal["linear", "trapezoid", "quintic", "spline"]
 
-BLOCK = 2048
-"""Rows that are processed at a time."""
-MOST_ROWS = 1_000_000
-"""Most rows of a motion."""
-MOST_SPLINE_POINTS = 10_000
-"""Most configurations that one smooth curve passes through: its equations are solved all at
-once."""
-CLOSEST_TIMES = 1e-6
-"""Least time between rows [s]."""
-MOST_SPEED, MOST_ACCELERATION = 1e4, 1e7
-"""Greatest |v| [rad/s] and |a| [rad/s²] that a log may have: no robot exceeds them."""
-# joint positions beyond this multiple of the largest joint position allowed are not in radians
-FAR_OUT = 2.0
+
+@dataclass(frozen=True)
+class GivenMotionLimits:
+    """Limits of given motions and of their evaluation."""
+
+    block_rows: int = 2048
+    """Rows that are processed at a time."""
+    max_rows: int = 1_000_000
+    """Largest number of rows of a motion."""
+    max_spline_points: int = 10_000
+    """Largest number of configurations on one smooth curve, whose equations are solved at once."""
+    min_time_step: float = 1e-6
+    """Smallest time between two rows [s]."""
+    max_time: float = 1e12
+    """Largest absolute time [s]."""
+    max_speed: float = 1e4
+    """Largest speed of a joint in a log; no robot exceeds it [rad/s]."""
+    max_acceleration: float = 1e7
+    """Largest acceleration of a joint in a log; no robot exceeds it [rad/s²]."""
+    max_position_ratio: float = 2.0
+    """Position over the largest position of the joint, above which positions are not in radians
+    [1]."""
+    max_segments: int = 10_000
+    """Largest number of segments that are listed one by one."""
+    max_intervals: int = 200
+    """Largest number of segments with intervals of their energies, a millisecond each."""
+    max_samples: int = 20_000
+    """Largest number of samples in an answer: some 13 MB of JSON for six joints."""
+    period_tolerance: float = 1e-6
+    """Remainder over a sample period, up to which it is a rounding error [1]."""
+
+
+MOTION_LIMITS = GivenMotionLimits()
 
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Joint positions q (n, nq) [rad] that a motion passes in this order, with a time for each
-    segment between them.
+    """Joint positions q (n, nq) [rad] that a motion passes in order, with times of the segments.
 
-    `times` (n - 1,) [s] may be one number for all segments. `piecewise_motion` describes the
-    interpolations. Errors count rows from `first_row`. Raises InvalidProblem.
+    `first_row` is the number of the first row in error messages.
+
+    Raises:
+        InvalidProblem: positions or times have a wrong shape or value.
     """
 
     q: Array
     times: Array
+    """Duration of each segment (n - 1,), or one number for all segments [s]."""
     interpolation: Interpolation = "quintic"
+    """Interpolation within segments, see `piecewise_motion`."""
     first_row: int = 0
 
     def __post_init__(self) -> None:
@@ -61,11 +84,11 @@ class Waypoints:
         object.__setattr__(self, "times", frozen(times, (segments,), "time_per_segment"))
         if (self.times <= 0).any():
             raise InvalidProblem("time_per_segment", "time_per_segment must be positive.")
-        if self.interpolation == "spline" and len(self.q) > MOST_SPLINE_POINTS:
+        if self.interpolation == "spline" and len(self.q) > MOTION_LIMITS.max_spline_points:
             raise InvalidProblem(
                 "interpolation",
-                f"A spline passes at most {MOST_SPLINE_POINTS} configurations: send more as a "
-                "trajectory with t.",
+                f"A spline passes at most {MOTION_LIMITS.max_spline_points} configurations: send "
+                "more as a trajectory with t.",
             )
 
     @property
@@ -74,8 +97,12 @@ class Waypoints:
         return len(self.times)
 
     def check(self, arm: Arm) -> None:
-        """Raise InvalidProblem or InvalidTable if the joint positions cannot be those of the
-        arm."""
+        """Check that the joint positions can be those of the arm.
+
+        Raises:
+            InvalidProblem: the number of joints is wrong.
+            InvalidTable: a position is far beyond its range.
+        """
         check_joints(arm, self.q, self.first_row)
 
 
@@ -93,7 +120,7 @@ class RecordedRows:
 
     @property
     def groups(self) -> dict[str, Array | None]:
-        """The columns by name; None if not logged."""
+        """Channels by name; None if not recorded."""
         return {"q": self.q, "v": self.v, "a": self.a}
 
 
@@ -101,9 +128,9 @@ class RecordedRows:
 class Recording:
     """A recorded motion as a stream of blocks of rows, which is read once.
 
-    `Recording.of(t, q)` makes one of arrays. All blocks have the same columns. Errors count rows
-    from `first_row`. Segments after the first one begin at `edges` [s], which increase, after the
-    first row.
+    `Recording.of(t, q)` creates a recording from arrays. All blocks have the same channels.
+    `first_row` is the number of the first row in error messages. `edges` are the increasing times
+    [s], after the first row, at which a new segment begins.
     """
 
     blocks: Iterable[RecordedRows]
@@ -119,7 +146,7 @@ class Recording:
         a: Array | None = None,
         edges: Sequence[float] = (),
     ) -> Recording:
-        """A recording that is in memory.
+        """A recording in memory.
 
         Args:
             t: times, increasing, shape (n,) [s].
@@ -127,9 +154,6 @@ class Recording:
             v: joint velocities if they were recorded, shape (n, nq) [rad/s].
             a: joint accelerations if they were recorded, shape (n, nq) [rad/s²].
             edges: times at which a new segment begins, after the first row [s].
-
-        Returns:
-            The recording, in blocks of at most BLOCK rows.
 
         Raises:
             InvalidProblem: the arrays have different numbers of rows.
@@ -139,7 +163,10 @@ class Recording:
             raise InvalidProblem(
                 "trajectory", "t, q, v and a must have as many rows as each other."
             )
-        rows = [slice(low, high) for low, high in pairwise([*range(0, len(t), BLOCK), len(t)])]
+        rows = [
+            slice(low, high)
+            for low, high in pairwise([*range(0, len(t), MOTION_LIMITS.block_rows), len(t)])
+        ]
         blocks = [
             RecordedRows(*(None if each is None else each[part] for each in columns))  # type: ignore[arg-type]
             for part in rows
@@ -152,29 +179,31 @@ class Recording:
         return len(self.edges) + 1
 
     def checked(self, arm: Arm) -> Iterator[RecordedRows]:
-        """The blocks, with times since the first row.
+        """Checked blocks, with times since the first row.
 
-        Raises InvalidTable at the first invalid row, and InvalidProblem.
+        Raises:
+            InvalidTable: a row is invalid, or the number of rows is.
+            InvalidProblem: the number of joints is wrong.
         """
         row, last, origin = self.first_row, -np.inf, None
         for block in self.blocks:
             if not len(block.t):
                 continue
-            if row + len(block.t) - self.first_row > MOST_ROWS:
+            if row + len(block.t) - self.first_row > MOTION_LIMITS.max_rows:
                 raise InvalidTable(
-                    f"A trajectory has at most {MOST_ROWS} rows: send fewer rows, or send it in "
-                    "parts."
+                    f"A trajectory has at most {MOTION_LIMITS.max_rows} rows: send fewer rows, or "
+                    "send it in parts."
                 )
             origin = float(block.t[0]) if origin is None else origin
             _check_finite(block, row)
             t = block.t - origin
-            steps = np.diff(t, prepend=last)
-            if (steps < CLOSEST_TIMES).any():
-                at = int(np.argmax(steps < CLOSEST_TIMES))
+            least = MOTION_LIMITS.min_time_step
+            too_short = np.diff(t, prepend=last) < least
+            if too_short.any():
+                at = int(np.argmax(too_short))
                 raise InvalidTable(
-                    f"t must increase from row to row by {CLOSEST_TIMES:g} s or more, and does not "
-                    f"at row {row + at}: "
-                    "sort the rows and drop repeated ones.",
+                    f"t must increase from row to row by {least:g} s or more, and does not "
+                    f"at row {row + at}: sort the rows and drop repeated ones.",
                     row + at,
                     "t",
                 )
@@ -188,40 +217,54 @@ class Recording:
 
 
 def _check_finite(block: RecordedRows, first_row: int) -> None:
-    most = {"t": 1e12, "q": np.inf, "v": MOST_SPEED, "a": MOST_ACCELERATION}
+    largest = {
+        "t": MOTION_LIMITS.max_time,
+        "q": np.inf,
+        "v": MOTION_LIMITS.max_speed,
+        "a": MOTION_LIMITS.max_acceleration,
+    }
     for name, values in {"t": block.t[:, None], **block.groups}.items():
         if values is None:
             continue
         with np.errstate(invalid="ignore"):
-            wrong = np.argwhere(~(np.isfinite(values) & (np.abs(values) <= most[name])))
+            wrong = np.argwhere(~(np.isfinite(values) & (np.abs(values) <= largest[name])))
         if len(wrong):
             row, joint = wrong[0].tolist()
             column = name if name == "t" else f"{name}{joint + 1}"
             raise InvalidTable(
                 f"{column} at row {first_row + row} is not finite, or too large to be a robot's: "
-                "correct it or drop "
-                "the row.",
+                "correct it or drop the row.",
                 first_row + row,
                 column,
             )
 
 
 def check_joints(arm: Arm, q: Array, first_row: int = 0) -> None:
-    """Raises InvalidProblem or InvalidTable for joint positions q (k, n) [rad] of another arm."""
+    """Check that joint positions can be those of an arm.
+
+    Args:
+        arm: the arm.
+        q: joint positions (k, n) [rad].
+        first_row: number of the first row in error messages.
+
+    Raises:
+        InvalidProblem: the number of joints is wrong.
+        InvalidTable: a position is far beyond its range.
+    """
     if q.shape[1] != arm.robot.nq:
         raise InvalidProblem(
             "q", f"Every row must have {arm.robot.nq} joint positions, one per joint."
         )
     limits = arm.robot.limits
     wrong = np.argwhere(
-        np.abs(q) > FAR_OUT * np.maximum(np.abs(limits.q_min), np.abs(limits.q_max))
+        np.abs(q)
+        > MOTION_LIMITS.max_position_ratio * np.maximum(np.abs(limits.q_min), np.abs(limits.q_max))
     )
     if len(wrong):
         row, joint = wrong[0].tolist()
         raise InvalidTable(
-            f"q{joint + 1} at row {first_row + row} is far beyond the joint's range and looks like "
-            "degrees: give "
-            "radians, or a CSV with units=deg.",
+            f"q{joint + 1} at row {first_row + row} is far beyond the joint's range and looks "
+            "like degrees: give radians, or a CSV with units=deg.",
             first_row + row,
             f"q{joint + 1}",
         )

@@ -1,8 +1,9 @@
-"""Whether samples of a motion are those of a spline on an arm."""
+"""Check that samples of a motion belong to a spline on an arm."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,15 +13,23 @@ from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.motion.spline import Spline, sample
 from joulepath.optimizer.problem.arm import Arm
 
-# largest difference of given samples from a motion: rounding of q [rad], and of v, a, tau relative
-# to their limits
-SAMPLE_TOLERANCE = 1e-6
+
+@dataclass(frozen=True)
+class SampleCheckSettings:
+    """Settings of the check of samples."""
+
+    tolerance: float = 1e-6
+    """Largest difference of positions [rad], and of velocities, accelerations and torques over
+    their limits [1]: rounding errors of a file."""
+
+
+SAMPLE_CHECK = SampleCheckSettings()
 
 
 def check_samples(arm: Arm, spline: Spline, t: Array, samples: Sequence[Array]) -> None:
-    """Check that samples of a motion are those of a spline on an arm.
+    """Check that samples of a motion belong to a spline on an arm.
 
-    The torques tell whether payload, mounting and robot are those that the samples are of.
+    The torques show a different payload, mounting or robot.
 
     Args:
         arm: arm that is said to make the motion.
@@ -30,11 +39,11 @@ def check_samples(arm: Arm, spline: Spline, t: Array, samples: Sequence[Array]) 
             shape (k, nq) each.
 
     Raises:
-        NotCertified: they differ by more than rounding.
+        NotCertified: the samples differ by more than rounding errors.
     """
     limits, duration = arm.active_limits, spline.duration
     if len(t) and not (
-        t[0] >= 0 and t[-1] <= duration * (1 + SAMPLE_TOLERANCE) and np.isfinite(t).all()
+        t[0] >= 0 and t[-1] <= duration * (1 + SAMPLE_CHECK.tolerance) and np.isfinite(t).all()
     ):
         raise NotCertified(0, "its samples are not of its own time", {})
     q, v, a = sample(spline, np.minimum(t, duration))
@@ -44,7 +53,7 @@ def check_samples(arm: Arm, spline: Spline, t: Array, samples: Sequence[Array]) 
     for name, computed, given, scale in zip(names, own, samples, scales, strict=True):
         if (
             given.shape != computed.shape
-            or not (np.abs(given - computed) <= SAMPLE_TOLERANCE * scale).all()
+            or not (np.abs(given - computed) <= SAMPLE_CHECK.tolerance * scale).all()
         ):
             raise NotCertified(
                 0, f"the {name} of its samples are not those of its spline on this arm", {}

@@ -12,17 +12,18 @@ from joulepath.optimizer.dynamics.bus_flow import drawn_at
 from joulepath.optimizer.dynamics.losses import power_flow
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.evaluate.piecewise_motion import PiecewiseMotion
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.result.solution import Samples
 
-MOST_SAMPLES = 20_000
-"""Most samples that are returned: some 13 MB of JSON for six joints."""
-# a remainder of a period below this fraction of it is rounding, not a sample
-PERIOD_ROUNDING = 1e-6
-
 
 class Sampler:
-    """Samples a motion at multiples of `period` [s], block after block."""
+    """Samples a motion, block after block.
+
+    Args:
+        plant: dynamics of the arm.
+        period: period of the samples [s].
+    """
 
     def __init__(self, plant: Plant, period: float) -> None:
         self._plant, self._period = plant, period
@@ -30,17 +31,21 @@ class Sampler:
         self._count = 0
 
     def update(self, motion: PiecewiseMotion, charge: Callable[[Array], Array]) -> None:
-        """Add the samples before the end of a block; `charge` gives that of the energy storage [J]
-        at times (k,) [s].
+        """Add the samples before the end of a block.
 
-        Raises InvalidProblem beyond MOST_SAMPLES.
+        Args:
+            motion: the block.
+            charge: charge of the energy storage [J] as a function of times (k,) [s].
+
+        Raises:
+            InvalidProblem: there are too many samples.
         """
-        stop = int(np.ceil(motion.breakpoints[-1] / self._period - PERIOD_ROUNDING))
-        if stop >= MOST_SAMPLES:
+        stop = int(np.ceil(motion.breakpoints[-1] / self._period - MOTION_LIMITS.period_tolerance))
+        if stop >= MOTION_LIMITS.max_samples:
             raise InvalidProblem(
                 "sample_period",
-                f"An answer has at most {MOST_SAMPLES} samples: use a longer sample_period, or "
-                "leave it out.",
+                f"An answer has at most {MOTION_LIMITS.max_samples} samples: use a longer "
+                "sample_period, or leave it out.",
             )
         if stop > self._count:
             t = np.asarray(np.arange(self._count, stop) * self._period, dtype=float)
@@ -48,8 +53,11 @@ class Sampler:
             self._count = stop
 
     def finish(self, last: PiecewiseMotion, charge: float) -> Samples:
-        """All samples, with one at the end of the `last` block, where the energy storage has
-        `charge` [J].
+        """All samples, with one more at the end of the motion.
+
+        Args:
+            last: the last block.
+            charge: charge of the energy storage at the end [J].
         """
         self._add(last, last.breakpoints[-1:], np.array([charge]))
         stored = self._plant.arm.bus.mode == "storage"

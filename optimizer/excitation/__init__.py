@@ -1,1 +1,1 @@
-"""Motions that tell an arm's parameters apart: excitation trajectories."""
+"""Excitation trajectories: motions that determine the parameters of an arm."""

@@ -1,4 +1,4 @@
-"""The error of excitations."""
+"""Errors of excitations."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class ExcitationInfeasible(JoulepathError):
-    """No excitation was found that keeps its limits from any start. `limit` names the one that the
-    last start broke.
+    """No start led to an excitation within its limits. `limit` names a limit that the last start
+    exceeded.
     """
 
     title = "No excitation within the limits"
     remedy = (
         "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; else "
-        "relax the limit or "
-        "give a longer `period`."
+        "relax the limit or give a longer `period`."
     )
 
     limit: str

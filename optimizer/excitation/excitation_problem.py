@@ -1,6 +1,4 @@
-"""What is asked of an excitation: an arm, a period, and the parameters that its motion is to tell
-apart.
-"""
+"""Request for an excitation: an arm, a period, and the parameters to determine."""
 
 from __future__ import annotations
 
@@ -10,66 +8,89 @@ from typing import Literal, get_args
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.evaluate.sampler import MOST_SAMPLES
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen, per_joint
 
 Part = Literal["inertials", "rotor", "friction"]
-"""Parameters that are to be told apart: base parameters of the links, rotor inertias, friction
-(Coulomb, viscous, offset, load)."""
+"""Parameters to determine: base parameters of the links, rotor inertias, friction (Coulomb,
+viscous, offset, load)."""
 Criterion = Literal["d", "condition"]
 
-MOST_HARMONICS = 10
-LEAST_PERIOD, LONGEST_PERIOD = 1.0, 60.0
-MOST_NOISE = 1e3
-LEAST_DEADLINE = 1e-6
+
+@dataclass(frozen=True)
+class ExcitationLimits:
+    """Limits of the fields of a request."""
+
+    min_period: float = 1.0
+    """Smallest period [s]."""
+    max_period: float = 60.0
+    """Largest period [s]."""
+    max_harmonics: int = 10
+    max_noise: float = 1e3
+    """Largest noise of the torques [N·m]."""
+    min_deadline: float = 1e-6
+    """Smallest deadline [s]."""
+    default_noise: float = 0.01
+    """Noise of the torques over the torque limit, if it is not given [1]."""
+
+
+REQUEST_LIMITS = ExcitationLimits()
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExcitationProblem:
-    """A request for a periodic motion of `arm` that tells its parameters apart.
+    """Request for a periodic motion to determine the parameters of an arm.
 
-    `period` [s] of a Fourier series with `harmonics`. `parts`: which parameters. `criterion` "d"
-    maximises the determinant of the information, "condition" lowers the condition of its columns
-    scaled to one length. The motion stays within `speed_fraction` of the speed limits, and
-    `clearance` [m] away from the arm itself, the scene, and with `mounting_plane` from the plane z
-    = 0 of the base, on which the arm stands. `centre` (nq,) [rad] fixes the centre of the series.
-    `noise` [N·m] is that of the torques, one number or (nq,): by default 1 % of the torque limit.
-    After `deadline` [s] the best motion so far is returned; `starts` are tried at most.
-    `sample_period` [s] is that of the returned samples.
+    The motion is a Fourier series. It keeps clear of the arm itself, of the scene, and optionally
+    of the plane z = 0 of the base, on which the arm stands.
 
-    Raises InvalidProblem, with the field named.
+    Raises:
+        InvalidProblem: a field is out of its range; the error names the field.
     """
 
     arm: Arm
     period: float = 10.0
+    """Period of the series [s]."""
     harmonics: int = 5
+    """Number of harmonics of the series."""
     parts: tuple[Part, ...] = get_args(Part)
+    """Parameters to determine."""
     criterion: Criterion = "d"
+    """`d` maximises the determinant of the information; `condition` minimises the condition
+    number of its columns scaled to unit length."""
     speed_fraction: float = 0.6
+    """Largest share of the speed limits [1]."""
     clearance: float = 0.02
+    """Smallest distance between two bodies [m]."""
     mounting_plane: bool = True
+    """Whether the plane z = 0 of the base is an obstacle."""
     centre: Array | None = None
+    """Centre of the series (nq,) [rad]; None to choose it."""
     noise: float | Array | None = None
+    """Standard deviation of the torques, one number or (nq,) [N·m]; None for 1 % of the limits."""
     starts: int = 3
+    """Largest number of starts of the search."""
     sample_period: float = 0.008
+    """Period of the returned samples [s]."""
     deadline: float = 60.0
+    """Time after which the best motion so far is returned [s]."""
 
     def __post_init__(self) -> None:
         for name, least, most in (
-            ("period", LEAST_PERIOD, LONGEST_PERIOD),
-            ("harmonics", 2, MOST_HARMONICS),
+            ("period", REQUEST_LIMITS.min_period, REQUEST_LIMITS.max_period),
+            ("harmonics", 2, REQUEST_LIMITS.max_harmonics),
             ("speed_fraction", 0.01, 1.0),
             ("clearance", 0.0, 0.5),
             ("starts", 1, 100),
             ("sample_period", 1e-4, 1.0),
-            ("deadline", LEAST_DEADLINE, np.inf),
+            ("deadline", REQUEST_LIMITS.min_deadline, np.inf),
         ):
             if not least <= getattr(self, name) <= most:
                 raise InvalidProblem(name, f"{name} must lie between {least:g} and {most:g}.")
-        if self.period > self.sample_period * MOST_SAMPLES:
-            least = self.period / MOST_SAMPLES
+        if self.period > self.sample_period * MOTION_LIMITS.max_samples:
+            least = self.period / MOTION_LIMITS.max_samples
             raise InvalidProblem(
                 "sample_period", f"sample_period must be at least {least:.2g} s for this period."
             )
@@ -89,5 +110,8 @@ class ExcitationProblem:
         if self.centre is not None:
             object.__setattr__(self, "centre", frozen(self.centre, (nq,), "centre"))
             self.arm.check_inside("centre", self.centre)
-        given = 0.01 * self.arm.robot.limits.tau_max if self.noise is None else self.noise
-        object.__setattr__(self, "noise", per_joint(given, nq, "noise", 1e-6, MOST_NOISE))
+        default = REQUEST_LIMITS.default_noise * self.arm.robot.limits.tau_max
+        given = default if self.noise is None else self.noise
+        object.__setattr__(
+            self, "noise", per_joint(given, nq, "noise", 1e-6, REQUEST_LIMITS.max_noise)
+        )

@@ -1,16 +1,14 @@
-"""excite(problem) → Excitation: a motion that tells the parameters of an arm apart, with its
-certificate.
+"""Public entry point: `excite(problem)` finds a motion that determines the parameters of an arm.
 
-Fourier series at rest at both ends (Swevers, Ganseman, Tükel, De Schutter, Van Brussel 1997),
-D-optimal, by L-BFGS on a cost with penalties from several random starts. What the penalties leave
-of speed, acceleration, jerk and torque is removed by a longer period; collisions are proven absent,
-or the start is dropped.
+The motion is a Fourier series at rest at both ends (Swevers, Ganseman, Tükel, De Schutter, Van
+Brussel 1997), D-optimal, found by L-BFGS on a cost with penalties from several random starts. A
+longer period removes the remaining excess of speed, acceleration, jerk and torque. Starts without a
+proof of clearance are dropped.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
@@ -19,11 +17,15 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.declared import Axes, Count, Internal, PerJoint, Ratio, Seconds, Unit
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
+from joulepath.optimizer.excitation.excitation_result import (
+    Excitation,
+    PredictedDeviation,
+    Series,
+)
 from joulepath.optimizer.excitation.fourier import FourierBasis
 from joulepath.optimizer.excitation.information import Information
 from joulepath.optimizer.excitation.limits import (
@@ -40,87 +42,54 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import HalfSpace, Obstacle, Scene
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.result.solution import Trajectory
 
 MOUNTING_PLANE = "mounting plane"
-# states of the period at which columns are computed; at each of them the limits, too
-STATES = 120
-# weight of the penalties, and most evaluations of a start
-PENALTY, MOST_EVALUATIONS = 40.0, 1000
-# relative decrease of the cost below which a start ends
-PROGRESS = 1e-5
-# independent samples per second that the predicted deviations assume: residuals of torques are
-# correlated over 0.1 s
-INDEPENDENT_RATE = 10.0
-# attempts to find a centre without collision, and greatest amplitude [rad/s] of the first
-# coefficients
-_CENTRES, _AMPLITUDE = 100, 0.15
-# shares of the way from a start to what was found at which a motion is looked for that keeps all
-# limits
-_WAY_BACK = (1.0, 0.9, 0.7, 0.4, 0.0)
-# share of its part of the time left that the search of a start may use: its certificate needs some
-_SHARE = 0.9
-
-Coefficients = Annotated[Array, Axes(("joint", "harmonic")), Unit("rad/s")]
 
 
 @dataclass(frozen=True)
-class Series:
-    """The Fourier series of every joint: q = centre + Σ_k a_k sin(kωt) / (kω) - b_k cos(kωt) /
-    (kω), ω = 2π / period. A row of `a` and `b` is that of a joint."""
+class ExcitationSettings:
+    """Settings of the search for an excitation."""
 
-    period: Seconds
-    """Period; longer than asked for if the limits need it."""
-    centre: Annotated[PerJoint, Unit("rad")]
-    """Centre of every joint."""
-    a: Coefficients
-    """Coefficients of the sines of a joint."""
-    b: Coefficients
-    """Coefficients of the cosines of a joint."""
+    states: int = 120
+    """States of the period at which columns and limits are evaluated."""
+    penalty_weight: float = 40.0
+    """Weight of the penalties in the cost."""
+    max_evaluations: int = 1000
+    """Largest number of evaluations of the cost per start."""
+    cost_tolerance: float = 1e-5
+    """Relative decrease of the cost at which a start ends [1]."""
+    lbfgs_memory: int = 30
+    """Corrections that L-BFGS keeps."""
+    independent_rate: float = 10.0
+    """Independent samples per second assumed for the predicted deviations [Hz]; residuals of
+    torques are correlated over 0.1 s."""
+    centre_attempts: int = 100
+    """Random centres that are tested for collisions."""
+    start_amplitude: float = 0.15
+    """Largest coefficient of a start [rad/s]."""
+    fallback_shares: tuple[float, ...] = (1.0, 0.9, 0.7, 0.4, 0.0)
+    """Shares of the way from the start to the optimum, tried in turn for a motion within all
+    limits."""
+    search_share: float = 0.9
+    """Share of a start's time that the search may use; the certificate needs the rest."""
 
 
-@dataclass(frozen=True)
-class PredictedDeviation:
-    """How well one period would tell a parameter."""
-
-    parameter: str
-    """A base parameter as a sum of parameters of bodies (`m`, `mx` …, `Ixx` …) and rotors (`Ia`),
-    each with the number of its joint; or `coulomb`, `viscous`, `offset` or `load` of a joint."""
-    sd: Annotated[float, Unit("SI")]
-    """Standard deviation after one period, with 10 independent samples of every joint per
-    second."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Excitation:
-    """A motion that tells parameters apart."""
-
-    coefficients: Series
-    """The motion as a series."""
-    trajectory: Trajectory
-    """The same motion as a spline, with samples."""
-    energy: Energy
-    """Energy of one period."""
-    condition: Ratio
-    """Condition of the columns, over the noise."""
-    scaled_condition: Ratio
-    """Condition of the columns, scaled to one length."""
-    predicted_sd: list[PredictedDeviation]
-    """Predicted standard deviations."""
-    cost: Annotated[float, Internal]
-    """What the criterion lowers."""
-    starts: Count
-    """Starts that were completed."""
-    feasible: Count
-    """Starts that gave a motion within all limits."""
-    certificate: Certificate
-    """Independent check of the motion."""
+EXCITATION = ExcitationSettings()
 
 
 @one_thread()
 def excite(problem: ExcitationProblem) -> Excitation:
-    """The best motion of all starts that end before the deadline. Raises ExcitationInfeasible, or
-    DeadlineExceeded.
+    """Find an excitation from several random starts.
+
+    Args:
+        problem: the request.
+
+    Returns:
+        The best motion of all starts completed before the deadline.
+
+    Raises:
+        ExcitationInfeasible: no start leads to a motion within all limits.
+        DeadlineExceeded: the deadline passed before any start ended.
     """
     deadline = Deadline.after(problem.deadline)
     design = _Design(problem)
@@ -129,12 +98,12 @@ def excite(problem: ExcitationProblem) -> Excitation:
     limit: str | None = None
     while done < problem.starts and not deadline.passed:
         coordinates = design.start(done)
-        part = _SHARE * deadline.left / (problem.starts - done)
+        part = EXCITATION.search_share * deadline.left / (problem.starts - done)
         done += 1
         if coordinates is None:
             limit = "clearance"
             continue
-        motion, limit = design.kept(
+        motion, limit = design.within_limits(
             coordinates, design.improved(coordinates, deadline.within(part))
         )
         if motion is None:
@@ -148,13 +117,13 @@ def excite(problem: ExcitationProblem) -> Excitation:
 
 
 class _Design:
-    """A problem with its columns, limits and collisions."""
+    """A problem with its regression columns, limits and collision model."""
 
     def __init__(self, problem: ExcitationProblem) -> None:
-        self.problem, self.arm = problem, _standing(problem)
+        self.problem, self.arm = problem, _with_mounting_plane(problem)
         self.basis = FourierBasis(problem.period, problem.harmonics)
-        self.columns = TorqueColumns(self.arm, problem.parts, STATES)
-        t = np.arange(STATES) * problem.period / STATES
+        self.columns = TorqueColumns(self.arm, problem.parts, EXCITATION.states)
+        t = np.arange(EXCITATION.states) * problem.period / EXCITATION.states
         self.matrices = [self.basis.matrix(t, order) for order in range(4)]
         self.plant = Plant(self.arm)
         limits = self.arm.active_limits
@@ -164,16 +133,20 @@ class _Design:
         )
 
     def start(self, number: int) -> Array | None:
-        """Coordinates of a small motion about a centre without collision; None if none was
+        """Coordinates of a small motion around a collision-free centre; None if no centre was
         found."""
         random, limits = np.random.default_rng(number), self.arm.active_limits
         size = (self.basis.free, self.arm.robot.nq)
-        small = random.uniform(-_AMPLITUDE, _AMPLITUDE, size) * np.minimum(1.0, limits.v_max)
+        small = random.uniform(
+            -EXCITATION.start_amplitude, EXCITATION.start_amplitude, size
+        ) * np.minimum(1.0, limits.v_max)
         if self.problem.centre is not None:
             return np.vstack([self.problem.centre, small])
         low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
         for centre in random.uniform(
-            low + 0.2 * (high - low), high - 0.2 * (high - low), (_CENTRES, len(low))
+            low + 0.2 * (high - low),
+            high - 0.2 * (high - low),
+            (EXCITATION.centre_attempts, len(low)),
         ):
             q = centre + self.matrices[0][:, 1:] @ small
             if (
@@ -184,9 +157,7 @@ class _Design:
         return None
 
     def improved(self, coordinates: Array, deadline: Deadline) -> Array:
-        """Coordinates of a local optimum of the cost with penalties, or of the best point before
-        the deadline.
-        """
+        """Coordinates of a local minimum of the cost, or of the last point before the deadline."""
         shape = coordinates.shape
         fixed = self.problem.centre is not None
 
@@ -207,16 +178,16 @@ class _Design:
             method="L-BFGS-B",
             callback=stop_late,
             options={
-                "maxfun": MOST_EVALUATIONS,
-                "maxiter": MOST_EVALUATIONS,
-                "maxcor": 30,
-                "ftol": PROGRESS,
+                "maxfun": EXCITATION.max_evaluations,
+                "maxiter": EXCITATION.max_evaluations,
+                "maxcor": EXCITATION.lbfgs_memory,
+                "ftol": EXCITATION.cost_tolerance,
             },
         )
         return np.asarray(found.x, dtype=float).reshape(shape)
 
     def cost(self, coordinates: Array) -> tuple[float, Array]:
-        """The criterion and the penalties, and the gradient (1 + free, nq)."""
+        """Cost with penalties, and its gradient (1 + free, nq)."""
         arm, columns = self.arm, self.columns
         q, v, a, jerk = states = [matrix @ coordinates for matrix in self.matrices]
         W = columns.values(q, v, a)
@@ -226,38 +197,47 @@ class _Design:
         seed = np.zeros_like(W)
         seed[:, :, columns.wanted] = by_wanted.reshape(*W.shape[:2], -1) / noise[:, None]
         torque_cost, by_torque = torque_excess(arm, W @ columns.dynamics, v, a)
-        seed += PENALTY * by_torque[:, :, None] * columns.dynamics
+        seed += EXCITATION.penalty_weight * by_torque[:, :, None] * columns.dynamics
         gradients = [*columns.pulled_back(q, v, a, seed), np.zeros_like(jerk)]
         penalties = [
             range_excess(arm, q),
             *(excess(x, most) for x, most in zip(states[1:], self.rates, strict=True)),
         ]
         for order, (_, by_state) in enumerate(penalties):
-            gradients[order] = gradients[order] + PENALTY * by_state
+            gradients[order] = gradients[order] + EXCITATION.penalty_weight * by_state
         penalty = torque_cost + sum(each for each, _ in penalties)
         if self.collisions is not None:
             near, by_q = ClearancePenalty(self.collisions, self.problem.clearance)(q)
             penalty += near
-            gradients[0] = gradients[0] + PENALTY * by_q
+            gradients[0] = gradients[0] + EXCITATION.penalty_weight * by_q
         total = sum(
             matrix.T @ gradient for matrix, gradient in zip(self.matrices, gradients, strict=True)
         )
-        return value + PENALTY * penalty, np.asarray(total)
+        return value + EXCITATION.penalty_weight * penalty, np.asarray(total)
 
-    def kept(self, start: Array, found: Array) -> tuple[Excitation | None, str | None]:
-        """The motion of a search that ended at coordinates `found`, or the nearest one back to its
-        start that keeps all limits: a search that ran out of time may break them. If none does, the
-        limit that it breaks."""
+    def within_limits(self, start: Array, found: Array) -> tuple[Excitation | None, str | None]:
+        """The first motion within all limits on the way from the end of a search to its start.
+
+        A search without enough time may end beyond a limit.
+
+        Args:
+            start: coordinates of the start.
+            found: coordinates of the end of the search.
+
+        Returns:
+            The motion and None; or None and the limit exceeded by the last motion.
+        """
         limit = None
-        for share in _WAY_BACK:
+        for share in EXCITATION.fallback_shares:
             motion = self.certified(start + share * (found - start))
-            limit = self.broken(motion.certificate)
+            limit = self.exceeded_limit(motion.certificate)
             if limit is None:
                 return motion, None
         return None, limit
 
     def certified(self, coordinates: Array) -> Excitation:
-        """The motion with its period long enough for all rates and torques, and its certificate."""
+        """The motion with its certificate, and with a period long enough for all rates and
+        torques."""
         spline = self.basis.spline(coordinates)
         certificate, energy = self._certificate(spline)
         stretch = self._stretch(certificate)
@@ -265,15 +245,17 @@ class _Design:
         if stretch > 1:
             spline = retimed(spline, stretch)
             certificate, energy = self._certificate(spline)
-        # of the coefficients, which are speeds: a longer period makes them smaller
+        # the coefficients are speeds, so a longer period makes them smaller
         stretched = np.vstack([coordinates[:1], coordinates[1:] / stretch])
-        t = np.linspace(0.0, spline.duration, STATES, endpoint=False)
+        t = np.linspace(0.0, spline.duration, EXCITATION.states, endpoint=False)
         W = self.columns.values(*(np.asarray(spline.curve(t, order)) for order in range(3)))
         noise = np.asarray(self.problem.noise)
         information = Information(
             (W[:, :, self.columns.wanted] / noise[:, None]).reshape(-1, len(self.columns.wanted))
         )
-        deviations = information.deviations(INDEPENDENT_RATE * spline.duration * self.arm.robot.nq)
+        deviations = information.deviations(
+            EXCITATION.independent_rate * spline.duration * self.arm.robot.nq
+        )
         return Excitation(
             coefficients=Series(basis.period, *basis.coefficients(stretched)),
             trajectory=self.plant.trajectory(spline, self.problem.sample_period),
@@ -291,7 +273,7 @@ class _Design:
         )
 
     def _stretch(self, certificate: Certificate) -> float:
-        """Factor ≥ 1 of the period that brings every rate within its limit."""
+        """Factor ≥ 1 on the period that brings every rate within its limit."""
         orders = {
             "velocity": 1,
             "acceleration": 2,
@@ -309,8 +291,8 @@ class _Design:
         ]
         return float(max(1.0, *needed))
 
-    def broken(self, certificate: Certificate) -> str | None:
-        """The limit that a motion breaks; None if it keeps all of them."""
+    def exceeded_limit(self, certificate: Certificate) -> str | None:
+        """Limit exceeded by a motion; None if it is within all limits."""
         clearance = certificate.clearance
         if clearance is not None and clearance.min_clearance < self.problem.clearance:
             return "clearance"
@@ -325,8 +307,8 @@ class _Design:
         ), energy
 
 
-def _standing(problem: ExcitationProblem) -> Arm:
-    """The arm with the plane that it stands on among its obstacles, if asked for."""
+def _with_mounting_plane(problem: ExcitationProblem) -> Arm:
+    """The arm with its mounting plane among the obstacles, if requested."""
     arm = problem.arm
     if not (problem.mounting_plane and arm.collisions) or MOUNTING_PLANE in arm.scene.names:
         return arm

@@ -1,10 +1,12 @@
-"""The columns that an arm's torques are linear in, at states of a motion, and the gradients of
-functions of them.
+"""Regression columns of an arm's torques at states of a motion, with gradients.
+
+The torques are linear in base parameters of links and rotors and in friction coefficients.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -15,26 +17,40 @@ from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.dynamics.torque_regressor import torque_regressor
 from joulepath.optimizer.excitation.excitation_problem import Part
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
-from joulepath.optimizer.identify.fits.torque_fit import LEAST_LOAD_SPREAD
+from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.problem.arm import Arm
 
-# speed [rad/s] over which the sign of a speed is smoothed: friction of slower joints tells little
-KNEE = 0.05
-# corner of the load that friction grows with, as a share of the torque limit
-BEND = 0.01
-# poses in which the weight that a joint carries is looked at
-POSES = 200
+
+@dataclass(frozen=True)
+class ColumnSettings:
+    """Settings of the columns."""
+
+    knee: float = 0.05
+    """Speed over which the sign of a speed is smoothed [rad/s]; friction of slower joints carries
+    little information."""
+    load_corner: float = 0.01
+    """Rounded corner of the absolute rigid torque over the torque limit [1]."""
+    poses: int = 200
+    """Number of random poses at which gravity torques are compared."""
+
+
+COLUMNS = ColumnSettings()
 
 
 class TorqueColumns:
-    """Columns for n states of an arm: base parameters of its links and rotors, then friction of
-    every joint. Load friction is that of the arm's own rigid torque, at the joints whose load
-    varies enough to tell it.
+    """Columns for n states of an arm: base parameters of links and rotors, then friction of each
+    joint.
 
-    `names` (p,) are those of the columns, `wanted` the indices of those of `parts`. `dynamics` (p,)
-    are the arm's own values of links and rotors, zero for friction: with them the columns give the
-    torques without friction.
+    Load friction depends on the arm's own rigid torque; it has a column at joints whose load varies
+    enough to determine it.
+
+    Attributes:
+        names: names (p,) of the columns.
+        wanted: indices of the columns of the requested parameters.
+        dynamics: the arm's own values (p,) of links and rotors, and zero for friction; with them,
+        the
+            columns give the torques without friction.
     """
 
     def __init__(self, arm: Arm, parts: Sequence[Part], n: int) -> None:
@@ -44,9 +60,9 @@ class TorqueColumns:
         gravity = ca.SX(ca.DM(model.gravity.linear))
         links = torque_regressor(model, q, v, a, gravity)
         dynamics = ca.horzcat(links, ca.diag(a))[:, list(base.independent)]
-        sign = v / ca.sqrt(v * v + KNEE * KNEE)
+        sign = v / ca.sqrt(v * v + COLUMNS.knee * COLUMNS.knee)
         carried = loaded_joints(arm)
-        load = ca.diag(sign * _size(ca.mtimes(links, ca.DM(body_parameters(model))), arm))[
+        load = ca.diag(sign * _rounded_abs(ca.mtimes(links, ca.DM(body_parameters(model))), arm))[
             :, carried
         ]
         columns = ca.horzcat(dynamics, ca.diag(sign), ca.diag(v), ca.SX.eye(nq), load)
@@ -61,7 +77,7 @@ class TorqueColumns:
             f"load{j + 1}" for j in carried
         ]
         self.names = (*base.expressions, *friction)
-        self.dynamics = np.append(base.combination @ _own(model), np.zeros(len(friction)))
+        self.dynamics = np.append(base.combination @ _own_values(model), np.zeros(len(friction)))
         self.wanted = _wanted(base.independent, nq, parts, len(friction))
 
     def values(self, q: Array, v: Array, a: Array) -> Array:
@@ -78,30 +94,36 @@ class TorqueColumns:
 
 
 def loaded_joints(arm: Arm) -> list[int]:
-    """Joints whose load varies by as much as an identification asks for, by the weight of links and
-    payload.
-    """
+    """Joints whose gravity torque varies enough for an identification of load friction."""
     model, limits = rigid_body_model(arm), arm.active_limits
     data = model.createData()
     low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
-    poses = np.random.default_rng(0).uniform(low, high, (POSES, model.nq))
-    weights = np.array([pin.computeGeneralizedGravity(model, data, q) for q in poses])
-    return np.flatnonzero(
-        weights.std(axis=0) >= LEAST_LOAD_SPREAD * arm.robot.limits.tau_max
-    ).tolist()
+    poses = np.random.default_rng(0).uniform(low, high, (COLUMNS.poses, model.nq))
+    gravity = np.array([pin.computeGeneralizedGravity(model, data, q) for q in poses])
+    least = TORQUE_FIT.min_load_spread * arm.robot.limits.tau_max
+    return np.flatnonzero(gravity.std(axis=0) >= least).tolist()
 
 
-def _size(tau: ca.SX, arm: Arm) -> ca.SX:
-    """The size (nq,) of rigid torques (nq,), with a rounded corner."""
-    bend = ca.DM(BEND * arm.robot.limits.tau_max)
-    return ca.sqrt(tau * tau + bend * bend)
+def _rounded_abs(tau: ca.SX, arm: Arm) -> ca.SX:
+    """Absolute rigid torques (nq,) with a rounded corner."""
+    corner = ca.DM(COLUMNS.load_corner * arm.robot.limits.tau_max)
+    return ca.sqrt(tau * tau + corner * corner)
 
 
-def _own(model: pin.Model) -> Array:
+def _own_values(model: pin.Model) -> Array:
+    """Parameters of bodies, then rotor inertias."""
     return np.append(body_parameters(model), model.armature)
 
 
 def _wanted(independent: Sequence[int], nq: int, parts: Sequence[Part], friction: int) -> list[int]:
+    """Indices of the columns of the requested parameters.
+
+    Args:
+        independent: numbers of the independent standard parameters.
+        nq: number of joints.
+        parts: requested parameters.
+        friction: number of columns of friction.
+    """
     rotors = 10 * nq
     chosen = [
         k

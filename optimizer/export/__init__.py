@@ -1,1 +1,1 @@
-"""Motions as programs and files for robot controllers, one format per file."""
+"""Export of motions as programs and files for robot controllers, one format per file."""

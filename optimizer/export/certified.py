@@ -1,4 +1,4 @@
-"""The certificate of what is exported: computed again, for the motion as it leaves."""
+"""Certificate of an exported motion, computed again for the exported splines and speeds."""
 
 from __future__ import annotations
 
@@ -11,25 +11,28 @@ from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.linear_algebra import one_thread
-from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.certificate import Certificate
 
 
 @one_thread()
 def certified(program: Program) -> list[Certificate]:
-    """The certificates of all moves.
+    """Certificates of all moves of a program.
 
-    Checked are the limits of the arm, standstill at the ends and clearance; not a tool path. Raises
-    NotCertified for the first move whose certificate is not valid, and InvalidProblem for one
-    longer than LONGEST_DURATION. Ends by DeadlinePassed if the watched deadline passes.
+    Limits of the arm, standstill at the ends and clearance are checked, but not a tool path.
+
+    Raises:
+        NotCertified: the certificate of a move is not valid.
+        InvalidProblem: a move takes too long.
+        DeadlinePassed: the watched deadline passed.
     """
     certificates = []
     for index, move in enumerate(program.moves):
         checkpoint()
-        if move.duration > LONGEST_DURATION:
+        if move.duration > DURATIONS.longest:
             raise InvalidProblem(
                 "speed_scale",
-                f"A move takes more than {LONGEST_DURATION:g} s: give a larger speed_scale.",
+                f"A move takes more than {DURATIONS.longest:g} s: give a larger speed_scale.",
             )
         ends = move.spline.control_points[0], move.spline.control_points[-1]
         try:
@@ -44,7 +47,7 @@ def certified(program: Program) -> list[Certificate]:
 
 
 def _reason(certificate: Certificate) -> str:
-    """What is wrong with a motion, in words."""
+    """Reason for an invalid certificate, in words."""
     worst = max(certificate.worst_ratio, key=lambda name: _nan_first(certificate.worst_ratio[name]))
     if not certificate.worst_ratio[worst] <= 1:
         return f"its {worst} is at {certificate.worst_ratio[worst]:.4g} of the limit"

@@ -1,4 +1,4 @@
-"""`csv`: samples of positions, velocities and accelerations, as `POST /evaluate` reads them."""
+"""`csv`: samples of positions, velocities and accelerations in the format of `POST /evaluate`."""
 
 from __future__ import annotations
 
@@ -12,9 +12,14 @@ from joulepath.optimizer.export.rows import TableOptions, times
 
 
 def to_csv(program: Program, options: TableOptions | None = None) -> WrittenFile:
-    """Columns t, q1 …, v1 …, a1 … [s, rad]; one row per period, and the end.
+    """Write a program as CSV, with columns t, q1 …, v1 …, a1 … [s, rad] and one row per period.
 
-    Raises FormatUnsuitable if the motion is too long.
+    Args:
+        program: the motion.
+        options: period of the rows; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the motion is too long.
     """
     period = (options or TableOptions()).period
     t = times(program, period, "csv")

@@ -12,7 +12,8 @@ from joulepath.optimizer.exceptions import JoulepathError
 @dataclass(eq=False)
 class FormatUnsuitable(JoulepathError):
     """The motion cannot be written in this format: the robot has another number of joints or
-    another maker's controller, or the file would be too large."""
+    another maker's controller, or the file would be too large.
+    """
 
     title = "Format unsuitable"
     remedy = "Use one of the formats or options that `detail` names."
@@ -20,7 +21,7 @@ class FormatUnsuitable(JoulepathError):
     format: str
     """The format."""
     message: Annotated[str, Internal]
-    """Why the motion does not fit the format, and what does."""
+    """Reason, and a suitable format or option."""
 
     def __str__(self) -> str:
         return self.message

@@ -42,13 +42,13 @@ ExportOptions = (
 
 @dataclass(frozen=True)
 class Format:
-    """An export format: its description, its writer, and the class of its options (None without
-    options).
-    """
+    """An export format."""
 
     meaning: str
+    """Description of the format."""
     write: Callable[[Program, Any], WrittenFile]
     options: type[ExportOptions] | None
+    """Class of its options; None for a format without options."""
 
 
 FORMATS: dict[FormatName, Format] = {
@@ -94,19 +94,18 @@ FORMATS: dict[FormatName, Format] = {
 
 @dataclass(frozen=True)
 class ExportedFile:
-    """A file for a robot controller, and what is known of it.
-
-    `name` is a name for the file, `content` its bytes. The motion in it is slowed down to
-    `speed_scale` of its speed, and its largest value / limit is `worst_ratio`, by its certificate.
-    `notes` says in sentences how far the file deviates from the motion, and what it leaves out.
-    """
+    """A file for a robot controller."""
 
     name: str
+    """Suggested name of the file."""
     content: bytes
     media_type: str
     speed_scale: float
+    """Share of its speed to which the motion is slowed down [1]."""
     worst_ratio: float
+    """Largest value / limit of the motion, by its certificate [1]."""
     notes: tuple[str, ...]
+    """Deviations of the file from the motion and omissions, in sentences."""
 
 
 @overload
@@ -143,24 +142,24 @@ def export(
 ) -> ExportedFile:
     """Write a motion as a program or file for a robot controller.
 
-    The motion is certified again at the speed at which it leaves: limits, rest at both ends of
-    every move, and clearance. A tool path is not compared again. No format was run on hardware.
+    The motion is certified again at its exported speed: limits, rest at both ends of every move,
+    and clearance. A tool path is not compared again. No format was run on hardware.
 
     Args:
         motion: solution of a problem or of a cycle, or a program of moves and rests.
         format: name of the format; docs/exports.md describes each.
         options: options of this format; None for its defaults.
-        problem: problem that a `Solution` solves, which names its arm. The others name theirs.
-        speed_scale: fraction of the speed in (0, 1]. Moves are slowed down, rests stay as they are.
+        problem: problem of a `Solution`, which contains its arm; other motions contain theirs.
+        speed_scale: fraction of the speed in (0, 1]. Moves are slowed down, rests are not.
         deadline: wall time after which the certificate is given up [s].
-        clock: function that returns the time [s].
+        clock: function for the current time [s].
 
     Returns:
         The file, with the largest value / limit of its motion.
 
     Raises:
         InvalidProblem: the options are those of another format, or `problem` is missing.
-        NotCertified: the motion breaks a limit at this speed, or is not one of this arm.
+        NotCertified: the motion exceeds a limit at this speed, or does not belong to the arm.
         FormatUnsuitable: the format is not for this robot, or the file would be too large.
         DeadlineExceeded: the deadline passed first.
     """

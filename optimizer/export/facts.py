@@ -1,4 +1,4 @@
-"""What every exported file says of itself, and plain text for comments."""
+"""Header, notes and plain text of exported files."""
 
 from __future__ import annotations
 
@@ -12,21 +12,18 @@ NOT_RUN = (
     "Not run on hardware: run it in the simulator of the maker, then slowly, with a hand at "
     "the stop button."
 )
-_LONGEST_COMMENT = 160
 _NOT_PLAIN = re.compile(r"[^A-Za-z0-9 .,:+\-/()=%_]")
 
 
 @dataclass(frozen=True)
 class WrittenFile:
-    """What the writer of a format makes.
-
-    `notes` says in sentences how far it deviates from the motion, and what it leaves out.
-    """
+    """A file in one format."""
 
     content: bytes
     media_type: str
     extension: str
     notes: tuple[str, ...] = ()
+    """Deviations of the file from the motion and omissions, in sentences."""
 
     @staticmethod
     def of_text(
@@ -36,15 +33,13 @@ class WrittenFile:
         return WrittenFile(text.encode(), media_type, extension, notes)
 
 
-def comment(text: str) -> str:
-    """The text with nothing in it that could end a comment or a string of any format: one line,
-    plain ASCII.
-    """
-    return _NOT_PLAIN.sub("?", text)[:_LONGEST_COMMENT]
+def comment(text: str, max_length: int = 160) -> str:
+    """One line of plain ASCII text that cannot end a comment or a string of any format."""
+    return _NOT_PLAIN.sub("?", text)[:max_length]
 
 
 def header(program: Program, title: str, notes: tuple[str, ...]) -> list[str]:
-    """Lines that open a file; the writer of a format puts its sign of a comment before each."""
+    """Lines at the head of a file, before which the writer of a format puts its comment sign."""
     scale = program.speed_scale
     slowed = (
         "at full speed"
@@ -64,7 +59,7 @@ def header(program: Program, title: str, notes: tuple[str, ...]) -> list[str]:
 
 
 def output_note(program: Program, output: int | str | None) -> tuple[str, ...]:
-    """A note for the program of a cycle that switches no output."""
+    """Note for the program of a cycle without a switched output."""
     if output is not None or all(timed.payload is None for timed in program.timed):
         return ()
     return (
@@ -74,8 +69,18 @@ def output_note(program: Program, output: int | str | None) -> tuple[str, ...]:
 
 
 def check_joints(program: Program, format: str, nq: int, maker: str, arms: str) -> None:
-    """Raises FormatUnsuitable for a robot with other than `nq` joints, or one of another maker's
-    that is known.
+    """Check that a format fits the robot.
+
+    Args:
+        program: the motion.
+        format: name of the format in error messages.
+        nq: number of joints of the format.
+        maker: maker of the robots.
+        arms: description of the robots in error messages.
+
+    Raises:
+        FormatUnsuitable: the robot has another number of joints, or is known to be of another
+            maker.
     """
     robot = program.robot
     # arms of users' own have figures without a maker: their number of joints decides

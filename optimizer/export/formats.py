@@ -1,4 +1,4 @@
-"""The names of the formats, which load nothing."""
+"""Names of the formats; this module imports nothing of the library."""
 
 from __future__ import annotations
 

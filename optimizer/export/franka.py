@@ -17,27 +17,42 @@ import numpy as np
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, header
 from joulepath.optimizer.export.program import Program
-from joulepath.optimizer.export.rows import MOST_ROWS, ticks
+from joulepath.optimizer.export.rows import TABLE, ticks
 
-PERIOD = 1e-3
-"""Period [s] of the control interface."""
-MOST_COMPILED = 30_000
-"""Most rows of a header: a compiler takes seconds for it."""
-ROUNDING = 1e-12
-"""Rounding of the positions [rad]."""
+
+@dataclass(frozen=True)
+class FrankaFormat:
+    """Properties of the format."""
+
+    period: float = 1e-3
+    """Period of the control interface [s]."""
+    max_compiled_rows: int = 30_000
+    """Largest number of rows of a header; a compiler takes seconds for it."""
+    rounding: float = 1e-12
+    """Rounding error of the positions [rad]."""
+
+
+FRANKA = FrankaFormat()
 
 
 @dataclass(frozen=True)
 class FrankaOptions:
-    """Options of `franka`: the `form` is a table as CSV, or a C++ header with a motion
-    generator."""
+    """Options of `franka`."""
 
     form: Literal["csv", "cpp"] = "csv"
+    """A table as CSV, or a C++ header with a motion generator."""
 
 
 def to_franka(program: Program, options: FrankaOptions | None = None) -> WrittenFile:
-    """The table or the header. Raises FormatUnsuitable for another kind of robot, and if it were
-    too large.
+    """Write a program as a table or a header.
+
+    Args:
+        program: the motion.
+        options: form of the file; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the robot is not one of Franka, the payload changes, or the file would be
+            too large.
     """
     options = options or FrankaOptions()
     check_joints(program, "franka", 7, "Franka", "robots of Franka, with seven joints")
@@ -47,10 +62,15 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Written
             "The payload changes on the way, and a motion generator cannot switch it: export move "
             "by move.",
         )
-    t = ticks(program, PERIOD, "franka", MOST_ROWS if options.form == "csv" else MOST_COMPILED)
+    t = ticks(
+        program,
+        FRANKA.period,
+        "franka",
+        TABLE.max_rows if options.form == "csv" else FRANKA.max_compiled_rows,
+    )
     q, v, _ = program.at(t)
     notes = (
-        f"a row every millisecond, exact to {ROUNDING:.0e} rad, the last at the goal",
+        f"a row every millisecond, exact to {FRANKA.rounding:.0e} rad, the last at the goal",
         "set the payload with setLoad before, and move to the start with a motion of your own",
         "limits of the FR3 that depend on the joint positions are not checked",
     )

@@ -1,4 +1,4 @@
-"""`json`: the splines themselves, with what the arm carries and when it rests."""
+"""`json`: the splines of a motion, with payloads and rests."""
 
 from __future__ import annotations
 

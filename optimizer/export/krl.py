@@ -1,5 +1,4 @@
-"""`krl`: a program for KUKA controllers (KR C4 and later), a spline block of SPTP points in a time
-block.
+"""`krl`: a program for KUKA controllers (KR C4 and later), with SPTP points in a time block.
 
 Syntax, as in KUKA's manual "KUKA System Software 8.x, operating and programming instructions for
 system integrators", chapter on spline motions: `PTP_SPLINE … SPTP {A1 …} … ENDSPLINE`; in it
@@ -21,17 +20,22 @@ from joulepath.optimizer.problem.arm import Payload
 
 @dataclass(frozen=True)
 class KrlOptions(PointOptions):
-    """Options of `krl`: those of `PointOptions`, and `digital_output`.
-
-    `digital_output` is the number of an output that is on from each grasp to the release; None
-    switches nothing.
-    """
+    """Options of `krl`."""
 
     digital_output: int | None = None
+    """Number of an output that is on from each grasp to the release; None switches nothing."""
 
 
 def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
-    """The program. Raises FormatUnsuitable for a robot without six joints or of another maker."""
+    """Write a program in KRL.
+
+    Args:
+        program: the motion.
+        options: points, axes and output; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the robot does not have six joints, or is of another maker.
+    """
     options = options or KrlOptions()
     check_joints(
         program, "krl", 6, "KUKA", "robots of KUKA that are programmed in KRL, with six joints"
@@ -42,8 +46,7 @@ def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
         f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "
         "keeps every time",
         "model of the controller: it passes the points at their times, and between them anything "
-        "from straight lines "
-        "in joint space to the cubic spline",
+        "from straight lines in joint space to the cubic spline",
         "what it adds to a time that it cannot keep is not in this bound",
         *output_note(program, options.digital_output),
     )
@@ -82,7 +85,7 @@ def _block(points: EvenPoints, options: KrlOptions) -> list[str]:
 
 
 def _switch(timed: Timed, output: int | None) -> list[str]:
-    """Lines for what the arm takes up or puts down before a step."""
+    """Lines that switch output and payload before a step."""
     if timed.payload is None:
         return []
     return [

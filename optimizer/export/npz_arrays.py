@@ -1,4 +1,4 @@
-"""`npz`: arrays for NumPy, samples and the splines they come from."""
+"""`npz`: arrays for NumPy, with samples and splines."""
 
 from __future__ import annotations
 
@@ -13,11 +13,18 @@ from joulepath.optimizer.export.rows import TableOptions, times
 
 
 def to_npz(program: Program, options: TableOptions | None = None) -> WrittenFile:
-    """Arrays t (k,) [s], q, v, a (k, nq) [rad, s] every period, `joint_names`, `speed_scale`, and
-    for the move of index i `degree_i`, `knots_i` (m,) [s], `control_points_i` (n, nq) [rad] and its
-    start `t0_i` [s].
+    """Write a program as arrays, to be read by `numpy.load` without pickle.
 
-    `numpy.load` reads it without pickle. Raises FormatUnsuitable if the motion is too long.
+    The arrays are t (k,) [s] and q, v, a (k, nq) [rad, s] at every period, `joint_names`,
+    `speed_scale`; and for the move with the index i, `degree_i`, `knots_i` (m,) [s],
+    `control_points_i` (n, nq) [rad] and its start `t0_i` [s].
+
+    Args:
+        program: the motion.
+        options: period of the samples; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the motion is too long.
     """
     t = times(program, (options or TableOptions()).period, "npz")
     q, v, a = program.at(t)

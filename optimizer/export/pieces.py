@@ -1,4 +1,4 @@
-"""A spline as polynomials, one per knot span."""
+"""Polynomial pieces of a spline, one per knot span."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from joulepath.optimizer.motion.spline import Spline
 
 
 def breaks(spline: Spline) -> Array:
-    """Ends (m + 1,) [s] of the knot spans that have a length."""
+    """Ends (m + 1,) of the knot spans with a positive length [s]."""
     return np.unique(spline.knots)
 
 
 def pieces(spline: Spline) -> tuple[Array, Array]:
-    """Ends (m + 1,) [s] of the pieces and their coefficients (m, degree + 1, nq) [rad], the
-    constant ones first.
+    """Polynomial pieces of a spline, as functions of the elapsed share of their time in [0, 1].
 
-    A piece is a polynomial of the share of its time that has passed, in [0, 1].
+    Returns:
+        Ends of the pieces (m + 1,) [s], and coefficients (m, degree + 1, nq) [rad], the constant
+        ones first.
     """
     edges, curve = breaks(spline), spline.curve
     length = np.diff(edges)[:, None]

@@ -1,4 +1,4 @@
-"""Options of the formats that give a controller points: how many of them, and in which axes."""
+"""Options of formats with points: number of points, and axes of the controller."""
 
 from __future__ import annotations
 
@@ -12,19 +12,17 @@ from joulepath.optimizer.export.errors import FormatUnsuitable
 
 @dataclass(frozen=True)
 class PointOptions:
-    """Number of points, and the axes of the controller: axis = sign · joint + offset [degrees].
-
-    `tolerance` [rad] is the deviation from the spline that the number of points is chosen for.
-    `signs` (1 or -1) and `offsets` [degrees] have one number per joint; None stands for 1 and for
-    0.
-    """
+    """Number of points, and the axes of the controller: axis = sign · joint + offset [degrees]."""
 
     tolerance: float = 0.005
+    """Deviation from the spline that determines the number of points [rad]."""
     signs: tuple[int, ...] | None = None
+    """Sign of each joint, 1 or -1; None for 1."""
     offsets: tuple[float, ...] | None = None
+    """Offset of each joint [degrees]; None for 0."""
 
     def degrees(self, q: Array) -> list[str]:
-        """Axes of joint positions q (nq,) [rad], to 1e-6 degrees."""
+        """Axes of joint positions (nq,) [rad], to 1e-6 degrees."""
         values = np.rad2deg(q)
         if self.signs is not None:
             values = values * np.array(self.signs)
@@ -33,7 +31,11 @@ class PointOptions:
         return [f"{x + 0.0:.6f}" for x in values]
 
     def check(self, format: str, nq: int) -> None:
-        """Raises FormatUnsuitable unless there are as many signs and offsets as joints, if any."""
+        """Check that signs and offsets have one number per joint.
+
+        Raises:
+            FormatUnsuitable: the number is wrong.
+        """
         for name, given in (("signs", self.signs), ("offsets", self.offsets)):
             if given is not None and len(given) != nq:
                 raise FormatUnsuitable(

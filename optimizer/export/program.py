@@ -1,4 +1,4 @@
-"""What is exported: moves along splines and rests between them, in order."""
+"""Programs to export: moves along splines with rests between them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,21 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.motion.spline import Spline, retimed, sample
 from joulepath.optimizer.problem.arm import Arm, Payload
 
-JOIN = 1e-6
-"""Largest jump [rad] of a joint from the end of a move to the start of the next."""
+
+@dataclass(frozen=True)
+class ProgramSettings:
+    """Settings of programs."""
+
+    max_jump: float = 1e-6
+    """Largest jump of a joint from the end of a move to the start of the next [rad]."""
+
+
+PROGRAM = ProgramSettings()
 
 
 @dataclass(frozen=True)
 class Move:
-    """A motion of `arm` from standstill to standstill; `label` is said in comments."""
+    """A motion of `arm` from standstill to standstill; comments contain the `label`."""
 
     spline: Spline
     arm: Arm
@@ -28,7 +36,7 @@ class Move:
 
     @property
     def duration(self) -> float:
-        """Length [s]."""
+        """Duration [s]."""
         return self.spline.duration
 
 
@@ -42,21 +50,25 @@ class Rest:
 
 @dataclass(frozen=True)
 class Timed:
-    """A step and when it begins [s]. Before it the payload becomes `payload`, where that is not
-    None: the arm takes something up (`grasps`), or puts it down."""
+    """A step of a program with its start."""
 
     step: Move | Rest
     t0: float
+    """Start of the step [s]."""
     payload: Payload | None = None
+    """Payload that the arm has from the start of the step on; None if it does not change."""
     grasps: bool = False
+    """Whether the arm takes something up rather than puts it down."""
 
 
 @dataclass(frozen=True)
 class Program:
     """Steps for one robot, the first of them a move.
 
-    Moves are slowed down by `speed_scale` already; rests are not. Raises InvalidProblem if the
-    steps do not fit together.
+    Moves are already slowed down by `speed_scale`; rests are not.
+
+    Raises:
+        InvalidProblem: the steps do not fit together.
     """
 
     steps: tuple[Move | Rest, ...]
@@ -75,7 +87,7 @@ class Program:
             np.abs(a.spline.control_points[-1] - b.spline.control_points[0])
             for a, b in pairwise(self.moves)
         ]
-        if max((float(jump.max()) for jump in jumps), default=0.0) > JOIN:
+        if max((float(jump.max()) for jump in jumps), default=0.0) > PROGRAM.max_jump:
             raise InvalidProblem(
                 "answer",
                 "A move does not begin where the one before it ends: ask for the cycle again.",
@@ -101,19 +113,17 @@ class Program:
 
     @property
     def payload(self) -> Payload:
-        """What the arm carries at the start."""
+        """Payload at the start."""
         return self.moves[0].arm.payload
 
     @property
     def duration(self) -> float:
-        """Length [s], rests included."""
+        """Duration [s], with rests."""
         return sum((step.duration for step in self.steps), 0.0)
 
     @cached_property
     def timed(self) -> tuple[Timed, ...]:
-        """The steps with their times. What the arm takes up or puts down, it does as soon as it
-        stands at the place.
-        """
+        """Steps with their starts. The payload changes as soon as the arm stands at the place."""
         timed, t, carried = list[Timed](), 0.0, self.payload
         for k, step in enumerate(self.steps):
             following = next((each for each in self.steps[k:] if isinstance(each, Move)), None)
@@ -143,9 +153,7 @@ class Program:
         return q, v, a
 
     def slowed(self, speed_scale: float) -> Program:
-        """The same with every move slowed down to this fraction of its speed. Rests stay as long as
-        they are.
-        """
+        """The program with every move slowed down to a share of its speed, and unchanged rests."""
         steps = tuple(
             replace(step, spline=retimed(step.spline, 1 / speed_scale))
             if isinstance(step, Move)

@@ -18,25 +18,39 @@ from joulepath.optimizer.export.program import Move, Program, Timed
 from joulepath.optimizer.problem.arm import Payload
 
 SIGNAL = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
-"""Names that RAPID has for signals."""
+"""Names of signals in RAPID."""
 _NO_EXTERNAL_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
-# a tool without a mass is refused by the controller [kg]
-_LEAST_MASS = 0.001
+
+
+@dataclass(frozen=True)
+class RapidFormat:
+    """Properties of the format."""
+
+    min_tool_mass: float = 0.001
+    """Smallest mass of a tool [kg]; the controller refuses a tool without mass."""
+
+
+RAPID = RapidFormat()
 
 
 @dataclass(frozen=True)
 class RapidOptions(PointOptions):
-    """Options of `rapid`: those of `PointOptions`, and `digital_output`.
-
-    `digital_output` is the name of a signal that is on from each grasp to the release; None
-    switches nothing.
-    """
+    """Options of `rapid`."""
 
     digital_output: str | None = None
+    """Name of a signal that is on from each grasp to the release; None switches nothing."""
 
 
 def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFile:
-    """The module. Raises FormatUnsuitable for a robot without six joints or of another maker."""
+    """Write a program in RAPID.
+
+    Args:
+        program: the motion.
+        options: points, axes and output; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the robot does not have six joints, or is of another maker.
+    """
     options = options or RapidOptions()
     check_joints(program, "rapid", 6, "ABB", "robots of ABB, with six joints")
     options.check("rapid", program.robot.nq)
@@ -48,9 +62,8 @@ def to_rapid(program: Program, options: RapidOptions | None = None) -> WrittenFi
     notes = (
         f"within {max(each.deviation for each in moves):.2e} rad of the spline, if the controller "
         "keeps every time",
-        "model of the controller: straight lines in joint space, each in its time, corners rounded "
-        "by any amount up to "
-        "the middles of the lines",
+        "model of the controller: straight lines in joint space, each in its time, corners "
+        "rounded by any amount up to the middles of the lines",
         "what it adds to a time that it cannot keep is not in this bound",
         *output_note(program, options.digital_output),
     )
@@ -85,7 +98,7 @@ def _loads(program: Program) -> list[Payload]:
 
 def _tool(number: int, load: Payload) -> str:
     com = ",".join(f"{1000 * x:.3f}" for x in load.com)
-    mass = max(load.mass, _LEAST_MASS)
+    mass = max(load.mass, RAPID.min_tool_mass)
     return (
         "  PERS tooldata "
         f"jpTool{number}:=[TRUE,[[0,0,0],[1,0,0,0]],[{mass:.4f},[{com}],[1,0,0,0],0,0,0]];"

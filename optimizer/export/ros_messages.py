@@ -1,5 +1,4 @@
-"""`ros2` and `moveit`: messages with a joint trajectory, as YAML for the command line or JSON for
-rosbridge.
+"""`ros2` and `moveit`: messages with a joint trajectory, as YAML or as JSON for rosbridge.
 
 Definitions: trajectory_msgs/msg/JointTrajectory, control_msgs/action/FollowJointTrajectory,
 moveit_msgs/msg/RobotTrajectory; of rosbridge, ROSBRIDGE_PROTOCOL.md (operations `send_action_goal`
@@ -19,33 +18,48 @@ from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.export.quintic_points import QuinticPoints, quintic_points
 
 Encoding = Literal["yaml", "json"]
-GOAL_TOLERANCE, GOAL_TIME = 0.01, 1
-"""Largest distance of a joint from the end [rad], and time for it to get there [s]."""
+
+
+@dataclass(frozen=True)
+class GoalSettings:
+    """Tolerances of a goal."""
+
+    position_tolerance: float = 0.01
+    """Largest distance of a joint from the end [rad]."""
+    time_tolerance: int = 1
+    """Time to reach the end after the motion [s]."""
+
+
+GOAL = GoalSettings()
 
 
 @dataclass(frozen=True)
 class Ros2Options:
-    """Options of `ros2`.
-
-    `message` is a FollowJointTrajectory goal or a JointTrajectory, `encoding` YAML, or JSON for
-    rosbridge. `controller` is the name of the controller's node.
-    """
+    """Options of `ros2`."""
 
     message: Literal["goal", "trajectory"] = "goal"
+    """A FollowJointTrajectory goal or a JointTrajectory."""
     encoding: Encoding = "yaml"
     controller: str = "joint_trajectory_controller"
+    """Name of the controller's node."""
 
 
 @dataclass(frozen=True)
 class MoveitOptions:
-    """Options of `moveit`: the `encoding` is YAML or JSON."""
+    """Options of `moveit`."""
 
     encoding: Encoding = "yaml"
 
 
 def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile:
-    """The message for a joint trajectory controller. Raises FormatUnsuitable if the motion is too
-    long.
+    """Write a program as a message for a joint trajectory controller.
+
+    Args:
+        program: the motion.
+        options: message, encoding and controller; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the motion is too long.
     """
     options = options or Ros2Options()
     points = quintic_points(program, "ros2")
@@ -56,12 +70,13 @@ def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile
     )
     if options.message == "goal":
         tolerance = [
-            {"name": name, "position": GOAL_TOLERANCE} for name in program.robot.joint_names
+            {"name": name, "position": GOAL.position_tolerance}
+            for name in program.robot.joint_names
         ]
         message = {
             "trajectory": trajectory,
             "goal_tolerance": tolerance,
-            "goal_time_tolerance": {"sec": GOAL_TIME, "nanosec": 0},
+            "goal_time_tolerance": {"sec": GOAL.time_tolerance, "nanosec": 0},
         }
         kind = "control_msgs/action/FollowJointTrajectory"
         wrapped = {
@@ -81,7 +96,15 @@ def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile
 
 
 def to_moveit(program: Program, options: MoveitOptions | None = None) -> WrittenFile:
-    """A RobotTrajectory for MoveIt. Raises FormatUnsuitable if the motion is too long."""
+    """Write a program as a RobotTrajectory for MoveIt.
+
+    Args:
+        program: the motion.
+        options: encoding; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the motion is too long.
+    """
     encoding, points = (options or MoveitOptions()).encoding, quintic_points(program, "moveit")
     message = {
         "joint_trajectory": _trajectory(program, points),
@@ -122,8 +145,7 @@ def _file(
 ) -> WrittenFile:
     notes = (
         f"{len(points.nanoseconds)} points, and quintics between them are within "
-        f"{points.position:.1e} rad and "
-        f"{points.velocity:.1e} rad/s of the spline",
+        f"{points.position:.1e} rad and {points.velocity:.1e} rad/s of the spline",
         "payload and outputs are not in the message: set them on the robot",
         *(
             f"at {timed.t0:.4f} s the payload becomes {timed.payload.mass:.4g} kg"

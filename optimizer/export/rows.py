@@ -1,4 +1,4 @@
-"""Sampling times of a program at a fixed period, for formats that are tables."""
+"""Times of the rows of a table, at a fixed period."""
 
 from __future__ import annotations
 
@@ -11,32 +11,51 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Program
 
-MOST_ROWS = 100_000
-"""Most rows of a table: some ten megabytes."""
-# what is left of the last period [s], below which its beginning counts as the end
-SHORTEST_ROW = 1e-6
+
+@dataclass(frozen=True)
+class TableLimits:
+    """Limits of a table."""
+
+    max_rows: int = 100_000
+    """Largest number of rows: some ten megabytes."""
+    min_remainder: float = 1e-6
+    """Remainder of the last period, up to which its beginning counts as the end [s]."""
+
+
+TABLE = TableLimits()
 
 
 @dataclass(frozen=True)
 class TableOptions:
-    """Options of `csv` and `npz`: `period` [s] is the time between two rows."""
+    """Options of `csv` and `npz`."""
 
     period: float = 0.008
+    """Time between two rows [s]."""
 
 
-def times(program: Program, period: float, format: str, most: int = MOST_ROWS) -> Array:
-    """Multiples of the period [s] from 0 on, and the end. Raises FormatUnsuitable if they are too
-    many.
+def times(program: Program, period: float, format: str, most: int = TABLE.max_rows) -> Array:
+    """Multiples of a period from 0 on, and the end of a program [s].
+
+    Args:
+        program: the motion.
+        period: the period [s].
+        format: name of the format in error messages.
+        most: largest number of rows.
+
+    Raises:
+        FormatUnsuitable: there are too many rows.
     """
-    before_end = math.ceil((program.duration - SHORTEST_ROW) / period)
+    before_end = math.ceil((program.duration - TABLE.min_remainder) / period)
     _check_count(before_end + 1, format, most)
     return np.append(np.arange(before_end) * period, program.duration)
 
 
-def ticks(program: Program, period: float, format: str, most: int = MOST_ROWS) -> Array:
-    """Multiples of the period [s] from 0 to the end, or to the first one after it. Raises
-    FormatUnsuitable if they are too many."""
-    count = math.ceil((program.duration - SHORTEST_ROW) / period) + 1
+def ticks(program: Program, period: float, format: str, most: int = TABLE.max_rows) -> Array:
+    """Multiples of a period from 0 to the first one at or after the end of a program [s].
+
+    Arguments and errors are those of `times`.
+    """
+    count = math.ceil((program.duration - TABLE.min_remainder) / period) + 1
     _check_count(count, format, most)
     return np.asarray(np.arange(count) * period, dtype=float)
 
@@ -46,6 +65,5 @@ def _check_count(count: int, format: str, most: int) -> None:
         raise FormatUnsuitable(
             format,
             f"The file would have {count} rows, and {format} has at most {most}: export it with a "
-            "longer period, "
-            "with a larger speed_scale, or move by move.",
+            "longer period, with a larger speed_scale, or move by move.",
         )

@@ -1,5 +1,4 @@
-"""`urscript`: a program for the controllers of Universal Robots that follows the spline with
-servoj.
+"""`urscript`: a program for Universal Robots controllers that follows the spline with servoj.
 
 Syntax and functions are those of the maker's script manual (PolyScope 5, e-series; CB3 has the
 same):
@@ -27,45 +26,66 @@ from joulepath.optimizer.export.urscript_parts import CHECKS, serving
 from joulepath.optimizer.motion.spline import peak_rates
 from joulepath.optimizer.problem.arm import Payload
 
-MOST_PIECES = 2_000
-"""Most polynomials of a program: about a megabyte."""
-MOST_POINTS = 20_000
-"""Most set points of a program: about two megabytes."""
-# rounding of the coefficients, 5e-13 rad each, and of the controller's own sums
-SET_POINT_ERROR = 1e-9
-# the arm follows a set point by about `lookahead_time`; further away [rad] it is stopped
-LEAST_TRACKING, TRACKING_TIME = 0.05, 0.1
+
+@dataclass(frozen=True)
+class UrscriptFormat:
+    """Properties of the format."""
+
+    max_pieces: int = 2_000
+    """Largest number of polynomials of a program: about a megabyte."""
+    max_points: int = 20_000
+    """Largest number of set points of a program: about two megabytes."""
+    set_point_error: float = 1e-9
+    """Bound on rounding errors of the coefficients, 5e-13 rad each, and of the sums of the
+    controller [rad]."""
+    min_tracking: float = 0.05
+    """Distance from a set point at which an arm at rest is stopped [rad]."""
+    tracking_time: float = 0.1
+    """Time that is added to `lookahead_time`, by which an arm follows its set points [s]; both
+    times the speed widen the distance at which the arm is stopped."""
+
+
+URSCRIPT = UrscriptFormat()
 
 
 @dataclass(frozen=True)
 class UrscriptOptions:
-    """Options of `urscript`.
-
-    `rate` [Hz] is that of the controller: 500 for e-series, 125 for CB3. The `form` is the
-    polynomials, which the controller evaluates, or all set points. `lookahead_time` [s] and `gain`
-    are servoj's. `digital_output`, a standard output, is on while the arm carries more than at the
-    start; None switches nothing.
-    """
+    """Options of `urscript`."""
 
     rate: Literal[500, 125] = 500
+    """Rate of the controller [Hz]: 500 for e-series, 125 for CB3."""
     form: Literal["polynomials", "points"] = "polynomials"
+    """Polynomials, evaluated by the controller, or all set points."""
     lookahead_time: float = 0.1
+    """Parameter of servoj [s]."""
     gain: float = 300.0
+    """Parameter of servoj."""
     digital_output: int | None = None
+    """Standard output that is on while the arm carries more than at the start; None switches
+    nothing."""
 
 
 def to_urscript(program: Program, options: UrscriptOptions | None = None) -> WrittenFile:
-    """The program. Raises FormatUnsuitable for another kind of robot, and if it were too large."""
+    """Write a program in URScript.
+
+    Args:
+        program: the motion.
+        options: controller, form and output; None for the defaults.
+
+    Raises:
+        FormatUnsuitable: the robot is not one of Universal Robots, or the program would be too
+            large.
+    """
     options = options or UrscriptOptions()
     check_joints(
         program, "urscript", 6, "Universal Robots", "robots of Universal Robots, with six joints"
     )
     _check_size(program, options)
     fastest = max(float(peak_rates(move.spline)[0].max()) for move in program.moves)
-    tracking = LEAST_TRACKING + fastest * (options.lookahead_time + TRACKING_TIME)
+    tracking = URSCRIPT.min_tracking + fastest * (options.lookahead_time + URSCRIPT.tracking_time)
     notes = (
-        f"set points every {1000 / options.rate:g} ms by servoj, within {SET_POINT_ERROR:.0e} rad "
-        "of the spline",
+        f"set points every {1000 / options.rate:g} ms by servoj, within "
+        f"{URSCRIPT.set_point_error:.0e} rad of the spline",
         f"the arm follows them later by about lookahead_time = {options.lookahead_time:g} s",
         f"it stops if a joint is more than {tracking:.3f} rad away from its set point",
         "at the end of a move it waits up to 1 s until every joint is within 0.001 rad",
@@ -99,13 +119,13 @@ def _check_size(program: Program, options: UrscriptOptions) -> None:
     if options.form == "points":
         count, most, what = (
             sum(int(m.duration * options.rate) + 1 for m in program.moves),
-            MOST_POINTS,
+            URSCRIPT.max_points,
             "set points",
         )
     else:
         count, most, what = (
             sum(len(pieces(m.spline)[0]) - 1 for m in program.moves),
-            MOST_PIECES,
+            URSCRIPT.max_pieces,
             "polynomials",
         )
     if count > most:
@@ -127,7 +147,7 @@ def _output_notes(program: Program, options: UrscriptOptions) -> tuple[str, ...]
 
 
 def _beginning(program: Program) -> list[str]:
-    """Checks, payload, and the slow way to the start."""
+    """Checks, payload, and a slow move to the start."""
     start = _numbers(program.start)
     return [
         f"  # {comment(program.timed[0].step.label)}: the start, in joint space",
@@ -169,7 +189,7 @@ def _body(program: Program, options: UrscriptOptions, degree: int) -> list[str]:
 
 
 def _switch(timed: Timed, options: UrscriptOptions) -> list[str]:
-    """Lines for what the arm takes up or puts down before a step."""
+    """Lines that switch output and payload before a step."""
     if timed.payload is None:
         return []
     output = (

@@ -1,4 +1,4 @@
-"""The functions at the head of a URScript program."""
+"""Functions at the head of a URScript program."""
 
 from __future__ import annotations
 
@@ -33,15 +33,20 @@ CHECKS = """\
     end
   end""".splitlines()
 """Functions that stop, measure distances between joint positions, and set the payload; `jp_tick`
-counts the periods of a move, so that no rounding adds up."""
+counts the periods of a move, so that rounding errors do not add up."""
 
 
 def serving(
     rate: int, lookahead_time: float, gain: float, tracking: float, degree: int
 ) -> list[str]:
-    """Functions that serve set points at `rate` [Hz] to servoj.
+    """Functions that send set points to servoj.
 
-    `tracking` [rad] is the largest distance from a set point. `degree` is that of all polynomials.
+    Args:
+        rate: rate of the set points [Hz].
+        lookahead_time: parameter of servoj [s].
+        gain: parameter of servoj.
+        tracking: largest distance from a set point [rad].
+        degree: degree of all polynomials.
     """
     powers = [_horner(joint, degree) for joint in range(JOINTS)]
     return f"""\
@@ -80,7 +85,8 @@ def serving(
 
 
 def _horner(joint: int, degree: int) -> str:
-    """The polynomial of a joint, coefficients c[k * JOINTS + joint] of u to the power k."""
+    """Polynomial of a joint in Horner's form, with coefficients c[k * JOINTS + joint] of u to the
+    power k."""
     text = f"c[{degree * JOINTS + joint}]"
     for power in range(degree - 1, -1, -1):
         inner = text if power == degree - 1 else f"({text})"

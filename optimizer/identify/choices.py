@@ -1,4 +1,4 @@
-"""The names between which an identification chooses, which load nothing."""
+"""Names of the choices of an identification; this module imports nothing."""
 
 from __future__ import annotations
 
@@ -18,6 +18,5 @@ Method = Literal[
     "threshold_velocity",
     "temperature",
 ]
-"""How the figures are found; docs/identification.md says what each method needs, and when to choose
-it."""
+"""Methods to find figures; docs/identification.md lists their requirements and uses."""
 DEFAULT_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "load", "offset")

@@ -1,5 +1,6 @@
-"""Identified figures in the form of a robot's `figures.yaml`: value, unit, source, trust and
-standard deviation.
+"""Identified figures in the form of a robot's `figures.yaml`.
+
+A figure has a value, unit, source, trust letter and standard deviation.
 """
 
 from __future__ import annotations
@@ -12,8 +13,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES
 from joulepath.optimizer.identify.results import IdentifiedFigures
 
-LAW = "identified"
-"""Name of the friction law."""
+FRICTION_LAW = "identified"
 _LAW_UNITS = {
     "coulomb": "N·m",
     "curved": "N·m",
@@ -29,14 +29,18 @@ _DRIVES = {
 }
 _INERTIALS = {"mass": "kg", "center_of_mass": "m", "inertia": "kg·m²"}
 TRUST = "B"
-MASS = "inertials.m"
+LINK_MASS = "inertials.m"
 
 
 def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
-    """The document of figures identified on a `date`: only sections with identified figures, and
-    their covariance.
+    """Document of identified figures, with their covariance.
 
-    Names in the covariance are paths of figures with the number of the joint: `drives.copper.2`.
+    Sections without identified figures are left out. Names in the covariance are paths of figures
+    with the number of the joint: `drives.copper.2`.
+
+    Args:
+        figures: the figures.
+        date: date of the sources of the figures.
     """
     source = f"identified from logs {', '.join(figures.logs)}, {date}"
 
@@ -52,7 +56,7 @@ def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
     law, drives, inertials = section(_LAW_UNITS), section(_DRIVES), section(_INERTIALS)
     document: dict[str, Any] = {"robot": figures.robot}
     if law:
-        document["friction_laws"] = {LAW: law}
+        document["friction_laws"] = {FRICTION_LAW: law}
     if drives:
         document["drives"] = drives
     if "idle_power" in figures.values:
@@ -62,33 +66,32 @@ def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
         document["inertials"] = inertials | {
             "inertia_frame_rpy": turned | {"source": source, "trust": TRUST}
         }
-    told = [k for k, (name, _) in enumerate(figures.parameters) if _path(name) is not None]
-    if told:
-        names = [_path(name, joint) for name, joint in (figures.parameters[k] for k in told)]
+    listed = [k for k, (name, _) in enumerate(figures.parameters) if _path(name) is not None]
+    if listed:
         document["covariance"] = {
-            "names": names,
-            "matrix": _symmetric(figures.covariance[np.ix_(told, told)]).tolist(),
+            "names": [_path(*figures.parameters[k]) for k in listed],
+            "matrix": _symmetric(figures.covariance[np.ix_(listed, listed)]).tolist(),
         }
     return document | {"session_sd": figures.session_sd, "move_sd": figures.move_sd}
 
 
 def _deviations(figures: IdentifiedFigures, name: str, value: Array) -> Array | None:
-    """Standard deviations in the shape of a figure, 0 for joints that keep the robot's own; None if
-    no one is known.
+    """Standard deviations in the shape of a figure, 0 for joints with the robot's own value; None
+    if no joint has a standard deviation.
     """
     found, known = np.zeros(value.shape), False
     for (figure, joint), sd in zip(figures.parameters, figures.sd.tolist(), strict=True):
-        if figure == (MASS if name == "mass" else name):
+        if figure == (LINK_MASS if name == "mass" else name):
             known = True
             found[() if joint is None else joint] = sd
     return found if known else None
 
 
 def _path(name: str, joint: int | None = None) -> str | None:
-    """The path of a figure in a document; None for one that has none there."""
+    """Path of a figure in a document; None for a figure without a path."""
     end = "" if joint is None else f".{joint}"
     if name in _LAW_UNITS:
-        return f"friction_laws.{LAW}.{name}{end}"
+        return f"friction_laws.{FRICTION_LAW}.{name}{end}"
     if name in _DRIVES:
         return f"drives.{name}{end}"
     if name in LINK_NAMES:

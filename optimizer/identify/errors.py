@@ -1,4 +1,4 @@
-"""The errors of an identification."""
+"""Errors of an identification."""
 
 from __future__ import annotations
 
@@ -11,31 +11,28 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class NotExcited(JoulepathError):
-    """Nothing that was asked for can be identified from the logs."""
+    """The logs identify none of the requested figures."""
 
     title = "Not excited"
     remedy = (
         "Log motions in which every joint moves, at several speeds and in both directions, with "
-        "motor currents or the "
-        "power of the arm's bus."
+        "motor currents or the power of the arm's bus."
     )
     detail = (
         "Nothing that was asked for can be identified from these logs: log motions in which every "
-        "joint moves, at "
-        "several speeds and in both directions."
+        "joint moves, at several speeds and in both directions."
     )
 
     parameters: list[str]
     """Parameters that cannot be identified."""
     advice: dict[str, Any]
-    """A body for `POST /excitation`, whose motion tells these parameters. Add the scene of your
-    cell.
-    """
+    """A body for `POST /excitation`; its motion identifies these parameters. Add the scene of your
+    cell."""
 
 
 @dataclass(eq=False)
 class NothingHeldOut(JoulepathError):
-    """The logs have fewer than two different motions, so that no move can be held out for the
+    """The logs have fewer than two different motions, so no move can be held out for the
     validation. A motion and its repetitions, in either direction, count as one."""
 
     title = "Nothing held out"
@@ -47,38 +44,36 @@ class NothingHeldOut(JoulepathError):
     def __str__(self) -> str:
         return (
             f"The logs have {self.moves} moves along fewer than two different motions, so that "
-            "none can be held out: "
-            "log at least two different motions, or name other logs in `validate`."
+            "none can be held out: log at least two different motions, or name other logs in "
+            "`validate`."
         )
 
 
 class NoPowerChannel(JoulepathError):
-    """Power is to be identified, and no log has the power of the arm's bus."""
+    """Power is requested, and no log has the power of the arm's bus."""
 
     title = "No power channel"
     remedy = (
         "Log `actual_robot_voltage` and `actual_robot_current`, or a column `P`. Joint currents "
-        "are not taken for it: "
-        "they are no DC currents."
+        "are not taken for it: they are no DC currents."
     )
     detail = (
         "No log has the power of the arm's bus: log voltage and current of the arm, or its power. "
-        "Joint currents are "
-        "not taken for it, as they are no DC currents."
+        "Joint currents are not taken for it, as they are no DC currents."
     )
 
 
 @dataclass(eq=False)
 class MethodNotApplicable(JoulepathError):
-    """The logs do not have what the `method` needs: `detail` says what is missing."""
+    """The logs do not meet a requirement of the `method`; `detail` names it."""
 
     title = "Method not applicable"
     remedy = "Log it, or choose another method; `automatic` takes what the logs have."
 
     method: str
-    """The method that was asked for."""
+    """The requested method."""
     needs: Annotated[str, Internal]
-    """What the method needs, as a sentence."""
+    """Requirement of the method, as a sentence."""
 
     def __str__(self) -> str:
         return f"The method {self.method} does not fit these logs: {self.needs}"
@@ -86,8 +81,7 @@ class MethodNotApplicable(JoulepathError):
 
 @dataclass(eq=False)
 class PayloadUnknown(JoulepathError):
-    """`torque_constant` is asked for, it is not known what the arm carried, and joints carry too
-    little weight to tell their constants."""
+    """`torque_constant` is requested, and the payload of the logs is not known."""
 
     title = "Payload unknown"
     remedy = (
@@ -97,10 +91,9 @@ class PayloadUnknown(JoulepathError):
     )
     detail = (
         "Gravity does not tell the torque constants of all joints, and nobody said what the arm "
-        "carried: give "
-        "`payload` with each log, of mass 0 if it was nothing, and find a payload and torque "
-        "constants one by one."
+        "carried: give `payload` with each log, of mass 0 if it was nothing, and find a payload "
+        "and torque constants one by one."
     )
 
     joints: Annotated[list[int], Unit("1")]
-    """Joints at which gravity tells no torque constant, from 0."""
+    """Joints with too little gravity torque for a torque constant, from 0."""

@@ -1,4 +1,4 @@
-"""What an identification is to find, and how."""
+"""Options of an identification."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Metho
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """A motor that turns with several joints: its speed is `ratios` (nq,) times theirs.
-
-    Its inertia and friction act on all of them. An example is a wrist whose last motor is driven
-    through the joint before it.
+    """A motor that turns with several joints, such as the last motor of a wrist that is driven
+    through the joint before it. Its inertia and friction act on all of these joints.
     """
 
     ratios: Array
+    """Speed of the motor over that of each joint (nq,) [1]."""
 
     def __post_init__(self) -> None:
         ratios = np.array(self.ratios, dtype=float)
@@ -34,33 +33,37 @@ class Coupling:
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Numbers of the joints that it couples."""
+        """Numbers of the coupled joints."""
         return tuple(np.flatnonzero(self.ratios).tolist())
 
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationOptions:
-    """`fit`: the figures to find; power is added by itself where the logs have it, friction and
-    rotors where the payload of the last log is to be found. `refit`: the links' inertials, too.
+    """Requested figures and the method to find them.
 
-    `method` is how they are found, and `period` [s] that of the motion for the method `periodic`.
-
-    `held_out` is the fraction of the moves that validate; 0: none, 1: each motion in its turn.
-    `terms` are those of the friction law, `knee` [rad/s] that of its step (None: the robot's own).
-    `velocity_threshold` [rad/s]: slower samples of a joint do not enter its rows. `prior_weight` is
-    that of the robot's own inertials in a refit. Raises InvalidProblem.
+    Raises:
+        InvalidProblem: an option is out of its range, or options exclude each other.
     """
 
     fit: Sequence[Target] = ("friction", "rotor")
+    """Requested figures. Power is added if the logs have it; friction and rotors are added if the
+    payload of the last log is requested."""
     refit: bool = False
+    """Whether to fit the inertials of the links, too."""
     method: Method = "automatic"
     period: float | None = None
+    """Period of the motion for the method `periodic` [s]."""
     held_out: float = 0.3
+    """Share of the moving time that validates; 0: none, 1: each motion in its turn."""
     terms: Sequence[Term] = DEFAULT_TERMS
+    """Terms of the friction law."""
     knee: float | None = None
+    """Speed over which Coulomb friction reverses [rad/s]; None for the robot's own."""
     estimator: Estimator = "wls"
     velocity_threshold: float = 0.02
+    """Speed up to which samples of a joint are left out [rad/s]."""
     prior_weight: float = 1.0
+    """Weight of the robot's own inertials in a refit [1]."""
     couplings: Sequence[Coupling] = field(default_factory=tuple)
 
     def __post_init__(self) -> None:
@@ -97,7 +100,7 @@ class IdentificationOptions:
 
     @property
     def reduced(self) -> bool:
-        """Whether base parameters are found, which need no knowledge of the links."""
+        """Whether the method finds base parameters and needs no knowledge of the links."""
         return self.method in ("base_parameters", "essential_parameters", "periodic")
 
     @property
@@ -112,7 +115,7 @@ class IdentificationOptions:
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        """What is fitted: a payload is told only together with friction and rotors."""
+        """Fitted figures: a payload is fitted only together with friction and rotors."""
         given = tuple(self.fit)
         together: tuple[Target, ...] = ("friction", "rotor") if "payload" in given else ()
         return (*given, *(each for each in together if each not in given))

@@ -1,4 +1,4 @@
-"""What an identification found, as frozen data."""
+"""Results of an identification."""
 
 from __future__ import annotations
 
@@ -6,54 +6,59 @@ from dataclasses import dataclass
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.identify.estimates.estimate import Name
-from joulepath.optimizer.identify.rows.fit_rows import Numbers
+from joulepath.optimizer.identify.estimates.grouped import IntArray
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A figure of a joint (None: of the whole arm), its standard deviation, and the robot's own
-    value before.
-
-    `identified` is false where the logs do not tell it; `why` says why not, or is empty.
-    """
+    """One figure, with its uncertainty."""
 
     figure: str
     joint: int | None
+    """Number of the joint from 0; None for a figure of the whole arm."""
     value: float
     sd: float
+    """Standard deviation of the value."""
     previous: float
+    """The robot's own value."""
     identified: bool
     why: str
+    """Reason for not identifying it, or empty."""
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueErrors:
-    """Errors of predicted torques, per joint (nq,): root mean square [N·m], and relative to the
-    measured torque [%] over rows in which the joint moves and over all. Errors [%] of the energy at
-    the shafts and in the copper."""
+    """Errors of predicted torques."""
 
     rmse: Array
+    """Root mean square of the error of each joint (nq,) in motion [N·m]."""
     relative: Array
+    """Error over the measured torque of each joint (nq,) in motion [%]."""
     relative_all: Array
+    """Error over the measured torque of each joint (nq,) in all rows [%]."""
     shaft_energy: float
+    """Error of the energy at the shafts [%]."""
     copper_energy: float
+    """Error of the energy in the copper [%]."""
 
 
 @dataclass(frozen=True, eq=False)
 class PowerErrors:
-    """Errors of predicted power: root mean square [W] over moving rows, and of the energies of
-    moves [%].
-    """
+    """Errors of predicted power."""
 
     rmse: float
+    """Root mean square of the error of rows in motion [W]."""
     energy_mean: float
+    """Mean error of the energy of a move [%]."""
     energy_p90: float
+    """90th percentile of the error of the energy of a move [%]."""
     energy_max: float
+    """Largest error of the energy of a move [%]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Errors of one set of figures on held-out moves; None where nothing was measured."""
+    """Errors of one set of figures on held-out moves; None for a channel that was not logged."""
 
     torque: TorqueErrors | None
     power: PowerErrors | None
@@ -61,133 +66,143 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """What was measured over n rows in motion, and what figures make of it.
+    """Measured and modelled torques and powers of n rows in motion, NaN if not logged."""
 
-    `log`, `move` (n,) are their numbers from 0, `time` (n,) [s] counts from the start of the log.
-    Torques of the motors (n, nq) [N·m] and power on the bus (n,) [W] are NaN where nothing was
-    measured. So is the modelled torque of a joint that hardly moves: friction at rest is not known.
-    """
-
-    log: Numbers
-    move: Numbers
+    log: IntArray
+    """Number of the log (n,), from 0."""
+    move: IntArray
+    """Number of the move (n,), from 0."""
     time: Array
+    """Time from the start of the log (n,) [s]."""
     torque: Array
+    """Measured motor torques (n, nq) [N·m]."""
     modelled_torque: Array
+    """Modelled motor torques (n, nq) [N·m]; NaN for a joint near standstill, because friction at
+    rest is not determined."""
     power: Array
+    """Measured power on the bus (n,) [W]."""
     modelled_power: Array
+    """Modelled power on the bus (n,) [W]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """How the figures predict `moves` moves that their fit has not seen.
-
-    `fitted` are the identified figures, `own` the robot's, `constant` a constant power. `coverage`
-    [1] is the share of these moves whose measured energy lies between P5 and P95, `half_width` [%]
-    the mean half of that interval; None without power. `curves` show these moves, as the fit
-    without them predicts them.
-    """
+    """Errors on moves that were not part of the fit."""
 
     moves: int
+    """Number of these moves."""
     fitted: Prediction
+    """Errors of the identified figures."""
     own: Prediction
+    """Errors of the robot's own figures."""
     constant: PowerErrors | None
+    """Errors of a constant power; None without power."""
     coverage: float | None
+    """Share of the moves with a measured energy between P5 and P95 [1]; None without power."""
     half_width: float | None
+    """Mean of half the interval from P5 to P95 [%]; None without power."""
     curves: Curves
+    """The moves, as predicted by the fit without them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Numbers of `standard` and `base` parameters of bodies and rotors, and each base parameter as
-    an expression.
-
-    `condition` of the columns of the base parameters in these logs, scaled to length 1; `excited`:
-    their rank. Both are None where the inertials are not fitted.
-    """
+    """Standard and base parameters of bodies and rotors."""
 
     standard: int
+    """Number of standard parameters."""
     base: int
+    """Number of base parameters."""
     base_expressions: tuple[str, ...]
+    """Base parameters as sums of standard parameters."""
     condition: float | None
+    """Condition number of the columns of the base parameters in the logs, scaled to unit length;
+    None where the inertials are not fitted."""
     excited: int | None
+    """Rank of these columns; None where the inertials are not fitted."""
 
 
 @dataclass(frozen=True, eq=False)
 class Physical:
-    """Whether the inertials of every link belong to a body, and the least eigenvalue of each
-    pseudo-inertia (nq,).
-    """
+    """Physical consistency of the links."""
 
     consistent: bool
+    """Whether the inertials of every link belong to a real body."""
     min_eigenvalue: Array
+    """Least eigenvalue of each pseudo-inertia (nq,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Correlation of neighbouring residuals of torque per joint (nq,) and of power, NaN where
-    nothing was measured.
-
-    `white`: whether all of them are below 0.3. `sessions` has the size of each log's friction
-    relative to the fit's.
-    """
+    """Correlation of neighbouring residuals, NaN for a channel that was not logged."""
 
     torque_lag_one: Array
+    """Correlation of torque residuals of each joint (nq,) [1]."""
     power_lag_one: float
+    """Correlation of power residuals [1]."""
     white: bool
+    """Whether all correlations are below 0.3."""
     sessions: tuple[float, ...]
+    """Friction of each log over the fitted friction [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Temperatures:
-    """Friction over temperature per joint: friction(T) = friction(T0)·exp(-k (T - T0)); k [1/K]
-    (nq,) is NaN where the logs span too little. `reference` T0 and `span` (nq,) [°C, K], NaN
-    without temperatures."""
+    """Friction over temperature per joint: friction(T) = friction(T0)·exp(-k (T - T0))."""
 
     reference: Array
+    """Reference temperature T0 (nq,) [°C]; NaN without temperatures."""
     span: Array
+    """Span of the temperatures (nq,) [K]; NaN without temperatures."""
     k: Array
+    """Rate (nq,) [1/K]; NaN where the span is too small."""
     sd: Array
+    """Standard deviation of the rate (nq,) [1/K]."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredNoise:
-    """The noise of `periods` periods: standard deviation (nq,) [N·m] of a row's torque.
-
-    `excess` is the mean square of the residuals over that of the noise: 1 if the model is right,
-    more if it misses something.
-    """
+    """Noise of a periodic motion."""
 
     periods: int
+    """Number of periods."""
     deviation: Array
+    """Standard deviation of the torque of a row (nq,) [N·m]."""
     excess: float
+    """Mean square of the residuals over that of the noise [1]: 1 for a correct model, more for a
+    model that misses an effect."""
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What would help most: the figure that takes the largest `share` of the energy's variance away
-    if it is known, and what to log."""
+    """The most useful further measurement."""
 
     figure: str
+    """Figure whose better knowledge would reduce the variance of the energy most."""
     joint: int | None
+    """Number of the joint from 0; None for a figure of the whole arm."""
     share: float
+    """Share of the variance that would vanish [1]."""
     do: str
+    """Motion or channel to log."""
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedFigures:
-    """Figures of `robot` that logs gave, over joints (nq,) or of the whole arm, by name.
-
-    `values` holds complete figures: joints that the logs do not tell have the robot's own.
-    `parameters` (p) are those that the logs moved, in the order of `covariance` (p, p).
-    `session_sd` is the relative standard deviation of friction from day to day, `move_sd` [W] that
-    of the mean power of a move, which the model cannot express.
-    """
+    """Figures of a robot from logs, over joints (nq,) or of the whole arm."""
 
     robot: str
     values: dict[str, Array]
+    """Complete figures by name: joints without an identified value have the robot's own."""
     parameters: tuple[Name, ...]
+    """Names of the p parameters that the logs changed."""
     sd: Array
+    """Standard deviations (p,)."""
     covariance: Array
+    """Covariance (p, p)."""
     session_sd: float
+    """Relative standard deviation of friction from day to day [1]."""
     move_sd: float
+    """Standard deviation of the mean power of a move, not expressed by the model [W]."""
     logs: tuple[str, ...]
+    """Names of the logs."""

@@ -1,1 +1,1 @@
-"""Positions of a serial chain, and every inverse; the only room that knows the form of an arm."""
+"""Kinematics of serial chains, forward and inverse; the only room that knows the form of an arm."""

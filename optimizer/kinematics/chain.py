@@ -1,6 +1,4 @@
-"""The chain of an arm for its inverse kinematics: flange poses, Jacobians, and the error against a
-pose.
-"""
+"""Serial chain of an arm: flange poses, Jacobians, and the error of a pose."""
 
 from __future__ import annotations
 
@@ -13,16 +11,29 @@ import pinocchio as pin
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.forward import joint_placements
 
-# sine of an angle below which its axis is taken from the sine alone
-_TINY = 1e-12
-# configurations up to which products of neighbours take less time than all in a row, link by link
-FEW = 16
+
+@dataclass(frozen=True)
+class ChainSettings:
+    """Settings of forward kinematics and pose errors."""
+
+    smallest_sine: float = 1e-12
+    """Sine of a rotation below which its rotation vector is the skew part of the matrix: the angle
+    over the sine is 1 to double precision.
+    """
+    small_batch: int = 16
+    """Largest number of configurations for which a tree of matrix products is faster than one pass
+    over the links with all configurations in a row.
+    """
+
+
+CHAIN = ChainSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Joints about z at `placements` (nq, 4, 4), each in the frame of the link before, and the
-    flange on the last.
+    """Serial chain of revolute joints about z, with the flange fixed to the last link.
+
+    `placements` (nq, 4, 4) are the poses of the joints, each in the frame of the previous link.
     """
 
     placements: Array
@@ -30,7 +41,7 @@ class Chain:
 
     @classmethod
     def of(cls, model: pin.Model) -> Chain:
-        """The chain of a model with a frame `flange`."""
+        """Chain of a Pinocchio model with a frame `flange`."""
         flange = model.frames[model.getFrameId("flange")].placement
         return cls(joint_placements(model), np.asarray(flange.homogeneous))
 
@@ -40,51 +51,58 @@ class Chain:
         return len(self.placements)
 
     def mirrored(self) -> Chain:
-        """The chain from the flange to the base.
+        """The same chain read from the flange to the base.
 
-        With -q in the other order, it has the base where q has the flange, each seen from the other
-        end.
+        With the joint positions -q in reverse order, its flange pose is the pose of the base in the
+        flange frame of this chain at q.
         """
         back = np.linalg.inv(np.concatenate([self.placements, self.T_last_flange[None]]))[::-1]
         return Chain(back[:-1], back[-1])
 
     def flange(self, q: Array) -> Array:
-        """T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
-        if len(q) > FEW:
+        """Flange poses T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
+        if len(q) > CHAIN.small_batch:
             return _poses(self.flange_components(q))
-        waves = self._waves
-        parts = np.cos(q)[..., None, None] * waves[0]
-        parts += np.sin(q)[..., None, None] * waves[1]
-        parts += waves[2]
-        # products of neighbours, and so on: few calls for few configurations
+        harmonics = self._harmonics
+        parts = np.cos(q)[..., None, None] * harmonics[0]
+        parts += np.sin(q)[..., None, None] * harmonics[1]
+        parts += harmonics[2]
+        # A tree of products of neighbouring links needs the fewest calls for few configurations.
         while (count := parts.shape[1]) > 1:
             pairs = parts[:, : count - 1 : 2] @ parts[:, 1::2]
             parts = np.concatenate([pairs, parts[:, -1:]], axis=1) if count % 2 else pairs
         return np.asarray(parts[:, 0])
 
     @cached_property
-    def _waves(self) -> Array:
-        """Coefficients (3, nq, 4, 4) of cos q, sin q and 1 in the pose of each link in the frame
-        before it.
+    def _harmonics(self) -> Array:
+        """Coefficients (3, nq, 4, 4) of cos q, sin q and 1 in the pose of each link in the frame of
+        the previous one.
 
-        The flange stands for the last link.
+        The flange takes the place of the last link.
         """
         P = self.placements
-        waves = np.zeros((3, *P.shape))
-        waves[0, :, :, :2] = P[:, :, :2]
-        waves[1, :, :, 0], waves[1, :, :, 1] = P[:, :, 1], -P[:, :, 0]
-        waves[2, :, :, 2:] = P[:, :, 2:]
-        waves[:, -1] = waves[:, -1] @ self.T_last_flange
-        return waves
+        harmonics = np.zeros((3, *P.shape))
+        harmonics[0, :, :, :2] = P[:, :, :2]
+        harmonics[1, :, :, 0], harmonics[1, :, :, 1] = P[:, :, 1], -P[:, :, 0]
+        harmonics[2, :, :, 2:] = P[:, :, 2:]
+        harmonics[:, -1] = harmonics[:, -1] @ self.T_last_flange
+        return harmonics
 
     def flange_and_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """T_base_flange (n, 4, 4) at q (n, nq) [rad], and its geometric Jacobian (n, 6, nq)."""
+        """Flange poses T_base_flange (n, 4, 4) and geometric Jacobians (n, 6, nq) at q (n, nq)
+        [rad].
+        """
         flange, jacobian = self.flange_and_columns(q)
         return _poses(flange), np.ascontiguousarray(jacobian.transpose(2, 0, 1))
 
     def flange_and_columns(self, q: Array) -> tuple[Array, Array]:
-        """The same with all configurations in a row, for long products in place of many small ones:
-        `flange_components` (3, n, 4), and the Jacobian (6, nq, n)."""
+        """Flange poses and Jacobians with the configurations along the last axes.
+
+        One long product over all configurations replaces many small ones.
+
+        Returns:
+            The flange poses as `flange_components` (3, n, 4), and the Jacobians (6, nq, n).
+        """
         frames, flange = self._frames(q)
         jacobian = np.empty((6, *q.shape[::-1]))
         axis = jacobian[3:]
@@ -95,20 +113,18 @@ class Chain:
         return flange, jacobian
 
     def flange_components(self, q: Array) -> Array:
-        """x, y, z and the place of the flange by components (3, n, 4), at q (n, nq) [rad]."""
+        """First three rows (3, n, 4) of the flange poses at q (n, nq) [rad]."""
         return self._frames(q)[1]
 
     def _frames(self, q: Array) -> tuple[Array, Array]:
-        """The links' frames (nq, 3, n, 4) and the flange's (3, n, 4) at q (n, nq) [rad], as of
-        `flange_and_columns`.
-        """
+        """First three rows of the poses of the links (nq, 3, n, 4) and of the flange (3, n, 4)."""
         n, nq = q.shape
         turns, angles = np.empty((nq, n), dtype=complex), q.T
         turns.real, turns.imag = np.cos(angles), -np.sin(angles)
         frames = np.empty((nq, 3, n, 4))
         rows, across = frames.reshape(nq, 3 * n, 4), frames.view(complex)[..., 0]
         frames[0] = self.placements[0, :3, None]
-        # x + iy of a frame turned about its z
+        # x + iy of a frame that turns about its z axis is multiplied by exp(-iq)
         across[0] *= turns[0]
         for k in range(1, nq):
             np.matmul(rows[k - 1], self.placements[k], out=rows[k])
@@ -117,15 +133,18 @@ class Chain:
 
 
 def _poses(frames: Array) -> Array:
-    """Poses (n, 4, 4) by their components (3, n, 4)."""
+    """Poses (n, 4, 4) from their first three rows (3, n, 4)."""
     T = np.empty((frames.shape[1], 4, 4))
     T[:, :3], T[:, 3] = frames.transpose(1, 0, 2), (0.0, 0.0, 0.0, 1.0)
     return T
 
 
 def pose_error(T_reached: Array, T: Array) -> Array:
-    """Twist (n, 6) [m, rad] in base axes that carries poses T_reached (n, 4, 4) to T (4, 4) or (n,
-    4, 4): to first order in the translation, exactly in the rotation but for half turns."""
+    """Twist (n, 6) [m, rad], in base axes, from poses T_reached (n, 4, 4) to the pose T.
+
+    The translation is exact to first order, the rotation vector for all angles below a half turn. T
+    has the shape (4, 4), or (n, 4, 4) for one pose per row.
+    """
     error = np.empty((len(T_reached), 6))
     error[:, :3] = T[..., :3, 3] - T_reached[:, :3, 3]
     E = T[..., :3, :3] @ T_reached[:, :3, :3].transpose(0, 2, 1)
@@ -137,12 +156,16 @@ def pose_error(T_reached: Array, T: Array) -> Array:
     )
     sine = np.sqrt((axis * axis).sum(axis=1))
     cosine = (E[:, 0, 0] + E[:, 1, 1] + E[:, 2, 2] - 1) / 2
-    scale = np.where(sine > _TINY, np.arctan2(sine, cosine) / np.maximum(sine, _TINY), 1.0)
+    scale = np.where(
+        sine > CHAIN.smallest_sine,
+        np.arctan2(sine, cosine) / np.maximum(sine, CHAIN.smallest_sine),
+        1.0,
+    )
     error[:, 3:] = axis * scale[:, None]
     return error
 
 
-def miss(error: Array) -> Array:
-    """The greater (n,) of distance [m] and angle [rad] of twists (n, 6)."""
+def twist_size(error: Array) -> Array:
+    """Size (n,) of twists (n, 6): the larger of the distance [m] and the angle [rad]."""
     squares = error * error
     return np.asarray(np.sqrt(np.maximum(squares[:, :3].sum(axis=1), squares[:, 3:].sum(axis=1))))

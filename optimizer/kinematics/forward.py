@@ -10,16 +10,20 @@ from joulepath.optimizer.native.shared_library import address, library
 
 
 def joint_placements(model: pin.Model) -> Array:
-    """Poses (nq, 4, 4) of the joints of a chain, each in the frame of the link before it."""
+    """Poses (nq, 4, 4) of the joints of a chain, each in the frame of the previous link."""
     return np.array([placement.homogeneous for placement in model.jointPlacements][1:])
 
 
 def link_frames(placements: Array, q: Array) -> Array:
-    """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad] of revolute joints about z at `placements`
-    (nq, 4, 4).
+    """Frames of all links, T_base_link, shape (n, nq + 1, 4, 4).
 
-    Frame 0 is that of the base, the identity. Frame k, of link k, lies on joint k with z along the
-    joint's axis.
+    Frame 0 is the base frame, the identity. Frame k belongs to link k: its origin lies on joint k
+    and its z axis along the axis of this joint.
+
+    Args:
+        placements: poses (nq, 4, 4) of the revolute joints about z, each in the frame of the
+            previous link.
+        q: joint positions (n, nq) [rad].
     """
     nq = q.shape[1]
     q, placements = np.ascontiguousarray(q, dtype=float), np.ascontiguousarray(placements)

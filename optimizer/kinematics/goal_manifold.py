@@ -1,8 +1,8 @@
-"""The configurations that reach a pose whose orientation is free in part, as a manifold to move on.
+"""Manifold of the configurations that reach a pose with a partly free orientation.
 
-With one rotation free and seven joints it has two dimensions, with all of them four. Many
-configurations move at once: along the manifold as a step to first order has it, then back onto it
-by Newton's method.
+With one free rotation, a seven-joint arm has a manifold of two dimensions; with a free orientation,
+of four. Many configurations move at once: by a first-order step along the manifold, then back onto
+it by Newton's method.
 """
 
 from __future__ import annotations
@@ -18,23 +18,39 @@ from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
-# a configuration reaches the pose up to this error [m, rad]; Newton steps back onto the manifold,
-# each at most so long [rad]
-REACHED, STEPS, LONGEST = 1e-10, 12, 0.5
-# damping of the steps, relative to the greatest entry of a system: next to a singularity they stay
-# short
-DAMPING = 1e-10
-# sine below which the axis of a tilt is any
-PARALLEL = 1e-12
-# steps towards other configurations, and the longest one [rad]
-APPROACHES, STRIDE = 14, 0.35
-# a joint nearer than this to where it is wanted pulls no harder [rad]
-NEAR = 0.1
+
+@dataclass(frozen=True)
+class GoalManifoldSettings:
+    """Settings of the projection onto the manifold and of the motion along it."""
+
+    tolerance: float = 1e-10
+    """Largest pose error of a configuration on the manifold [m, rad]."""
+    newton_steps: int = 12
+    """Largest number of Newton steps of a projection."""
+    longest_newton_step: float = 0.5
+    """Largest joint movement of one Newton step [rad]."""
+    damping: float = 1e-10
+    """Damping relative to the largest entry of the normal matrix; it keeps steps short next to a
+    singularity.
+    """
+    parallel: float = 1e-12
+    """Sine of the tilt below which the tilt axis is undetermined."""
+    approach_steps: int = 14
+    """Number of steps towards a target configuration."""
+    longest_approach_step: float = 0.35
+    """Largest joint movement of one step towards a target [rad]."""
+    nearest_distance: float = 0.1
+    """Joint distance from the target below which the weight of a joint no longer grows [rad]."""
+
+
+SETTINGS = GoalManifoldSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class GoalManifold:
-    """What reaches `pose` with an arm within joint limits (nq,) [rad]."""
+    """Configurations of an arm that reach `pose` within the joint limits `q_min`, `q_max` (nq,)
+    [rad].
+    """
 
     pose: ConeOrientedPose
     placements: Array
@@ -44,56 +60,74 @@ class GoalManifold:
 
     @classmethod
     def of(cls, arm: Arm, pose: ConeOrientedPose) -> GoalManifold:
-        """The manifold of an arm within the limits in force."""
+        """Manifold of an arm within its active limits."""
         limits = arm.active_limits
         return cls(
             pose, joint_placements(arm.robot.model), T_last_tcp(arm), limits.q_min, limits.q_max
         )
 
     def put(self, q: Array) -> tuple[Array, Mask]:
-        """The configurations (n, nq) on the manifold that Newton's method finds from q (n, nq)
-        [rad], and which of them (n,) reach the pose within the limits."""
+        """Projects configurations onto the manifold by Newton's method.
+
+        Args:
+            q: start configurations (n, nq) [rad].
+
+        Returns:
+            The projected configurations (n, nq) [rad], and a mask (n,) of the successful
+            projections within the limits.
+        """
         q = np.clip(q, self.q_min, self.q_max)
-        for _ in range(STEPS):
+        for _ in range(SETTINGS.newton_steps):
             error, rows = self._error_and_rows(q)
-            if np.abs(error).max(initial=0.0) < REACHED:
+            if np.abs(error).max(initial=0.0) < SETTINGS.tolerance:
                 break
             move = self._towards(error, rows, np.ones_like(q))
-            # a joint that would leave its range stays on its limit, and the others do what it would
-            # have done
+            # A joint that would leave its range stays on its limit, and the other joints take over
+            # its part.
             held = ((q <= self.q_min) & (move < 0)) | ((q >= self.q_max) & (move > 0))
             if held.any():
                 move = self._towards(error, rows, np.where(held, 0.0, 1.0))
-            q = np.clip(q + _shortened(move, LONGEST), self.q_min, self.q_max)
+            q = np.clip(q + _shortened(move, SETTINGS.longest_newton_step), self.q_min, self.q_max)
         error, _ = self._error_and_rows(q)
-        return q, np.asarray(np.abs(error).max(axis=1) < REACHED)
+        return q, np.asarray(np.abs(error).max(axis=1) < SETTINGS.tolerance)
 
     def nearest(self, q: Array, to: Array, weights: Array) -> tuple[Array, Mask]:
-        """Where configurations (n, nq) on the manifold come to that move nearer to others (n, nq)
-        [rad], and which (n,) of them reach the pose within the limits.
+        """Moves configurations along the manifold towards target configurations.
 
-        They go where the sum of the joints' distances with `weights` (nq,) is least nearby: by
-        quadratic steps whose weights are those of the distances left.
+        Minimises the weighted sum of joint distances locally, by quadratic steps with iteratively
+        reweighted joints.
+
+        Args:
+            q: configurations (n, nq) on the manifold [rad].
+            to: target configurations (n, nq) [rad].
+            weights: weight of each joint's distance, shape (nq,).
+
+        Returns:
+            The configurations (n, nq) [rad], and a mask (n,) of the rows that reach the pose within
+            the limits.
         """
-        for _ in range(APPROACHES):
+        for _ in range(SETTINGS.approach_steps):
             error, rows = self._error_and_rows(q)
-            way = to - q
-            ease = np.maximum(np.abs(way), NEAR) / weights
+            remaining = to - q
+            ease = np.maximum(np.abs(remaining), SETTINGS.nearest_distance) / weights
             held = np.zeros(q.shape, dtype=bool)
             for _ in range(2):
-                pull = np.where(held, 0.0, way)
+                pull = np.where(held, 0.0, remaining)
                 given = np.where(held, 0.0, ease)
                 along = pull - self._towards((rows @ pull[:, :, None])[:, :, 0], rows, given)
                 held |= ((q <= self.q_min) & (along < 0)) | ((q >= self.q_max) & (along > 0))
-            move = _shortened(along, STRIDE) + _shortened(
-                self._towards(error, rows, given), LONGEST
+            move = _shortened(along, SETTINGS.longest_approach_step) + _shortened(
+                self._towards(error, rows, given), SETTINGS.longest_newton_step
             )
             q = np.clip(q + move, self.q_min, self.q_max)
         return self.put(q)
 
     def _error_and_rows(self, q: Array) -> tuple[Array, Array]:
-        """Twists (n, 6) [m, rad] that lead from q (n, nq) to the pose, to first order, and their
-        rows (n, 6, nq) of the Jacobian: those of angles that are free are zero."""
+        """Twists (n, 6) [m, rad] from q (n, nq) to the pose, to first order, and Jacobians (n, 6,
+        nq).
+
+        The Jacobian rows of free rotations are zero.
+        """
         frames = link_frames(self.placements, q)
         T = frames[:, -1] @ self.T_last
         rows, error = geometric_jacobian(frames, T[:, :3, 3]), np.zeros((len(q), 6))
@@ -103,7 +137,7 @@ class GoalManifold:
         sine = np.linalg.norm(normal, axis=1)
         angle = np.arctan2(sine, pointing @ direction)
         excess = np.maximum(angle - self.pose.half_angle, 0.0)
-        unit = normal / np.maximum(sine, PARALLEL)[:, None]
+        unit = normal / np.maximum(sine, SETTINGS.parallel)[:, None]
         error[:, 3:] = -unit * excess[:, None]
         if self.pose.half_angle > 0:
             across = np.where((excess > 0)[:, None, None], unit[:, :, None] * unit[:, None, :], 0.0)
@@ -114,19 +148,19 @@ class GoalManifold:
 
     @staticmethod
     def _towards(error: Array, rows: Array, ease: Array) -> Array:
-        """The steps (n, nq) with rows · step = error (n, 6) that are shortest, each joint with its
+        """Shortest steps (n, nq) with rows · step = error (n, 6), in the metric of the mobilities
         `ease` (n, nq).
         """
         eased = rows * ease[:, None, :]
         system = eased @ rows.transpose(0, 2, 1)
-        scale = DAMPING * np.abs(system).max(axis=(1, 2), initial=1e-12)
+        scale = SETTINGS.damping * np.abs(system).max(axis=(1, 2), initial=1e-12)
         system[:, range(6), range(6)] += scale[:, None] + 1e-14
         solved = np.linalg.solve(system, error[:, :, None])
         return np.asarray((eased.transpose(0, 2, 1) @ solved)[:, :, 0])
 
 
 def _shortened(move: Array, longest: float) -> Array:
-    """Steps (n, nq), none with a joint that moves by more than `longest` [rad]."""
+    """Steps (n, nq), scaled so that no joint moves by more than `longest` [rad]."""
     return np.asarray(
         move * np.minimum(1.0, longest / np.maximum(np.abs(move).max(axis=1, keepdims=True), 1e-12))
     )

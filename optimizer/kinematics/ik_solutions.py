@@ -1,7 +1,6 @@
-"""Solutions of inverse kinematics: configurations that reach a pose, and what is known of them.
+"""Solutions of inverse kinematics: configurations of a pose with their branch and singularity.
 
-How near they are to a singularity is computed when it is first asked for, for all branches of a
-pose at once.
+The distance from a singularity is computed on first use, for all branches of a pose at once.
 """
 
 from __future__ import annotations
@@ -20,8 +19,9 @@ from joulepath.optimizer.problem.branches import BranchLabel
 
 @dataclass(frozen=True, eq=False)
 class Singularities:
-    """How near configurations q (n, nq) [rad] are to a singularity. `parts` names parts of a label
-    that are on one.
+    """Singularity measures of configurations q (n, nq) [rad] of one pose.
+
+    `parts` returns the singular parts of the label of a configuration.
     """
 
     chain: Chain
@@ -30,8 +30,8 @@ class Singularities:
 
     @cached_property
     def smallest_values(self) -> list[float]:
-        """The smallest singular value of the flange's geometric Jacobian (m and rad mixed, as
-        usual) at each.
+        """Smallest singular value of the flange's geometric Jacobian at each configuration, with
+        metres and radians mixed.
         """
         jacobian = self.chain.flange_and_jacobian(self.q)[1]
         values: list[float] = np.linalg.svd(jacobian, compute_uv=False)[:, -1].tolist()
@@ -42,8 +42,8 @@ class Singularities:
 class PrincipalSolution:
     """One branch of a pose: q (nq,) in [-pi, pi], without regard to limits.
 
-    `self_motion` is the curve of solutions that it is a member of, if any. It is row `row` of those
-    in `singularities`.
+    `self_motion` is the curve of solutions through q, or None for an isolated solution; `row` is
+    the index of q in `singularities`.
     """
 
     q: Array
@@ -60,31 +60,30 @@ class PrincipalSolution:
         singularities: Singularities,
         row: int,
     ) -> None:
-        # all at once: of some forty solutions of a pose, one by one took as long as it takes to
-        # confirm them
+        # One dictionary update: for some forty solutions of a pose, frozen fields set one by one
+        # took as long as the forward kinematics that confirms the solutions.
         self.__dict__.update(
             q=q, label=label, self_motion=self_motion, singularities=singularities, row=row
         )
 
     @cached_property
     def singular(self) -> tuple[str, ...]:
-        """The parts of the label that are singular: the configuration is on both branches of such a
+        """Singular parts of the label: the configuration belongs to both branches of such a
         part.
         """
         return self.singularities.parts(self.q)
 
     @property
     def smallest_singular_value(self) -> float:
-        """That of the flange's geometric Jacobian."""
+        """Smallest singular value of the flange's geometric Jacobian."""
         return self.singularities.smallest_values[self.row]
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class LimitedSolution:
-    """One configuration q (nq,) [rad] within limits that reaches a pose, and its branch: see
-    `PrincipalSolution`.
+    """Configuration q (nq,) [rad] within limits that reaches a pose, and its branch.
 
-    `limit_distance` [rad] is the least distance of any joint to its limits.
+    `limit_distance` [rad] is the smallest distance of a joint from its limits.
     """
 
     q: Array
@@ -96,20 +95,22 @@ class LimitedSolution:
 
     @property
     def label(self) -> BranchLabel:
-        """The branch's name or number."""
+        """Name or number of the branch."""
         return self.branch.label
 
     @property
     def singular(self) -> tuple[str, ...]:
-        """The parts of the label that are singular."""
+        """Singular parts of the label."""
         return self.branch.singular
 
     @property
     def self_motion(self) -> SelfMotion | None:
-        """The curve of solutions that this is a member of, if any."""
+        """Curve of solutions through q, or None for an isolated solution."""
         return self.branch.self_motion
 
     @property
     def smallest_singular_value(self) -> float:
-        """That of the flange's geometric Jacobian, which full turns do not change."""
+        """Smallest singular value of the flange's geometric Jacobian; full turns do not
+        change it.
+        """
         return self.branch.smallest_singular_value

@@ -1,9 +1,8 @@
-"""The joint axes of a chain at its zero position, and the simplest arm nearby: axes that nearly are
-parallel or meet.
+"""Joint axes of a chain at its zero position, and the nearest arm with parallel and meeting axes.
 
-Rounded angles in a description (1.5708 for a quarter turn) and the calibration of a single arm
-leave axes that meet, or are parallel, but for little. A formula that needs them to is applied to
-the simplest arm, and its solutions are starts.
+Rounded angles of a description (1.5708 for a quarter turn) and the calibration of a single arm
+leave axes that meet, or are parallel, only approximately. A closed form that needs exact geometry
+is applied to the nearest simple arm, and its solutions seed Newton's method on the exact arm.
 """
 
 from __future__ import annotations
@@ -16,17 +15,32 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.forward import link_frames
 
-# sine of an angle between neighbouring axes below which they count as parallel: far more than
-# rounded angles make
-PARALLEL = 2e-4
-# distance [m] of axes below which they count as meeting: far more than a calibration moves them
-MEETING = 5e-4
+
+@dataclass(frozen=True)
+class JointAxesSettings:
+    """Tolerances of parallel and meeting axes."""
+
+    parallel: float = 2e-4
+    """Sine of the angle between neighbouring axes below which they count as parallel; far above the
+    error of rounded angles.
+    """
+    most_condition: float = 1e6
+    """Condition number of the normal equations above which axes have no meeting point."""
+    meeting: float = 5e-4
+    """Distance of axes below which they count as meeting [m]; far above the shifts of a
+    calibration.
+    """
+
+
+AXES = JointAxesSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class JointAxes:
-    """Directions (nq, 3) and points (nq, 3) [m] of the axes in the base frame, and the flange (4,
-    4), all at q = 0.
+    """Axes of the joints at q = 0, in the base frame.
+
+    `directions` (nq, 3) are unit vectors, `points` (nq, 3) [m] lie on the axes, `T_zero` (4, 4) is
+    the flange pose.
     """
 
     directions: Array
@@ -35,16 +49,16 @@ class JointAxes:
 
     @classmethod
     def of(cls, chain: Chain) -> JointAxes:
-        """The axes of a chain."""
+        """Axes of a chain."""
         frames = link_frames(chain.placements, np.zeros((1, chain.nq)))[0]
         return cls(
             frames[1:, :3, 2].copy(), frames[1:, :3, 3].copy(), frames[-1] @ chain.T_last_flange
         )
 
     def chain(self) -> Chain:
-        """The chain with these axes."""
+        """Chain with these axes."""
         frames = np.tile(np.eye(4), (len(self.points), 1, 1))
-        # the direction of x is free
+        # The direction of x is arbitrary.
         x = np.eye(3)[np.abs(self.directions).argmin(axis=1)]
         y = np.cross(self.directions, x)
         y /= np.linalg.norm(y, axis=1)[:, None]
@@ -54,15 +68,17 @@ class JointAxes:
         return Chain(np.concatenate([frames[:1], back[:-1] @ frames[1:]]), back[-1] @ self.T_zero)
 
     def simplified(self) -> JointAxes:
-        """The arm of parallel and meeting axes nearby: this one, if nothing nearly is."""
+        """Nearest arm with exactly parallel and meeting axes; equal to this one if no axes nearly
+        are.
+        """
         directions, points = self.directions.copy(), self.points.copy()
         for k in range(1, len(directions)):
-            if np.linalg.norm(np.cross(self.directions[k - 1], self.directions[k])) < PARALLEL:
+            if np.linalg.norm(np.cross(self.directions[k - 1], self.directions[k])) < AXES.parallel:
                 directions[k] = directions[k - 1] * np.sign(directions[k - 1] @ self.directions[k])
         for first in (len(points) - 3, 0):
             three = slice(first, first + 3)
             centre, distance = meeting_point(directions[three], points[three])
-            if distance < MEETING:
+            if distance < AXES.meeting:
                 points[three] = centre
                 for k in range(first - 1, -1, -1):
                     _let_meet(directions, points, k, k + 1)
@@ -76,11 +92,18 @@ class JointAxes:
 
 
 def meeting_point(directions: Array, points: Array) -> tuple[Array, float]:
-    """The point (3,) nearest to axes (n, 3), (n, 3), and the greatest distance [m] of an axis from
-    it; inf if they are parallel."""
+    """Point (3,) nearest to all axes, and the largest distance of an axis from it.
+
+    Args:
+        directions: unit vectors of the axes, shape (n, 3).
+        points: points on the axes, shape (n, 3) [m].
+
+    Returns:
+        The point (3,) [m] and the distance [m]; the distance is infinite for parallel axes.
+    """
     across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     total = across.sum(axis=0)
-    if np.linalg.cond(total) > 1e6:
+    if np.linalg.cond(total) > AXES.most_condition:
         return points[0], np.inf
     centre = np.linalg.solve(total, (across @ points[:, :, None]).sum(axis=0)[:, 0])
     return centre, float(
@@ -89,11 +112,11 @@ def meeting_point(directions: Array, points: Array) -> tuple[Array, float]:
 
 
 def _let_meet(directions: Array, points: Array, moved: int, other: int) -> None:
-    """Shift an axis, in its place, until it meets its neighbour, if it nearly does."""
+    """Shifts the axis `moved`, in place, until it meets the axis `other`, if it nearly does."""
     normal = np.cross(directions[moved], directions[other])
     length = float(np.linalg.norm(normal))
-    if length < PARALLEL:
+    if length < AXES.parallel:
         return
     gap = float((points[other] - points[moved]) @ normal) / length
-    if abs(gap) < MEETING:
+    if abs(gap) < AXES.meeting:
         points[moved] = points[moved] + gap * normal / length

@@ -1,24 +1,41 @@
-"""Newton's method for n configurations at once, of one pose or of one each, damped after Levenberg
-and Marquardt.
+"""Newton's method for many configurations at once, with Levenberg-Marquardt damping.
 
-The damping is the squared error, and more where a step fails: so the method converges on curves of
-solutions, too, to a point nearby, and at a fold of two branches (Yamashita and Fukushima, "On the
-rate of convergence of the Levenberg-Marquardt method", 2001).
+The damping is the squared error, and more after a failed step. The method therefore converges at
+folds of two branches, too, and on curves of solutions to a nearby point (Yamashita and Fukushima,
+"On the rate of convergence of the Levenberg-Marquardt method", 2001).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 
-# error [m, rad] below which a step tells nothing but rounding
-EXACT = 2e-15
-# damping after a failed step, its growth and its decay
-_FIRST, _GROWTH, _DECAY, _MOST = 1e-6, 8.0, 0.2, 1e4
-# longest step of any joint [rad]
-_LONGEST_STEP = 0.5
+
+@dataclass(frozen=True)
+class NewtonSettings:
+    """Settings of the damped Newton method."""
+
+    exact: float = 2e-15
+    """Pose error below which a step would only follow rounding [m, rad]."""
+    last_digits: float = 1e-13
+    """Pose error below which a failed step ends the iteration: only rounding is left [m, rad]."""
+    first_damping: float = 1e-6
+    """Additional damping after a first failed step, relative to the squared error."""
+    damping_growth: float = 8.0
+    """Factor of the additional damping after each further failed step."""
+    damping_decay: float = 0.2
+    """Factor of the additional damping after a successful step."""
+    most_damping: float = 1e4
+    """Additional damping above which a configuration is given up."""
+    longest_step: float = 0.5
+    """Largest joint movement of one step [rad]."""
+
+
+NEWTON = NewtonSettings()
 
 
 def solved(
@@ -29,50 +46,61 @@ def solved(
     hopeless: float = np.inf,
     least_damping: float = 0.0,
 ) -> tuple[Array, Array]:
-    """Configurations (n, nq) [rad] from starts q (n, nq), and by how much each misses (n,) the
-    flange pose T (4, 4), or one of its own (n, 4, 4).
+    """Configurations that reach flange poses, found from start configurations.
 
-    A start ends once a step no longer helps: at the last digit, or at a local minimum of the error.
-    With `hopeless`, a start whose error is larger after a third of the steps ends there. With
-    `least_damping`, nothing moves along directions whose squared singular value is smaller.
+    A configuration stops once a step no longer reduces its error: at the last digit, or at a local
+    minimum.
+
+    Args:
+        chain: chain of the arm.
+        q: start configurations (n, nq) [rad].
+        T: flange pose (4, 4) of all configurations, or one pose each (n, 4, 4).
+        steps: largest number of steps.
+        hopeless: pose error [m, rad] above which a configuration stops after a third of the steps.
+        least_damping: squared singular value below which nothing moves along the corresponding
+            direction.
+
+    Returns:
+        The configurations (n, nq) [rad], and their pose errors (n,) [m, rad].
     """
     q = q.copy()
     T_reached, jacobian = chain.flange_and_jacobian(q)
     error = pose_error(T_reached, T)
-    missed, extra = miss(error), np.zeros(len(q))
-    going = np.flatnonzero(missed > EXACT)
+    residual, extra = twist_size(error), np.zeros(len(q))
+    active = np.flatnonzero(residual > NEWTON.exact)
     for step in range(steps):
-        if not len(going):
+        if not len(active):
             break
-        u, s, vt = np.linalg.svd(jacobian[going])
-        squared = (error[going] ** 2).sum(axis=1)
-        weight = s / (s * s + (squared + extra[going] + least_damping)[:, None] + 1e-300)
-        move = ((u.transpose(0, 2, 1) @ error[going][:, :, None])[:, :, 0] * weight)[
-            :, None, :
-        ] @ vt[:, : s.shape[1]]
-        move = move[:, 0]
-        move *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.abs(move).max(axis=1), 1e-300))[
-            :, None
-        ]
-        tried = q[going] + move
+        squared = (error[active] ** 2).sum(axis=1)
+        damping = squared + extra[active] + least_damping
+        tried = q[active] + _damped_steps(jacobian[active], error[active], damping)
         T_tried, jacobian_tried = chain.flange_and_jacobian(tried)
-        error_tried = pose_error(T_tried, T if T.ndim == 2 else T[going])
-        missed_tried = miss(error_tried)
+        error_tried = pose_error(T_tried, T if T.ndim == 2 else T[active])
+        residual_tried = twist_size(error_tried)
         better = (error_tried**2).sum(axis=1) < squared
-        taken = going[better]
-        q[taken], jacobian[taken], error[taken] = (
-            tried[better],
-            jacobian_tried[better],
-            error_tried[better],
+        taken = active[better]
+        q[taken] = tried[better]
+        jacobian[taken] = jacobian_tried[better]
+        error[taken] = error_tried[better]
+        residual[taken] = residual_tried[better]
+        extra[taken] *= NEWTON.damping_decay
+        extra[active[~better]] = np.maximum(
+            extra[active[~better]] * NEWTON.damping_growth, NEWTON.first_damping * squared[~better]
         )
-        missed[taken] = missed_tried[better]
-        extra[taken] *= _DECAY
-        extra[going[~better]] = np.maximum(
-            extra[going[~better]] * _GROWTH, _FIRST * squared[~better]
-        )
-        stuck = (~better) & ((extra[going] > _MOST) | (missed[going] < 1e-13))
-        late = (
-            (missed[going] > hopeless) if step >= steps // 3 else np.zeros(len(going), dtype=bool)
-        )
-        going = going[(missed[going] > EXACT) & ~stuck & ~late]
-    return q, missed
+        left = residual[active]
+        stuck = ~better & ((extra[active] > NEWTON.most_damping) | (left < NEWTON.last_digits))
+        given_up = (left > hopeless) & (step >= steps // 3)
+        active = active[(left > NEWTON.exact) & ~stuck & ~given_up]
+    return q, residual
+
+
+def _damped_steps(jacobian: Array, error: Array, damping: Array) -> Array:
+    """Steps (n, nq) [rad] towards errors (n, 6) with Jacobians (n, 6, nq) and dampings (n,), of at
+    most `longest_step` per joint.
+    """
+    u, s, vt = np.linalg.svd(jacobian)
+    weight = s / (s * s + damping[:, None] + 1e-300)
+    in_modes = (u.transpose(0, 2, 1) @ error[:, :, None])[:, :, 0] * weight
+    step = (in_modes[:, None, :] @ vt[:, : s.shape[1]])[:, 0]
+    largest = np.maximum(np.abs(step).max(axis=1), 1e-300)
+    return np.asarray(step * np.minimum(1.0, NEWTON.longest_step / largest)[:, None])

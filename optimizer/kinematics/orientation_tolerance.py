@@ -1,6 +1,4 @@
-"""Orientations that a pose with an orientation tolerance allows: distance from them, projection
-onto them, samples.
-"""
+"""Orientations within an orientation tolerance: distance, projection, samples."""
 
 from __future__ import annotations
 
@@ -8,34 +6,33 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
-# sine of the angle between two axes below which they count as parallel: any common normal will do
-PARALLEL = 1e-12
+PARALLEL_SINE = 1e-12
+"""Sine of the angle between two axes below which any common normal serves as rotation axis."""
 
 
 def tilt(pose: ConeOrientedPose, R: Array) -> Array:
-    """Rotation vector (3,) [rad], base frame, from `direction` to `axis` as it points at the
-    orientation R (3, 3).
+    """Rotation vector (3,) [rad], in the base frame, from `direction` to the tool axis at R
+    (3, 3).
     """
     pointing = R @ pose.axis
     normal = np.cross(pose.direction, pointing)
     sine = float(np.linalg.norm(normal))
     angle = float(np.arctan2(sine, pose.direction @ pointing))
-    if sine < PARALLEL:
+    if sine < PARALLEL_SINE:
         normal, sine = _across(pose.direction), 1.0
     return np.asarray(normal * (angle / sine))
 
 
 def excess_angle(pose: ConeOrientedPose, R: Array) -> float:
-    """Angle [rad] by which the tool axis at R (3, 3) lies outside the cone; 0 for an allowed
-    orientation.
-    """
+    """Angle [rad] by which the tool axis at R (3, 3) lies outside the cone; 0 if it is inside."""
     return max(0.0, float(np.linalg.norm(tilt(pose, R))) - pose.half_angle)
 
 
 def nearest_orientation(pose: ConeOrientedPose, R: Array) -> Array:
-    """The allowed orientation (3, 3) at the least angle from R (3, 3)."""
+    """Allowed orientation (3, 3) at the smallest angle from R (3, 3)."""
     excess = excess_angle(pose, R)
     if excess == 0.0:
         return R
@@ -43,11 +40,34 @@ def nearest_orientation(pose: ConeOrientedPose, R: Array) -> Array:
     return np.asarray(pin.exp3(-beyond * (excess / np.linalg.norm(beyond))) @ R)
 
 
-def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
-    """`count` allowed orientations (count, 3, 3), evenly spread and always the same.
+def within_cone(arm: Arm, pose: ConeOrientedPose, share: float = 1.0) -> ConeOrientedPose:
+    """The pose without the orientations that the cone of the arm's tool excludes.
 
-    The tool axis is spread evenly over the cone's cap of the sphere, the rotation about it evenly
-    over the circle. The points are of a Halton sequence.
+    It is the pose itself unless both cones have the same axes or the pose allows any orientation.
+    With the excluded orientations, few samples would lie in a narrow cone, and a lower bound would
+    count motions that are not allowed.
+
+    Args:
+        arm: arm with the tool.
+        pose: pose of partly free orientation.
+        share: largest share of the tool cone's half angle that the pose may use.
+    """
+    cone = arm.tool_cone
+    if cone is None:
+        return pose
+    is_free = pose.half_angle == np.pi
+    same_axes = np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)
+    if not is_free and not same_axes:
+        return pose
+    half_angle = min(pose.half_angle, share * cone.half_angle)
+    return ConeOrientedPose(pose.position, cone.axis, cone.direction, half_angle)
+
+
+def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
+    """Evenly spread, deterministic sample (count, 3, 3) of the allowed orientations.
+
+    The points are a Halton sequence: the tool axis is uniform on the cone's spherical cap, the
+    rotation about it uniform on the circle.
     """
     if pose.half_angle > 0:
         level, azimuth, spin = (_radical_inverse(base, count) for base in (2, 3, 5))
@@ -67,26 +87,25 @@ def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
 
 
 def _across(axis: Array) -> Array:
-    """A unit vector at right angles to a unit vector."""
+    """Unit vector perpendicular to a unit vector."""
     other = np.eye(3)[int(np.abs(axis).argmin())]
     across = np.cross(axis, other)
     return np.asarray(across / np.linalg.norm(across))
 
 
 def _least_rotation(a: Array, b: Array) -> Array:
-    """The rotation (3, 3) of least angle from the unit vector a to the unit vector b."""
+    """Rotation (3, 3) of least angle from the unit vector a to the unit vector b."""
     normal = np.cross(a, b)
     sine = float(np.linalg.norm(normal))
-    if sine < PARALLEL:
+    if sine < PARALLEL_SINE:
         return np.eye(3) if a @ b > 0 else np.asarray(pin.exp3(np.pi * _across(a)))
     return np.asarray(pin.exp3(normal / sine * np.arctan2(sine, a @ b)))
 
 
 def _radical_inverse(base: int, count: int) -> Array:
-    """The numbers 0 ... count - 1 with their digits mirrored at the point (count,): one axis of the
-    Halton sequence.
+    """Radical inverses (count,) of 0 … count - 1, one axis of a Halton sequence.
 
-    scipy.stats has it, too, but takes longer to import than all else that a request needs.
+    Written out, because importing scipy.stats takes longer than all other imports of a request.
     """
     number, found, weight = np.arange(count), np.zeros(count), 1.0
     while number.any():

@@ -1,7 +1,7 @@
-"""Path constraints: a tool axis within a cone, and limits on the speeds of TCP and elbow.
+"""Path constraints: a cone of tool directions, and limits on the speeds of TCP and elbow.
 
-Each gives ratios value / limit for joint positions and speeds, and their gradients. A ratio above 1
-violates the limit.
+Each constraint gives ratios value / limit for joint positions and velocities, and their gradients.
+A ratio above 1 violates the limit.
 """
 
 from __future__ import annotations
@@ -24,14 +24,13 @@ from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
-# angle [rad] or speed [m/s] below which the gradient is replaced by a finite one: both have a kink
-# at zero
-AT_REST = 1e-9
+REGULAR = 1e-9
+"""Angle [rad] or speed [m/s] below which the gradient is kept finite: both have a kink at zero."""
 
 
 class ConstraintRatios(NamedTuple):
-    """Ratios value / limit (n, c) of c constraints at n states, and their gradients by q and by v
-    (n, c, nq).
+    """Ratios value / limit (n, c) of c constraints at n states, and their gradients (n, c, nq) by q
+    and v.
     """
 
     value: Array
@@ -40,33 +39,33 @@ class ConstraintRatios(NamedTuple):
 
 
 class PathConstraint(Protocol):
-    """A constraint along the path: names of its c ratios, and the ratios at n states."""
+    """Constraint along the path with c ratios."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """A name for every ratio."""
+        """Name of every ratio."""
         ...
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """Ratios (n, c) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
+        """Ratios (n, c) for link frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         ...
 
     def linearised(
         self, frames: Array, q: Array, v: Array, wanted: Mask | None = None
     ) -> ConstraintRatios:
-        """Ratios and gradients at the same states. Those that are not `wanted` (n, c) may be left
-        out: zero.
+        """Ratios and gradients at the same states; entries outside the mask `wanted` (n, c) may be
+        zero.
         """
         ...
 
 
 @dataclass(frozen=True)
 class ToolConeConstraint:
-    """The direction `axis` (3,) of the last link, in its frame, stays within `half_angle` [rad] of
-    `direction` (3,).
+    """Cone constraint of a tool axis.
 
-    `direction` is in the base frame; both are unit vectors. The ratio is the angle between them
-    over the half angle.
+    The unit vector `axis` (3,), in the frame of the last link, stays within `half_angle` [rad] of
+    the unit vector `direction` (3,), in the base frame. The ratio is the angle between them over
+    the half angle.
     """
 
     axis: Array
@@ -77,25 +76,27 @@ class ToolConeConstraint:
 
     @staticmethod
     def of(arm: Arm, cone: ToolCone) -> ToolConeConstraint:
-        """The constraint of an arm's cone, with its axis transformed from the TCP frame into that
-        of the last link.
+        """Constraint of an arm's cone, with its axis transformed from the TCP frame to the last
+        link.
         """
         return ToolConeConstraint(
             T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle
         )
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """Ratios (n, 1) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
+        """Ratios (n, 1) for link frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         return (self._angle(frames[:, -1, :3, :3] @ self.axis) / self.half_angle)[:, None]
 
     def linearised(
         self, frames: Array, q: Array, v: Array, wanted: Mask | None = None
     ) -> ConstraintRatios:
-        """Ratios and gradients at the same states; the angle's differential is -d(cos) / sin."""
+        """Ratios and gradients at the same states; the differential of the angle is -d(cos) /
+        sin.
+        """
         pointing = frames[:, -1, :3, :3] @ self.axis
         angle = self._angle(pointing)
         slope = -(self.direction @ direction_jacobian(frames, pointing))
-        by_q = slope / (np.maximum(np.sin(angle), AT_REST) * self.half_angle)[:, None]
+        by_q = slope / (np.maximum(np.sin(angle), REGULAR) * self.half_angle)[:, None]
         return ConstraintRatios(
             (angle / self.half_angle)[:, None],
             by_q[:, None],
@@ -103,16 +104,14 @@ class ToolConeConstraint:
         )
 
     def _angle(self, pointing: Array) -> Array:
-        """Angles (n,) [rad] to `direction`; atan2 is exact near zero and near a half turn, too."""
+        """Angles (n,) [rad] to `direction`, by atan2, accurate near zero and near a half turn."""
         across = np.linalg.norm(np.cross(pointing, self.direction), axis=1)
         return np.asarray(np.arctan2(across, pointing @ self.direction))
 
 
 @dataclass(frozen=True)
 class PointSpeedConstraint:
-    """Points (c, 3) [m] fixed to a link, in its frame, move at most at `limit` [m/s] in the base
-    frame.
-    """
+    """Speed limit [m/s], in the base frame, of points (c, 3) [m] fixed to a link, in its frame."""
 
     name: str
     link: int
@@ -121,11 +120,11 @@ class PointSpeedConstraint:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """One name, repeated for every point."""
+        """The name of the constraint, once per point."""
         return (self.name,) * len(self.points)
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """Ratios (n, c) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
+        """Ratios (n, c) for link frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         velocities = [
             point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)
         ]
@@ -143,7 +142,7 @@ class PointSpeedConstraint:
             J = point_jacobian(frames, self.link, x)
             velocity = (J @ v[..., None])[..., 0]
             speed = np.linalg.norm(velocity, axis=1)
-            along = (velocity / np.maximum(speed, AT_REST)[:, None])[:, None]
+            along = (velocity / np.maximum(speed, REGULAR)[:, None])[:, None]
             value.append(speed)
             by_q.append((along @ velocity_gradient(frames, J, v))[:, 0])
             by_v.append((along @ J)[:, 0])
@@ -160,19 +159,19 @@ class PointSpeedConstraint:
 
 @dataclass(frozen=True)
 class PathConstraints:
-    """All path constraints of one arm whose joints are mounted at `placements` (nq, 4, 4)."""
+    """All path constraints of an arm with joint placements (nq, 4, 4)."""
 
     placements: Array
     limits: Sequence[PathConstraint]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """A name for every ratio."""
+        """Name of every ratio."""
         return tuple(name for limit in self.limits for name in limit.names)
 
     @cached_property
     def limit_speeds(self) -> bool:
-        """Whether a ratio hangs on v; else all of them hang on q alone."""
+        """Whether any ratio depends on v; otherwise all depend on q alone."""
         return any(isinstance(limit, PointSpeedConstraint) for limit in self.limits)
 
     def ratios(self, q: Array, v: Array) -> Array:
@@ -181,9 +180,7 @@ class PathConstraints:
         return np.concatenate([limit.ratios(frames, q, v) for limit in self.limits], axis=1)
 
     def speed_ratios(self, q: Array, v: Array) -> Array:
-        """The largest ratio (n,) of a speed at q [rad] and v [rad/s] (n, nq); 0 without such
-        limits.
-        """
+        """Largest speed ratio (n,) at q [rad] and v [rad/s] (n, nq); 0 without speed limits."""
         frames, speeds = link_frames(self.placements, q), np.zeros((len(q), 1))
         limited = [
             each.ratios(frames, q, v)
@@ -193,8 +190,9 @@ class PathConstraints:
         return np.asarray(np.hstack([speeds, *limited]).max(axis=1))
 
     def linearised(self, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
-        """Ratios and gradients at q [rad] and v [rad/s] (n, nq); those not `wanted` (n, c) may be
-        zero.
+        """Ratios and gradients at q [rad] and v [rad/s] (n, nq).
+
+        Entries outside the mask `wanted` (n, c) may be zero.
         """
         frames = link_frames(self.placements, q)
         if wanted is None:
@@ -215,7 +213,7 @@ class PathConstraints:
 
 
 def path_constraint_list(arm: Arm) -> list[PathConstraint]:
-    """The path constraints of an arm: tool cone, speed of the TCP, speed of the elbow."""
+    """Path constraints of an arm: tool cone, TCP speed, elbow speed."""
     limits: list[PathConstraint] = []
     if arm.tool_cone is not None:
         limits.append(ToolConeConstraint.of(arm, arm.tool_cone))
@@ -235,6 +233,6 @@ def path_constraint_list(arm: Arm) -> list[PathConstraint]:
 
 
 def path_constraints_of(arm: Arm) -> PathConstraints | None:
-    """The path constraints of an arm together; None if it has none."""
+    """Combined path constraints of an arm; None if it has none."""
     limits = path_constraint_list(arm)
     return PathConstraints(joint_placements(arm.robot.model), limits) if limits else None

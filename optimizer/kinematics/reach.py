@@ -1,5 +1,4 @@
-"""How far out of reach a pose may lie and still keep the configurations at the edge of the
-reach."""
+"""Tolerance for poses just out of reach, whose branches meet at the edge of the workspace."""
 
 from __future__ import annotations
 
@@ -16,79 +15,85 @@ from joulepath.optimizer.kinematics.newton import solved
 
 @dataclass(frozen=True)
 class Reach:
-    """Tolerances of inverse kinematics at the edge of the reach.
+    """Tolerances of inverse kinematics at the edge of the workspace.
 
-    A pose that was read off a controller is rounded, and one at full stretch is then out of reach
-    by a fraction of a micrometre. Without a tolerance, it would lose the branches that meet at the
-    edge.
+    A pose read off a controller is rounded, and at full stretch it may be out of reach by a
+    fraction of a micrometre. Without a tolerance, it would lose the branches that meet at the edge.
     """
 
     beyond: float = 8e-7
-    """Distance [m] out of reach up to which a pose keeps its branches, at the edge.
-
-    It is below the 1e-6 m that the certificate allows at an end, with room for rounding.
+    """Distance out of reach up to which a pose keeps its branches at the edge [m]; below the 1e-6 m
+    that the certificate allows at an end, with room for rounding.
     """
-    missed: float = 9e-7
-    """Greatest error [m, rad] of a configuration at the edge: two edges at once may add up to more,
-    and are refused.
+    residual: float = 9e-7
+    """Largest pose error of a configuration at the edge [m, rad]; two simultaneous edges may add up
+    to a larger error, and are refused.
     """
     near: float = 1e-4
-    """Distance [m] or error [m, rad] up to which a configuration at an edge leads to the one
-    nearest to the pose.
-
-    The wrist's lever may enlarge what the flange lacks.
+    """Pose error up to which a configuration at an edge is refined towards the pose [m, rad]; the
+    lever of the wrist may amplify the missing distance of the flange.
     """
     apart: float = 0.1
-    """Distance [rad] of a joint within which an exact solution replaces one at the edge: it is the
-    same branch.
+    """Joint distance within which an exact solution replaces one at the edge [rad]: both belong to
+    the same branch.
     """
     singular: float = 1e-4
-    """Smallest singular value of the Jacobian, m and rad mixed, below which a configuration may lie
-    at an edge. At a distance e [m] from a fold it is about the root of 2 e times the arm's length.
+    """Smallest singular value, with metres and radians mixed, below which a configuration may lie
+    at an edge. At a distance e [m] from a fold it is about √(2e · length of the arm).
     """
-
     rounding: float = 1e-10
-    """Distance [m] out of reach that is rounding: a pose without a configuration is singular, not
-    out of reach.
+    """Distance out of reach that is due to rounding [m]; a pose without a configuration is then
+    singular, not out of reach.
     """
+    rounding_angle: float = 1e-10
+    """Angle beyond a joint limit that is due to rounding [rad]."""
     like_millimetres: float = 20.0
-    """Distance [m] out of reach beyond which a position was hardly meant in metres."""
+    """Distance out of reach beyond which a position was probably given in millimetres [m]."""
 
 
 REACH = Reach()
 
 
 def at_the_edge(
-    chain: Chain, q: Array, missed: Array, inexact: Mask, T: Array
+    chain: Chain, q: Array, residual: Array, inexact: Mask, T: Array
 ) -> tuple[Array, Array]:
-    """Configurations q (n, nq) [rad] and what they miss of a flange pose T (4, 4), `missed` (n,)
-    [m, rad].
+    """Refines inexact configurations towards the pose, and drops duplicates of exact ones.
 
-    Those that are `inexact` (n,) come as near as they can. They count for nothing, infinitely far
-    from the pose, where an exact one of the same branch is known.
+    Args:
+        chain: chain of the arm.
+        q: configurations (n, nq) [rad].
+        residual: pose error of each, shape (n,) [m, rad].
+        inexact: mask (n,) of the configurations to refine.
+        T: flange pose (4, 4).
+
+    Returns:
+        The configurations and their pose errors; the error is infinite if an exact configuration of
+        the same branch is known.
     """
-    beside = np.flatnonzero(inexact & (missed < REACH.near))
+    beside = np.flatnonzero(inexact & (residual < REACH.near))
     if not len(beside):
-        return q, missed
-    exact, q, missed = q[~inexact], q.copy(), missed.copy()
-    q[beside], missed[beside] = solved(chain, q[beside], T)
+        return q, residual
+    exact, q, residual = q[~inexact], q.copy(), residual.copy()
+    q[beside], residual[beside] = solved(chain, q[beside], T)
     for k in beside.tolist():
         if (np.abs(wrapped(exact - q[k])).max(axis=1) < REACH.apart).any():
-            missed[k] = np.inf
-    return q, missed
+            residual[k] = np.inf
+    return q, residual
 
 
 def out_of_reach(distance: float | None, target: str) -> UnreachablePose | SingularPose:
-    """The error for a pose without a configuration, out of reach by a distance [m]; None if that is
-    unknown.
+    """Error for a pose without a configuration.
+
+    Args:
+        distance: distance out of reach [m]; None if unknown.
+        target: name of the pose in the message.
     """
     if distance is None:
         return UnreachablePose(
             target,
             None,
             f"No arm configuration was found for the {target} pose: move the position closer to "
-            "the robot's "
-            "workspace, or change the orientation.",
+            "the robot's workspace, or change the orientation.",
         )
     if distance <= REACH.rounding:
         return SingularPose(target, 0.0)
@@ -97,6 +102,5 @@ def out_of_reach(distance: float | None, target: str) -> UnreachablePose | Singu
         target,
         distance,
         f"The {target} pose is {distance:.4g} m out of reach in this orientation: {hint}move the "
-        "position closer "
-        "to the robot's workspace, or change the orientation.",
+        "position closer to the robot's workspace, or change the orientation.",
     )

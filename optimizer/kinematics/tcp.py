@@ -1,6 +1,4 @@
-"""The TCP: its frame, pose and Jacobian, and poses that differ from it by a rotation about its own
-origin.
-"""
+"""Frame, pose and Jacobian of the TCP, and poses rotated about its origin."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ def T_last_tcp(arm: Arm) -> Array:
 
 
 def flange_pose(T_base_tcp: Array, T_flange_tcp: Array) -> Array:
-    """Pose (4, 4) of the flange in the base frame that puts the TCP at T_base_tcp (4, 4)."""
+    """Flange pose (4, 4) in the base frame that puts the TCP at T_base_tcp (4, 4)."""
     R, p = T_flange_tcp[:3, :3], T_flange_tcp[:3, 3]
     T_tcp_flange = np.eye(4)
     T_tcp_flange[:3, :3] = R.T
@@ -30,27 +28,31 @@ def flange_pose(T_base_tcp: Array, T_flange_tcp: Array) -> Array:
 
 
 def tcp_pose(arm: Arm, q: Array) -> Array:
-    """Pose T_base_tcp (..., 4, 4) of the TCP in the base frame for joint positions q (..., nq)
-    [rad].
-    """
+    """TCP poses T_base_tcp (..., 4, 4) in the base frame at q (..., nq) [rad]."""
     q = np.asarray(q, dtype=float)
     frames = link_frames(joint_placements(arm.robot.model), q.reshape(-1, arm.robot.nq))
     return np.asarray(frames[:, -1] @ T_last_tcp(arm)).reshape(*q.shape[:-1], 4, 4)
 
 
 def tcp_jacobian(arm: Arm, q: Array) -> Array:
-    """Geometric Jacobian (6, nq) of the TCP at q (nq,) [rad]: linear rows [m] first, in base
-    axes."""
+    """Geometric Jacobian (6, nq) of the TCP at q (nq,) [rad], in base axes, linear rows [m]
+    first.
+    """
     frames = link_frames(joint_placements(arm.robot.model), q[None])
     return np.asarray(geometric_jacobian(frames, (frames[:, -1] @ T_last_tcp(arm))[:, :3, 3])[0])
 
 
 def rotated_poses(arm: Arm, q: Array, rotvecs: Sequence[Array]) -> list[tuple[Array, Array]]:
-    """Position (3,) [m] and quaternion x, y, z, w (4,) of the TCP at q (nq,) [rad] after each
-    rotation, in base frame.
+    """Poses of the TCP at q (nq,) [rad], rotated about the origin of the TCP.
 
-    Each rotation is a rotation vector (3,) [rad] in the TCP frame, about the origin of the TCP. The
-    position is therefore the same for all.
+    Args:
+        arm: arm with its TCP.
+        q: configuration (nq,) [rad].
+        rotvecs: rotation vectors (3,) [rad] in the TCP frame.
+
+    Returns:
+        Position (3,) [m] and quaternion x, y, z, w (4,) in the base frame for each rotation. The
+        position is the same for all.
     """
     T = tcp_pose(arm, q)
     orientation = Rotation.from_matrix(T[:3, :3])

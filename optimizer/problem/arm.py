@@ -1,5 +1,5 @@
-"""An arm in its cell: robot, tool, payload, mounting, limits, friction, drives, bus. Validated on
-construction.
+"""An arm in its cell: robot, tool, payload, mounting, limits, friction, drives and bus. Validated
+on construction.
 """
 
 from __future__ import annotations
@@ -14,33 +14,50 @@ from joulepath.models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.problem.arrays import frozen, per_joint, rigid_transform
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.names import first_among
+from joulepath.optimizer.problem.names import first_taken
 from joulepath.optimizer.problem.scene import Attachment, Scene
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
-# least speed limit [m/s] of a point: below it, motions would last longer than any answer may
-LEAST_SPEED = 1e-3
-LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
-# most capsules of a tool
-MOST_PARTS = 16
-# names of the bodies at the flange
-TOOL, PAYLOAD = "tool", "payload"
 
-# range of the factors on mass and inertia of a link: beyond it, the arm is no variant of the robot
-LINK_MASS_SCALES = (0.1, 10.0)
-# coefficients of the inverter's loss, and their greatest value [W, W/A, W/A²], far above that of
-# any inverter
-INVERTER_PARTS = ("constant", "linear", "quadratic")
-INVERTER_MOST = 1e3
+@dataclass(frozen=True)
+class ArmRanges:
+    """Ranges of the figures of an arm."""
+
+    least_speed: float = 1e-3
+    """Least speed limit of a point [m/s]; below it, motions would exceed the longest duration."""
+    max_tool_parts: int = 16
+    """Most capsules of a tool."""
+    link_mass_scales: tuple[float, float] = (0.1, 10.0)
+    """Least and greatest factor on mass and inertia of a link; beyond, it is no variant of the
+    robot.
+    """
+    max_inverter_coefficient: float = 1e3
+    """Greatest coefficient of an inverter's loss [W, W/A, W/A²], far above any inverter."""
+
+
+ARM_RANGES = ArmRanges()
+
+LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
+TOOL = "tool"
+"""Name of the tool among the bodies."""
+PAYLOAD = "payload"
+"""Name of the payload among the bodies."""
+INVERTER_COEFFICIENTS = ("constant", "linear", "quadratic")
+"""Coefficients of the inverters' loss."""
 
 
 @dataclass(frozen=True)
 class Payload:
-    """A body fixed to the flange: mass [kg], com (3,) [m] in the flange frame, inertia (3, 3)
-    [kg·m²] about the com.
+    """A body fixed to the flange.
 
-    `shape` is its geometry, which is used for collisions only. Raises InvalidProblem, with the
-    field named, for a mass or an inertia that no body has.
+    Attributes:
+        mass: mass [kg].
+        com: centre of mass in the flange frame, shape (3,) [m].
+        inertia: inertia about the centre of mass, shape (3, 3) [kg·m²].
+        shape: geometry for collisions; None without one.
+
+    Raises:
+        InvalidProblem: no body has this mass or inertia; names the field.
     """
 
     mass: float = 0.0
@@ -69,17 +86,23 @@ class Payload:
                 "the sum of the other two.",
             )
 
-    @property
-    def content(self) -> tuple[float, bytes, bytes, int]:
-        """The same for the same body. A shape is the same as itself alone."""
-        return self.mass, self.com.tobytes(), self.inertia.tobytes(), id(self.shape)
+    def is_same_body(self, other: Payload) -> bool:
+        """Whether two payloads have the same mass, centre and inertia, and the same shape
+        object.
+        """
+        return (
+            self.shape is other.shape
+            and self.mass == other.mass
+            and np.array_equal(self.com, other.com)
+            and np.array_equal(self.inertia, other.inertia)
+        )
 
 
 @dataclass(frozen=True)
 class Inverter:
     """Coefficients of the inverters' loss constant + linear·|i| + quadratic·i² [W, W/A, W/A²].
 
-    Each is one number for all joints, or one per joint (nq,). None keeps the robot's figure.
+    A coefficient is one number for all joints, or an array (nq,). None keeps the robot's value.
     """
 
     constant: float | Array | None = None
@@ -91,18 +114,26 @@ class Inverter:
 class Arm:
     """A robot with its tool, payload, mounting, surroundings and limits.
 
-    `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, `gravity` (3,) [m/s²] is in
-    the base frame. `limits` replaces the robot's limits and may only tighten them. `friction` names
-    one of the robot's friction laws (None: its default). `inverter` replaces coefficients of the
-    robot's inverters, and `bus` says where surplus power goes. `link_mass_scale` (nq,), or one
-    number, multiplies mass and inertia of every moving link, not of the payload.
+    Attributes:
+        robot: the robot.
+        T_flange_tcp: pose of the TCP in the flange frame, shape (4, 4).
+        payload: body carried.
+        gravity: gravity in the base frame, shape (3,) [m/s²].
+        limits: joint limits, at most those of the robot; None for these.
+        friction: name of one of the robot's friction laws; None for its default.
+        inverter: replaced coefficients of the inverters.
+        bus: exchange of power between joints and supply.
+        link_mass_scale: factor on mass and inertia of every moving link without the payload, a
+            number or shape (nq,).
+        tool: shapes fixed to the flange, for collisions.
+        scene: obstacles, for collisions.
+        collisions: whether collisions are checked.
+        tool_cone: cone for an axis of the tool; None without one.
+        tcp_speed: speed limit of the TCP in the base frame [m/s]; None without one.
+        elbow_speed: speed limit of the elbow in the base frame [m/s]; None without one.
 
-    `tool` holds the shapes fixed to the flange, `scene` the obstacles around the arm; both are used
-    for collisions only. With `collisions` false, no collisions are checked. `tool_cone` keeps an
-    axis of the tool near a direction; `tcp_speed` and `elbow_speed` [m/s] limit the speeds of these
-    points in the base frame.
-
-    Raises InvalidProblem, with the field named, if the parts do not fit together.
+    Raises:
+        InvalidProblem: the parts do not fit together; names the field.
     """
 
     robot: Robot
@@ -128,16 +159,19 @@ class Arm:
             self, "limits", self.robot.limits if self.limits is None else self.limits
         )
         object.__setattr__(self, "tool", tuple(self.tool))
-        if len(self.tool) > MOST_PARTS:
-            raise InvalidProblem("tool.capsules", f"A tool has at most {MOST_PARTS} capsules.")
+        if len(self.tool) > ARM_RANGES.max_tool_parts:
+            raise InvalidProblem(
+                "tool.capsules", f"A tool has at most {ARM_RANGES.max_tool_parts} capsules."
+            )
         self._check_touches()
         self._check_names()
         self._check_limits()
         for name in ("tcp_speed", "elbow_speed"):
             speed = getattr(self, name)
-            if speed is not None and not LEAST_SPEED <= speed < np.inf:
+            if speed is not None and not ARM_RANGES.least_speed <= speed < np.inf:
                 raise InvalidProblem(
-                    f"limits.{name}", f"limits.{name} must be at least {LEAST_SPEED:g} m/s."
+                    f"limits.{name}",
+                    f"limits.{name} must be at least {ARM_RANGES.least_speed:g} m/s.",
                 )
         if self.elbow_speed is not None and self.robot.elbow is None:
             raise InvalidProblem(
@@ -149,11 +183,13 @@ class Arm:
                 "friction", f"There is no friction law of that name: use one of {known}."
             )
         nq = self.robot.nq
-        scale = per_joint(self.link_mass_scale, nq, "link_mass_scale", *LINK_MASS_SCALES)
+        scale = per_joint(self.link_mass_scale, nq, "link_mass_scale", *ARM_RANGES.link_mass_scales)
         object.__setattr__(self, "link_mass_scale", scale)
-        given = {name: getattr(self.inverter, name) for name in INVERTER_PARTS}
+        given = {name: getattr(self.inverter, name) for name in INVERTER_COEFFICIENTS}
         figures = {
-            name: per_joint(value, nq, f"drives.inverter.{name}", 0.0, INVERTER_MOST)
+            name: per_joint(
+                value, nq, f"drives.inverter.{name}", 0.0, ARM_RANGES.max_inverter_coefficient
+            )
             for name, value in given.items()
             if value is not None
         }
@@ -161,13 +197,13 @@ class Arm:
 
     @property
     def active_limits(self) -> Limits:
-        """The limits in force."""
+        """Joint limits in force."""
         assert self.limits is not None
         return self.limits
 
     @cached_property
     def friction_law(self) -> FrictionLaw:
-        """The friction law in force."""
+        """Friction law in force."""
         return (
             self.robot.friction
             if self.friction is None
@@ -176,8 +212,8 @@ class Arm:
 
     @cached_property
     def drives(self) -> Drives:
-        """The drives in force."""
-        names = [name for name in INVERTER_PARTS if getattr(self.inverter, name) is not None]
+        """Drives in force."""
+        names = [name for name in INVERTER_COEFFICIENTS if getattr(self.inverter, name) is not None]
         return replace(
             self.robot.drives,
             **{f"inverter_{name}": getattr(self.inverter, name) for name in names},
@@ -190,14 +226,21 @@ class Arm:
 
     @property
     def regeneration(self) -> float:
-        """Fraction of the surplus power on the bus that is fed back to the supply."""
+        """Fraction of the surplus power on the bus fed back to the supply."""
         if self.bus.mode == "recuperating":
             return self.bus.efficiency
         return 0.0 if self.bus.mode == "isolated" else self.robot.electronics.regeneration
 
     def check_inside(self, target: str, q: Array) -> None:
-        """Raises OutsideLimits, which names `target`, if a joint of q (nq,) [rad] is out of
-        range."""
+        """Check that joint positions are in range.
+
+        Args:
+            target: name of the target, for the error.
+            q: joint positions, shape (nq,) [rad].
+
+        Raises:
+            OutsideLimits: a joint is out of range.
+        """
         lower, upper = self.active_limits.q_min, self.active_limits.q_max
         outside = np.flatnonzero((q < lower) | (q > upper))
         if outside.size:
@@ -207,9 +250,7 @@ class Arm:
             )
 
     def _check_touches(self) -> None:
-        """Raises InvalidProblem if a part of the tool, or the payload, touches a link that the
-        robot does not have.
-        """
+        """Check that all links touched by tool or payload exist."""
         parts = [(f"tool.capsules.{k}.touches", part) for k, part in enumerate(self.tool)]
         if self.payload.shape is not None:
             parts.append(("payload.touches", self.payload.shape))
@@ -222,7 +263,7 @@ class Arm:
 
     def _check_names(self) -> None:
         own = (*self.robot.link_names, TOOL, PAYLOAD)
-        taken = first_among(self.scene.names, own)
+        taken = first_taken(self.scene.names, own)
         if taken is not None:
             raise InvalidProblem(
                 f"scene.obstacles.{taken}.name",
@@ -232,7 +273,7 @@ class Arm:
 
     def _check_limits(self) -> None:
         limits, robot = self.active_limits, self.robot.limits
-        # written so that NaN, which compares false with everything, is refused
+        # negated comparisons refuse NaN
         for public, name in LIMIT_NAMES.items():
             value, most = getattr(limits, name), getattr(robot, name)
             # bounds divide by the others; without a limit on jerk, acceleration jumps
@@ -265,7 +306,7 @@ class Arm:
             )
 
     def no_faster_than(self, tcp_speed: float | None) -> Arm:
-        """The same arm, whose TCP is no faster than this [m/s] either; None changes nothing."""
+        """The arm with a further speed limit of the TCP [m/s]; None changes nothing."""
         return (
             self
             if tcp_speed is None
@@ -273,8 +314,11 @@ class Arm:
         )
 
     def check_rating(self, field: str, mass: float) -> None:
-        """Raises InvalidProblem for `field` if a payload of `mass` [kg] exceeds the robot's
-        rating."""
+        """Check a payload's mass [kg] against the robot's rating.
+
+        Raises:
+            InvalidProblem: the mass exceeds the rating; names `field`.
+        """
         if mass > self.robot.rated_payload:
             rating = self.robot.rated_payload
             raise InvalidProblem(

@@ -1,8 +1,9 @@
-"""Checks of a problem's arrays. Each returns a read-only copy; each error names the field."""
+"""Checks of a problem's arrays: they return read-only copies, and their errors name the field."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -14,15 +15,25 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 Checked = TypeVar("Checked")
 
-# of a rotation matrix: one assembled in double precision is orthonormal to about 1e-15
-ORTHONORMAL = 1e-9
-# a vector shorter than this has no direction [any unit]
-SHORTEST_VECTOR = 1e-6
+
+@dataclass(frozen=True)
+class ArraySettings:
+    """Tolerances of the checks."""
+
+    orthonormal: float = 1e-9
+    """Greatest deviation of R Rᵀ from the identity; double precision gives about 1e-15."""
+    shortest_vector: float = 1e-6
+    """Length below which a vector has no direction, in its unit."""
+
+
+ARRAYS = ArraySettings()
 
 
 def frozen(values: object, shape: tuple[int, ...], field: str) -> Array:
-    """A read-only, finite array of that shape, in which -1 stands for any length. Raises
-    InvalidProblem.
+    """Read-only, finite array of a given shape; -1 in the shape stands for any length.
+
+    Raises:
+        InvalidProblem: the values do not form such an array.
     """
     try:
         return read_only(values, shape, field)
@@ -31,8 +42,10 @@ def frozen(values: object, shape: tuple[int, ...], field: str) -> Array:
 
 
 def sized(field: str, check: Callable[[], Checked]) -> Checked:
-    """What a check of a shape's size returns. Raises InvalidProblem at the field where it raises
-    WrongSize.
+    """Result of a check of a shape's size.
+
+    Raises:
+        InvalidProblem: the check raised WrongSize.
     """
     try:
         return check()
@@ -41,13 +54,19 @@ def sized(field: str, check: Callable[[], Checked]) -> Checked:
 
 
 def check_sizes(field: str, lengths: float | Array) -> None:
-    """Raises InvalidProblem unless radii, lengths or edges [m] are those of a body."""
+    """Check radii, lengths or edges [m] of a body.
+
+    Raises:
+        InvalidProblem: no body has this size.
+    """
     sized(field, lambda: check_lengths(field, lengths))
 
 
 def per_joint(values: object, count: int, field: str, least: float, most: float) -> Array:
-    """Numbers (count,) within [least, most] from one number for all joints, or one each. Raises
-    InvalidProblem.
+    """Numbers (count,) within [least, most], from one number for all joints or one per joint.
+
+    Raises:
+        InvalidProblem: the values have another shape or are out of range.
     """
     given = [values] * count if np.ndim(values) == 0 else values  # type: ignore[arg-type]
     array = frozen(given, (count,), field)
@@ -57,23 +76,27 @@ def per_joint(values: object, count: int, field: str, least: float, most: float)
 
 
 def unit_vector(values: object, field: str) -> Array:
-    """The unit vector (3,) along a vector (3,) of any length. Raises InvalidProblem, also for the
-    zero vector.
+    """Unit vector (3,) along a vector of any length.
+
+    Raises:
+        InvalidProblem: the vector is malformed or zero.
     """
     vector = frozen(values, (3,), field)
     length = float(np.linalg.norm(vector))
-    if length < SHORTEST_VECTOR:
+    if length < ARRAYS.shortest_vector:
         raise InvalidProblem(field, f"{field} must not be zero: it gives a direction.")
     return frozen(vector / length, (3,), field)
 
 
 def rigid_transform(values: object, field: str) -> Array:
-    """A homogeneous matrix (4, 4) with an orthonormal, right-handed rotation. Raises
-    InvalidProblem.
+    """Homogeneous matrix (4, 4) with an orthonormal, right-handed rotation.
+
+    Raises:
+        InvalidProblem: the matrix is no rigid transform.
     """
     T = frozen(values, (4, 4), field)
     R = T[:3, :3]
-    if np.abs(R @ R.T - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(R) < 0:
+    if np.abs(R @ R.T - np.eye(3)).max() > ARRAYS.orthonormal or np.linalg.det(R) < 0:
         raise InvalidProblem(
             field, f"The rotation matrix of {field} must be orthonormal and right-handed."
         )
@@ -83,8 +106,10 @@ def rigid_transform(values: object, field: str) -> Array:
 
 
 def placement(values: object, field: str) -> Array:
-    """Pose (4, 4) of a body, with its origin at most SIZES.largest from that of the frame. Raises
-    InvalidProblem.
+    """Pose (4, 4) of a body with its origin at most `SIZES.largest` from the origin of the frame.
+
+    Raises:
+        InvalidProblem: the matrix is no rigid transform, or too far away.
     """
     T = rigid_transform(values, field)
     if np.abs(T[:3, 3]).max() > SIZES.largest:

@@ -1,4 +1,4 @@
-"""The power bus: how joints and supply exchange power."""
+"""Power bus: exchange of power between joints and supply."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ BusMode = Literal["shared", "isolated", "recuperating", "storage"]
 
 @dataclass(frozen=True)
 class Bus:
-    """How joints and supply exchange power; `capacity`, `power` and `initial` belong to the energy
-    storage.
+    """Exchange of power between joints and supply.
 
-    `efficiency` [1] is that of feeding back (`recuperating`), or of charging and discharging
-    together (`storage`). `capacity` and `initial` [J] are usable charge; `power` [W] limits both
-    charging and discharging.
+    Attributes:
+        mode: "shared", "isolated", "recuperating" or "storage".
+        efficiency: efficiency of feeding back (`recuperating`), or of charging and discharging
+            together (`storage`) [1].
+        capacity: usable capacity of the energy storage [J].
+        power: limit of charging and of discharging the storage [W].
+        initial: usable charge of the storage at the start [J].
 
-    Raises InvalidProblem, with the field named.
+    Raises:
+        InvalidProblem: a value is out of range; names the field.
     """
 
     mode: BusMode = "shared"
@@ -35,7 +39,7 @@ class Bus:
             raise InvalidProblem(
                 "bus.mode", "bus.mode must be shared, isolated, recuperating or storage."
             )
-        # written so that NaN, which compares false with everything, is refused
+        # negated comparisons refuse NaN
         if not 0 <= self.efficiency <= 1:
             raise InvalidProblem("bus.efficiency", "bus.efficiency must be a number from 0 to 1.")
         if not 0 <= self.capacity < np.inf:

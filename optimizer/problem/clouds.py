@@ -1,8 +1,8 @@
-"""Obstacles of many parts: point clouds, voxel grids and triangle meshes, validated on
+"""Obstacles of many parts: point clouds, voxel grids and triangle meshes. Validated on
 construction.
 
-Each is the union of its parts. Nothing is simplified: collision checking and the certificate use
-every part.
+An obstacle is the union of its parts. Nothing is simplified: collision checking and the certificate
+use every part.
 """
 
 from __future__ import annotations
@@ -17,23 +17,44 @@ from joulepath.models.shape_sizes import SIZES, check_extent
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import check_sizes, frozen, sized
 
-# most points, occupied voxels and triangles of an obstacle, and of all obstacles of a scene
-# together: they bound the memory and the time of a request
-MOST_POINTS = MOST_VOXELS = MOST_TRIANGLES = 100_000
-MOST_PARTS_IN_SCENE = 200_000
-# greatest number of voxels along an edge of a grid
-MOST_ALONG_EDGE = 4096
-# least height of a triangle over its longest edge, relative to that edge: flatter ones are left
-# out. Their edges belong to their neighbours
-FLAT_TRIANGLE = 1e-9
+
+@dataclass(frozen=True)
+class CloudRanges:
+    """Ranges of obstacles of many parts."""
+
+    max_points: int = 100_000
+    """Most points of an obstacle: the limits bound memory and time of a request."""
+    max_voxels: int = 100_000
+    """Most occupied voxels of an obstacle."""
+    max_triangles: int = 100_000
+    """Most triangles of an obstacle."""
+    max_parts_in_scene: int = 200_000
+    """Most points, voxels and triangles of all obstacles of a scene together."""
+    max_along_edge: int = 4096
+    """Greatest number of voxels along an edge of a grid."""
+    flat_triangle: float = 1e-9
+    """Least height of a triangle relative to its longest edge [1]; flatter triangles are left out,
+    since their edges belong to their neighbours.
+    """
+
+
+CLOUD_RANGES = CloudRanges()
+
 
 Whole = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Balls of `radius` [m] about `points` (n, 3) [m]. Raises InvalidProblem, with the field
-    named."""
+    """Balls about points.
+
+    Attributes:
+        points: centres, shape (n, 3) [m].
+        radius: radius [m].
+
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
+    """
 
     points: Array
     radius: float
@@ -43,7 +64,7 @@ class Points:
         _count(
             "points",
             len(points),
-            MOST_POINTS,
+            CLOUD_RANGES.max_points,
             "points: thin the cloud out, for example to one point per voxel",
         )
         _within_reach("points", points)
@@ -53,10 +74,15 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Voxels:
-    """Cubes with edges of `size` [m]: of the cell (i, j, k) of `cells` (n, 3), from (i, j, k) ·
-    size to one size more.
+    """Cubes of a grid.
 
-    Cells that are named twice count once. Raises InvalidProblem, with the field named.
+    Attributes:
+        size: edge of a cube [m].
+        cells: cells (i, j, k) from (i, j, k) · size to (i + 1, j + 1, k + 1) · size, shape (n, 3);
+            repeated cells count once.
+
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
     """
 
     size: float
@@ -65,10 +91,10 @@ class Voxels:
     def __post_init__(self) -> None:
         check_sizes("size", self.size)
         cells = np.unique(np.array(self.cells, dtype=np.int64).reshape(-1, 3), axis=0)
-        _count("cells", len(cells), MOST_VOXELS, "occupied cells: use larger voxels")
-        if np.abs(cells).max() > MOST_ALONG_EDGE:
+        _count("cells", len(cells), CLOUD_RANGES.max_voxels, "occupied cells: use larger voxels")
+        if np.abs(cells).max() > CLOUD_RANGES.max_along_edge:
             raise InvalidProblem(
-                "cells", f"cells must lie within {MOST_ALONG_EDGE} cells of the origin."
+                "cells", f"cells must lie within {CLOUD_RANGES.max_along_edge} cells of the origin."
             )
         _within_reach("cells", np.asarray(cells * self.size, dtype=float))
         cells.flags.writeable = False
@@ -77,25 +103,31 @@ class Voxels:
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """The triangles with corners `corners` (n, 3, 3) [m], of any form: no convexity is asked for.
+    """Triangles of any form; no convexity is needed.
 
-    If the mesh is closed (every edge belongs to two triangles of opposite directions), its inside
-    counts as solid; otherwise it is a surface. Triangles without an area are left out. Raises
-    InvalidProblem, with the field named.
+    The inside of a closed mesh counts as solid; in a closed mesh every edge belongs to two
+    triangles in opposite directions. Otherwise the mesh is a surface. Triangles without an area are
+    left out.
+
+    Attributes:
+        corners: corners of all triangles, shape (n, 3, 3) [m].
+
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
     """
 
     corners: Array
 
     def __post_init__(self) -> None:
         corners = frozen(self.corners, (-1, 3, 3), "data")
-        _count("data", len(corners), MOST_TRIANGLES, "triangles: simplify the mesh")
+        _count("data", len(corners), CLOUD_RANGES.max_triangles, "triangles: simplify the mesh")
         _within_reach("data", corners)
         sized("data", lambda: check_extent("data", corners.reshape(-1, 3)))
         edges = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
         double_area = np.linalg.norm(
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
         )
-        kept = double_area > FLAT_TRIANGLE * edges**2
+        kept = double_area > CLOUD_RANGES.flat_triangle * edges**2
         if not kept.any():
             raise InvalidProblem(
                 "data", "data has no triangle with an area: give a mesh with a surface."
@@ -104,10 +136,9 @@ class TriangleMesh:
 
     @property
     def is_closed(self) -> bool:
-        """Whether every edge belongs to exactly two triangles, which run along it in opposite
-        directions.
+        """Whether every edge belongs to exactly two triangles with opposite directions.
 
-        Corners are compared exactly. If they differ by rounding, the mesh is not closed.
+        Corners are compared exactly; a mesh with rounding differences is not closed.
         """
         _, corner = np.unique(self.corners.reshape(-1, 3), axis=0, return_inverse=True)
         first = corner.reshape(-1, 3)

@@ -14,14 +14,19 @@ from joulepath.optimizer.problem.pose import Pose
 
 @dataclass(frozen=True)
 class ConeOrientedPose:
-    """The TCP at `position` (3,) [m] in the base frame, with `axis` at most `half_angle` [rad] away
-    from `direction`.
+    """Position of the TCP, with an axis of the tool within a cone.
 
-    `axis` (3,) is fixed to the tool, in the TCP frame; `direction` (3,) is in the base frame. Both
-    are normalised. The rotation about the axis is free. A `half_angle` of pi therefore allows every
-    orientation; one of 0 leaves only the rotation about the axis.
+    The rotation about the axis is free. A `half_angle` of pi allows every orientation, a
+    `half_angle` of 0 only the rotation about the axis. Both vectors are normalised.
 
-    Raises InvalidProblem if `axis` or `direction` is zero, or if `half_angle` is not in [0, pi].
+    Attributes:
+        position: position of the TCP in the base frame, shape (3,) [m].
+        axis: axis of the tool in the TCP frame, shape (3,).
+        direction: axis of the cone in the base frame, shape (3,).
+        half_angle: half angle of the cone, in [0, pi] [rad].
+
+    Raises:
+        InvalidProblem: a vector is zero, or the angle out of range.
     """
 
     position: Array
@@ -43,16 +48,21 @@ class ConeOrientedPose:
 
     @staticmethod
     def about(pose: Pose, axis: Array) -> ConeOrientedPose:
-        """`pose` with a free rotation about `axis` (3,), which is given in the TCP frame. Raises
-        InvalidProblem.
+        """A pose with a free rotation about an axis.
+
+        Args:
+            pose: pose with the direction of the axis.
+            axis: axis in the TCP frame, shape (3,).
+
+        Raises:
+            InvalidProblem: the axis is zero.
         """
         axis = frozen(axis, (3,), "pose.orientation.axis")
         return ConeOrientedPose(pose.T[:3, 3], axis, pose.T[:3, :3] @ axis, 0.0)
 
     @property
     def freedom(self) -> int:
-        """Number of independent rotations that the tolerance leaves: 3, or 1 about the axis
-        alone."""
+        """Number of free rotations: 3, or 1 about the axis alone."""
         return 3 if self.half_angle > 0 else 1
 
     def with_orientation(self, R: Array) -> Pose:

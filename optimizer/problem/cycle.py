@@ -1,4 +1,4 @@
-"""A cycle of work: stops that the arm visits one after the other, again and again. Validated on
+"""A cycle: stops visited by the arm one after another, again and again. Validated on
 construction.
 """
 
@@ -10,14 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
-from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell, Hold
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
 from joulepath.optimizer.problem.names import check_name, first_repeated
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, MethodName
+from joulepath.optimizer.problem.problem import DURATIONS, MethodName
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import (
     APPROACH,
@@ -28,44 +27,64 @@ from joulepath.optimizer.problem.stops import (
     moves_over,
     passing,
 )
-from joulepath.optimizer.problem.targets import AnyOf, Target, validated
+from joulepath.optimizer.problem.targets import Target, validated_in_cycle
 from joulepath.optimizer.result.energy import Objective
 
-MOST_STOPS = 256
-# stops that one motion passes through: the effort of its nonlinear program grows with their square
-# and more
-MOST_PASSES = 12
-# longest duration of a cycle [s]
-LONGEST_ROUND = 36_000.0
-# name of the configuration from which the cycle starts, and of a closed cycle's end
+
+@dataclass(frozen=True)
+class CycleRanges:
+    """Ranges of cycles."""
+
+    max_stops: int = 256
+    """Most stops of a cycle."""
+    max_passes: int = 12
+    """Most stops passed by one motion; the effort of its nonlinear program grows more than
+    quadratically with their number."""
+    longest: float = 36_000.0
+    """Longest duration of a cycle [s]."""
+
+
+CYCLE_RANGES = CycleRanges()
+
 START = "start"
+"""Name of the first configuration of a cycle, and of the last one of a closed cycle."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cycle:
-    """A request for the cycle of least energy: from `start` over all `stops`, in their order or a
-    free one.
+    """A request for the cycle of least energy from `start` through all `stops`.
 
-    `start` is a target like those of the stops, `branch` restricts its branches; `arm` carries its
-    payload from the start to the first stop that changes it. A `closed` round ends in the
-    configuration in which it started, full turns included. `duration_min` and `duration_max` [s]
-    bound the duration of the cycle, dwells and waiting included: time that is left over is waited
-    out. With `windings` every full-turn alternative of a configuration counts; else the one nearest
-    to the middle of the joints' ranges. `hold`, `brake_delay` [s] and `brake_power` [W] say how the
-    arm dwells and waits, as in `Dwell`; it waits at `wait`, a stop or the start (None: where that
-    costs least).
+    The orientation at a stop may be free in part; at the start it is given in full.
 
-    The `objective` "mechanical" is the work of all moves. Slower moves do less, so it needs a
-    `duration_max`; rests do none.
+    Attributes:
+        arm: arm with the payload carried from the start on.
+        start: target at the start.
+        stops: stops, in their order unless `order` is given.
+        closed: whether the cycle ends in the configuration of its start, full turns included.
+        duration_min: least duration with dwells and waits [s]; None for no limit. Time left over is
+            waited out.
+        duration_max: greatest duration with dwells and waits [s]; None for no limit.
+        order: free order of the stops; None for the given order.
+        branch: allowed branches at the start.
+        method: method of the motions.
+        objective: "electrical" energy, or "mechanical" work of all moves. Slower moves do less
+            work, so the latter needs a `duration_max`; rests do no work.
+        windings: whether every full turn of a configuration counts; otherwise only the
+            configuration nearest to the middle of the joint ranges.
+        hold: how the arm is held at rest, as in `Dwell`.
+        brake_delay: see `Dwell` [s].
+        brake_power: see `Dwell` [W].
+        wait: stop at which the arm waits, or `start`; None for the cheapest place.
+        rests_at_passes: whether the arm also rests at the stops it would pass through.
+        with_baselines: whether to search for baselines.
+        approximate: whether unsolved electrical moves weigh more than their bounds, so that fewer
+            of them are solved and the answer is only likely the best.
+        sample_period: period of the samples [s].
+        deadline: limit of the wall time [s].
 
-    With `stopping` the arm rests at the stops that it would pass through, too: what passing is
-    compared with. Where it is not `compared`, other ways to go round are not looked for. A `rough`
-    cycle is likely one of the best: electrical moves that are not solved weigh more than their
-    bounds, so that fewer of them are.
-
-    The orientation at a stop may be free in part, at the start it is given in full.
-
-    Raises InvalidProblem or OutsideLimits, with the field named.
+    Raises:
+        InvalidProblem: a field is malformed.
+        OutsideLimits: joint positions are out of range.
     """
 
     arm: Arm
@@ -83,27 +102,27 @@ class Cycle:
     brake_delay: float = 0.0
     brake_power: float | None = None
     wait: str | None = None
-    stopping: bool = False
-    compared: bool = True
-    rough: bool = False
+    rests_at_passes: bool = False
+    with_baselines: bool = True
+    approximate: bool = False
     sample_period: float = 0.008
     deadline: float = 60.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stops", tuple(self.stops))
-        if not 1 <= len(self.stops) <= MOST_STOPS:
-            raise InvalidProblem("stops", f"A cycle must have 1 to {MOST_STOPS} stops.")
+        if not 1 <= len(self.stops) <= CYCLE_RANGES.max_stops:
+            raise InvalidProblem("stops", f"A cycle must have 1 to {CYCLE_RANGES.max_stops} stops.")
         self._check_names()
-        object.__setattr__(self, "start", _checked_target(self.arm, "start", self.start))
+        object.__setattr__(self, "start", validated_in_cycle(self.arm, "start", self.start))
         checked = tuple(
-            replace(stop, target=_checked_target(self.arm, f"stops.{k}.target", stop.target))
+            replace(stop, target=validated_in_cycle(self.arm, f"stops.{k}.target", stop.target))
             for k, stop in enumerate(self.stops)
         )
         object.__setattr__(self, "stops", checked)
         for k, stop in enumerate(self.stops):
-            if not 0 <= stop.dwell <= LONGEST_DURATION:
+            if not 0 <= stop.dwell <= DURATIONS.longest:
                 raise InvalidProblem(
-                    f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s."
+                    f"stops.{k}.dwell", f"dwell must be from 0 to {DURATIONS.longest:g} s."
                 )
             self._check_limits(k, stop)
             if stop.path is not None:
@@ -195,10 +214,11 @@ class Cycle:
         passed = 0
         for k, stop in enumerate(self.stops):
             passed = passed + 1 if stop.via else 0
-            if passed > MOST_PASSES:
+            if passed > CYCLE_RANGES.max_passes:
                 raise InvalidProblem(
                     f"stops.{k}.via",
-                    f"The arm passes through at most {MOST_PASSES} stops between two rests: set "
+                    f"The arm passes through at most {CYCLE_RANGES.max_passes} stops between two "
+                    "rests: set "
                     "via to false here.",
                 )
 
@@ -217,7 +237,7 @@ class Cycle:
 
     def _check_holding(self) -> None:
         try:
-            self.waiting(1.0)
+            self.dwell_of(1.0)
         except InvalidProblem as error:
             raise InvalidProblem(
                 error.field.replace("dwell", "hold"), str(error).replace("dwell", "hold")
@@ -225,9 +245,9 @@ class Cycle:
 
     def _check_duration(self) -> None:
         for value in (self.duration_min, self.duration_max):
-            if value is not None and not 0 < value <= LONGEST_ROUND:
+            if value is not None and not 0 < value <= CYCLE_RANGES.longest:
                 raise InvalidProblem(
-                    "time", f"time must be above 0 and at most {LONGEST_ROUND:g} s."
+                    "time", f"time must be above 0 and at most {CYCLE_RANGES.longest:g} s."
                 )
         if (
             self.duration_min is not None
@@ -243,36 +263,35 @@ class Cycle:
             )
 
     @property
-    def dwelling(self) -> float:
-        """Time [s] of all dwells."""
+    def dwell_time(self) -> float:
+        """Duration of all dwells [s]."""
         return sum(stop.dwell for stop in self.stops)
 
     @property
     def longest_move(self) -> float:
-        """Longest duration [s] of a move."""
-        most = np.inf if self.duration_max is None else self.duration_max - self.dwelling
-        return float(np.clip(most, LEAST_DURATION, LONGEST_DURATION))
+        """Longest duration of a move [s]."""
+        most = np.inf if self.duration_max is None else self.duration_max - self.dwell_time
+        return float(np.clip(most, DURATIONS.least, DURATIONS.longest))
 
-    def waiting(self, length: float) -> Dwell:
-        """A wait of `length` [s], as the wait after a motion of no duration."""
+    def dwell_of(self, length: float) -> Dwell:
+        """A dwell of `length` [s] after a motion of zero duration."""
         return Dwell(length, self.hold, self.brake_delay, self.brake_power)
 
     @cached_property
     def arms(self) -> list[Arm]:
-        """The arm with what it carries on the way to each stop, and after the last one: one arm for
-        each payload.
+        """Arm with its payload on the way to every stop and after the last one; one arm per
+        payload.
         """
-        arms, known = [self.arm], {self.arm.payload.content: self.arm}
+        arms = [self.arm]
         for stop in self.stops:
             payload = arms[-1].payload if stop.payload is None else stop.payload
-            if payload.content not in known:
-                known[payload.content] = replace(self.arm, payload=payload)
-            arms.append(known[payload.content])
+            same = (arm for arm in arms if arm.payload.is_same_body(payload))
+            arms.append(next(same, None) or replace(self.arm, payload=payload))
         return arms
 
     @cached_property
     def moves(self) -> list[PlannedMove]:
-        """The moves of the cycle in their order, those along lines and paths included."""
+        """Moves of the cycle in order, including those along lines and paths."""
         moves, place, passed = list[PlannedMove](), START, list[Stop]()
         for stop, before, after in zip(self.stops, self.arms, self.arms[1:], strict=False):
             if stop.via:
@@ -283,56 +302,24 @@ class Cycle:
             place, passed = moves[-1].goal, []
         if self.closed:
             moves.append(passing(PlannedMove(place, START, self.arms[-1], self.arms[-1]), passed))
-        return [part for move in moves for part in move.parts] if self.stopping else moves
+        return [part for move in moves for part in move.parts] if self.rests_at_passes else moves
 
     @cached_property
-    def passes(self) -> bool:
+    def has_passes(self) -> bool:
         """Whether the arm passes through some stop without a rest."""
         return any(move.through for move in self.moves)
 
     def may_wait_after(self, move: PlannedMove) -> bool:
-        """Whether time that is left over may be waited out after a move: not at a stop that the arm
-        passes through.
-        """
+        """Whether the arm may wait after a move: not at a stop it would pass through."""
         at_pass = any(stop.via and stop.name == move.goal for stop in self.stops)
         return self.wait in (None, move.goal) and not at_pass
 
     @property
-    def any_time(self) -> bool:
-        """Whether the cycle may take as long as it does."""
+    def has_free_duration(self) -> bool:
+        """Whether the duration of the cycle is not limited."""
         return self.duration_min is None and self.duration_max is None
 
-    def nearest_duration(self, duration: float) -> float:
-        """The duration [s] within the bounds of the time that is nearest to another one."""
+    def clamped_duration(self, duration: float) -> float:
+        """The allowed duration [s] nearest to the given one."""
         most = np.inf if self.duration_max is None else self.duration_max
         return min(max(duration, self.duration_min or 0.0), most)
-
-
-def _checked_target(arm: Arm, field: str, target: Target) -> Target:
-    """The target, its joint positions as read-only arrays.
-
-    Raises InvalidProblem, also for a start, or one of several targets, whose orientation is free in
-    part; or OutsideLimits.
-    """
-    if field == START and isinstance(target, ConeOrientedPose):
-        raise InvalidProblem(
-            field,
-            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or "
-            "joint positions.",
-        )
-    if isinstance(target, AnyOf) and any(
-        isinstance(member, ConeOrientedPose) for member in target.targets
-    ):
-        raise InvalidProblem(
-            field,
-            "Of several targets, each has its orientation in full: give a quaternion, rpy or "
-            "rotvec.",
-        )
-    try:
-        return validated(arm, "goal", target)
-    except OutsideLimits as error:
-        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
-    except InvalidProblem as error:
-        raise InvalidProblem(
-            error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)
-        ) from None

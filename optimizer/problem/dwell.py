@@ -1,6 +1,4 @@
-"""A dwell: the time from one start of the motion to the next, and how the arm is held at the goal
-until then.
-"""
+"""A dwell: time from one start of a motion to the next, with the arm held at the goal."""
 
 from __future__ import annotations
 
@@ -16,14 +14,17 @@ Hold = Literal["motors", "brakes"]
 
 @dataclass(frozen=True)
 class Dwell:
-    """The `time` [s] from one start of the motion to the next, and how the arm is held at the goal
-    until then.
+    """Rest at the goal until the next start of the motion.
 
-    With `hold` "brakes" the motors hold for `brake_delay` [s] first. Then the arm draws
-    `brake_power` [W] in all, electronics included (None: the power of the electronics with the
-    brakes on).
+    Attributes:
+        time: time from one start of the motion to the next [s].
+        hold: "motors", or "brakes" after a delay.
+        brake_delay: time on the motors before the brakes engage [s].
+        brake_power: total power on the brakes, electronics included [W]; None for the power of the
+            electronics with the brakes on.
 
-    Raises InvalidProblem, with the field named.
+    Raises:
+        InvalidProblem: a value is out of range; names the field.
     """
 
     time: float

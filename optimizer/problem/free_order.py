@@ -1,4 +1,4 @@
-"""A free order of the stops of a cycle, and what restricts it."""
+"""A free order of the stops of a cycle, and its restrictions."""
 
 from __future__ import annotations
 
@@ -7,28 +7,29 @@ from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 
-import numpy as np
-
 from joulepath.optimizer.exceptions import ContradictoryOrder, InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.stops import Stop
 
-# stops of a cycle with a free order: the search visits every subset of them
 MOST_FREE_STOPS = 12
+"""Most stops of a cycle with a free order; the search visits all subsets of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreeOrder:
-    """The stops may be visited in any order that has the first stop of each pair of `before`
-    earlier than the second, and the stops of each list of `together` one directly after the other,
-    as they are listed."""
+    """Restrictions of a free order of stops.
+
+    Attributes:
+        before: pairs of stops; the first of a pair comes earlier than the second.
+        together: lists of stops visited directly after one another, in this order.
+    """
 
     before: Sequence[tuple[str, str]] = ()
     together: Sequence[Sequence[str]] = ()
 
 
 def groups_of(order: FreeOrder, stops: Sequence[Stop]) -> list[list[Stop]]:
-    """The stops in groups that stay together, in the order in which their first stops are given."""
+    """Groups of stops to be visited together, in the given order of their first stops."""
     by_name = {stop.name: stop for stop in stops}
     listed = {name: list(names) for names in order.together for name in names}
     groups = list[list[Stop]]()
@@ -40,7 +41,7 @@ def groups_of(order: FreeOrder, stops: Sequence[Stop]) -> list[list[Stop]]:
 
 
 def earlier_groups(order: FreeOrder, groups: Sequence[Sequence[Stop]]) -> list[set[int]]:
-    """For each group the numbers of those that come before it."""
+    """Numbers of the groups before every group."""
     number = {stop.name: k for k, group in enumerate(groups) for stop in group}
     earlier = [set[int]() for _ in groups]
     for first, second in order.before:
@@ -50,17 +51,23 @@ def earlier_groups(order: FreeOrder, groups: Sequence[Sequence[Stop]]) -> list[s
 
 
 def is_given_order_allowed(order: FreeOrder, stops: Sequence[Stop]) -> bool:
-    """Whether the stops may be visited in the order in which they are given."""
+    """Whether the stops may be visited in the given order."""
     place = {stop.name: k for k, stop in enumerate(stops)}
     listed = all(place[b] == place[a] + 1 for names in order.together for a, b in pairwise(names))
     return listed and all(place[a] < place[b] for a, b in order.before)
 
 
 def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> None:
-    """Raises InvalidProblem, with the field named, if an order contradicts itself or does not fit
-    the stops.
+    """Check that an order fits its stops and does not contradict itself.
 
-    `carried` is what the arm carries at the start.
+    Args:
+        order: the order.
+        stops: stops of the cycle.
+        carried: payload at the start.
+
+    Raises:
+        ContradictoryOrder: no order of the stops exists.
+        InvalidProblem: a field is malformed; names the field.
     """
     if len(stops) > MOST_FREE_STOPS:
         raise InvalidProblem(
@@ -80,7 +87,7 @@ def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> No
     _check_before(order, stops)
     for group in groups_of(order, stops):
         after = [stop.payload for stop in group if stop.payload is not None]
-        if after and not _same(after[-1], carried):
+        if after and not after[-1].is_same_body(carried):
             raise InvalidProblem(
                 "together",
                 f"After {group[-1].name} the arm carries something else than at the start. With a "
@@ -115,11 +122,3 @@ def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
             "together.",
             [stop.name for group in circle[:-1] for stop in group],
         ) from None
-
-
-def _same(one: Payload, other: Payload) -> bool:
-    """Whether two payloads are the same."""
-    bodies = ((each.mass, each.com, each.inertia) for each in (one, other))
-    return one.shape is other.shape and all(
-        np.array_equal(a, b) for a, b in zip(*bodies, strict=True)
-    )

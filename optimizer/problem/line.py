@@ -12,18 +12,33 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen
 
 LineFrame = Literal["tcp", "base"]
-# m: least and greatest length of a line
-LEAST_DISTANCE, MOST_DISTANCE = 1e-4, 2.0
+
+
+@dataclass(frozen=True)
+class LineRanges:
+    """Ranges of lines of the TCP."""
+
+    least_distance: float = 1e-4
+    """Least length of a line [m]."""
+    greatest_distance: float = 2.0
+    """Greatest length of a line [m]."""
+
+
+LINE_RANGES = LineRanges()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """The TCP moves by `distance` [m] along `direction` (3,), and its orientation stays.
+    """Straight motion of the TCP with a constant orientation.
 
-    The direction is a vector of any length in the `frame` of the TCP at the stop, or of the base.
-    `speed` [m/s] bounds the speed of the TCP on the line.
+    Attributes:
+        direction: direction of any length, shape (3,).
+        distance: length of the line [m].
+        frame: frame of the direction: "tcp" at the stop, or "base".
+        speed: speed limit of the TCP on the line [m/s]; None without one.
 
-    Raises InvalidProblem, with the field named.
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
     """
 
     direction: Array
@@ -39,10 +54,11 @@ class Line:
                 "direction",
                 "direction must not be zero: give the vector along which the TCP moves.",
             )
-        if not LEAST_DISTANCE <= self.distance <= MOST_DISTANCE:
+        if not LINE_RANGES.least_distance <= self.distance <= LINE_RANGES.greatest_distance:
             raise InvalidProblem(
                 "distance",
-                f"distance must be from {LEAST_DISTANCE:g} to {MOST_DISTANCE:g} m: "
+                f"distance must be from {LINE_RANGES.least_distance:g} to "
+                f"{LINE_RANGES.greatest_distance:g} m: "
                 f"{self.distance!r}.",
             )
         if self.frame not in ("tcp", "base"):
@@ -51,7 +67,8 @@ class Line:
             raise InvalidProblem("speed", "speed must be a positive number of metres per second.")
 
     def shift(self, T_base_tcp: Array) -> Array:
-        """The way (3,) [m] of the TCP in the base frame, at a stop with the pose T_base_tcp (4,
-        4)."""
+        """Displacement (3,) [m] of the TCP in the base frame, at a stop with pose T_base_tcp (4,
+        4).
+        """
         along = self.direction / np.linalg.norm(self.direction) * self.distance
         return np.asarray(T_base_tcp[:3, :3] @ along if self.frame == "tcp" else along)

@@ -1,4 +1,4 @@
-"""Names that a caller gives: plain text that cannot be taken for another name."""
+"""Names given by a caller: plain text, distinguishable from all other names."""
 
 from __future__ import annotations
 
@@ -7,31 +7,33 @@ from collections.abc import Collection, Sequence
 
 from joulepath.optimizer.exceptions import InvalidProblem
 
-# most characters of an obstacle's name
 LONGEST_NAME = 64
+"""Most characters of a name."""
 
 
 def is_plain(name: str) -> bool:
-    """Whether every character shows: letters, digits, punctuation, signs and spaces, at least one
-    of them no space.
+    """Whether all characters are visible, and at least one is no space.
 
-    Control characters, line breaks, invisible and formatting characters (such as those that reverse
-    the direction of writing) do not show.
+    Control characters, line breaks, invisible and formatting characters, such as changes of the
+    writing direction, are not visible.
     """
     return name.isprintable() and not name.isspace() and bool(name)
 
 
-def reading(name: str) -> str:
-    """What a reader takes the name for. Names that differ only in case, in spaces, or in the width
-    or composition of characters (Unicode's NFKC) have the same one."""
+def normalized(name: str) -> str:
+    """Form of a name without case, repeated spaces, and Unicode variants of width or composition
+    (NFKC).
+    """
     return " ".join(
         unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold()).split()
     )
 
 
 def check_name(field: str, name: object) -> None:
-    """Raises InvalidProblem, with `field` named, unless `name` is plain text of 1 to LONGEST_NAME
-    characters.
+    """Check that a name is plain text of 1 to LONGEST_NAME characters.
+
+    Raises:
+        InvalidProblem: the name is invalid; names `field`.
     """
     if not isinstance(name, str) or not 1 <= len(name) <= LONGEST_NAME:
         raise InvalidProblem(field, f"{field} must be a text of 1 to {LONGEST_NAME} characters.")
@@ -44,16 +46,16 @@ def check_name(field: str, name: object) -> None:
 
 
 def first_repeated(names: Sequence[str]) -> int | None:
-    """Index of the first name that reads like an earlier one; None if there is none."""
+    """Index of the first name equal to an earlier one in normalized form; None without one."""
     earlier = set()
-    for k, name in enumerate(map(reading, names)):
+    for k, name in enumerate(map(normalized, names)):
         if name in earlier:
             return k
         earlier.add(name)
     return None
 
 
-def first_among(names: Sequence[str], taken: Collection[str]) -> int | None:
-    """Index of the first name that reads like one of `taken`; None if there is none."""
-    known = set(map(reading, taken))
-    return next((k for k, name in enumerate(names) if reading(name) in known), None)
+def first_taken(names: Sequence[str], taken: Collection[str]) -> int | None:
+    """Index of the first name equal to one of `taken` in normalized form; None without one."""
+    known = set(map(normalized, taken))
+    return next((k for k, name in enumerate(names) if normalized(name) in known), None)

@@ -1,6 +1,4 @@
-"""A pose of the TCP in the robot's base frame, from a matrix or from any of the usual forms of an
-orientation.
-"""
+"""A pose of the TCP in the base frame, from a matrix or any usual form of an orientation."""
 
 from __future__ import annotations
 
@@ -12,16 +10,19 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen, rigid_transform
 
-# how far the norm of a quaternion may be from 1: rounded to three decimals it is that near
 QUATERNION_TOLERANCE = 1e-3
+"""Greatest deviation of a quaternion's norm from 1, as after rounding to three decimals."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Pose of the TCP in the robot's base frame: `T` is the homogeneous matrix T_base_tcp (4, 4),
-    position in m.
+    """Pose of the TCP in the base frame.
 
-    Raises InvalidProblem if `T` is not a rigid transform.
+    Attributes:
+        T: homogeneous matrix T_base_tcp, shape (4, 4), position in m.
+
+    Raises:
+        InvalidProblem: `T` is no rigid transform.
     """
 
     T: Array
@@ -58,7 +59,8 @@ class Pose:
 def rotation_from_quaternion(quaternion: object) -> Array:
     """Rotation matrix (3, 3) of a quaternion x, y, z, w (4,), which is normalised.
 
-    Raises InvalidProblem if its norm differs from 1 by more than QUATERNION_TOLERANCE.
+    Raises:
+        InvalidProblem: the norm differs from 1 by more than QUATERNION_TOLERANCE.
     """
     field = "pose.quaternion"
     given = frozen(quaternion, (4,), field)
@@ -78,10 +80,10 @@ def rotation_from_quaternion(quaternion: object) -> Array:
 
 
 def rotation_from_rpy(rpy: object) -> Array:
-    """Rotation matrix (3, 3) of roll, pitch, yaw (3,) [rad]: Rz(yaw) Ry(pitch) Rx(roll), about the
-    fixed axes x, y, z.
+    """Rotation matrix (3, 3) Rz(yaw) Ry(pitch) Rx(roll) of angles (3,) [rad] about the fixed axes.
 
-    Raises InvalidProblem.
+    Raises:
+        InvalidProblem: the angles are malformed.
     """
     angles = frozen(rpy, (3,), "pose.rpy")
     roll, pitch, yaw = (
@@ -91,8 +93,10 @@ def rotation_from_rpy(rpy: object) -> Array:
 
 
 def rotation_from_rotvec(rotvec: object) -> Array:
-    """Rotation matrix (3, 3) of a rotation vector (3,) [rad]: unit axis times angle. Raises
-    InvalidProblem.
+    """Rotation matrix (3, 3) of a rotation vector (3,) [rad]: unit axis times angle.
+
+    Raises:
+        InvalidProblem: the vector is malformed.
     """
     vector = frozen(rotvec, (3,), "pose.rotvec")
     angle = float(np.linalg.norm(vector))

@@ -19,38 +19,51 @@ from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.result.energy import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
-# effort for the lower bound of the answer
+# effort for the lower bound
 BoundEffort = Literal["normal", "tight"]
 
-# bounds on every planned duration [s]; the first also holds if start and goal are the same
-LEAST_DURATION = 0.01
-LONGEST_DURATION = 600.0
+
+@dataclass(frozen=True)
+class DurationRanges:
+    """Ranges of durations."""
+
+    least: float = 0.01
+    """Least duration of a motion [s], also if start and goal are the same."""
+    longest: float = 600.0
+    """Greatest duration of a motion [s]."""
+
+
+DURATIONS = DurationRanges()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """A request for the motion of least energy of `arm` between `start` and `goal`.
+    """A request for the motion of least energy of an arm between two targets.
 
-    `start` and `goal` are joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these; the goal
-    may be a `ConeOrientedPose`. `duration_min` and `duration_max` [s] bound the duration. If they
-    are equal, they fix it; None leaves it to the optimiser. With a `dwell` the arm waits at the
-    goal until the end of the dwell, and the motion lasts no longer than the dwell.
+    Attributes:
+        arm: the arm.
+        start: joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these.
+        goal: like `start`, or a `ConeOrientedPose`.
+        method: method of the solver; ignored with a tool path or passes.
+        objective: "electrical" energy or "mechanical" work.
+        duration_min: least duration [s]; None for no limit.
+        duration_max: greatest duration [s]; None for no limit. Equal bounds fix the duration.
+        dwell: rest at the goal; the motion is then no longer than `dwell.time`.
+        tool_path: path of the TCP from start to goal, a pose or joint positions. Only branch and
+            timing are free; if the tool may turn about an axis, start and goal may be a
+            `ConeOrientedPose` with a free rotation about it.
+        passes: joint positions (nq,) [rad] that the motion passes through in order, at free times;
+            start and goal are then joint positions.
+        branch: allowed branches of start and goal.
+        windings: whether the goal may be a full turn of a joint away; ignored with a tool path.
+        bound: "tight" for more effort on the lower bounds of candidates that could beat the answer;
+            for mechanical work, on candidates that differ by full turns of the outer joints.
+        sample_period: period of the returned samples [s].
+        deadline: wall time after which the best verified result is returned [s].
 
-    With a `tool_path` the TCP goes along it from `start` to `goal`, which are a pose or joint
-    positions each: only the branch and the timing are free, and `method` and `windings` do not
-    matter. If the tool may turn about an axis on the way, start and goal may leave the rotation
-    about it free: a `ConeOrientedPose` each.
-
-    With `passes`, joint positions (nq,) [rad], the motion passes through them in their order, at
-    times that are free; then start and goal are joint positions, too, and `method` does not matter.
-
-    `branch` restricts the inverse kinematics branches of start and goal. With `windings` the goal
-    may also be a full turn of a joint away. With the `bound` "tight" more time goes into the lower
-    bounds of what could still beat the answer; for mechanical work, into solving all candidates
-    that differ by full turns of the outer joints. `sample_period` [s] is that of the returned
-    samples. After `deadline` [s] of wall time the best verified result so far is returned.
-
-    Raises InvalidProblem or OutsideLimits, with the field named, if the parts do not fit together.
+    Raises:
+        InvalidProblem: the parts do not fit together; names the field.
+        OutsideLimits: joint positions are out of range.
     """
 
     arm: Arm
@@ -122,6 +135,5 @@ class Problem:
 
 
 def narrowed(problem: Problem, start: int, goal: int) -> Problem:
-    """The same problem with only one target each: those of index `start` and `goal` among its
-    own."""
+    """The problem with a single start and goal: those of the given indices."""
     return replace(problem, start=members(problem.start)[start], goal=members(problem.goal)[goal])

@@ -1,4 +1,4 @@
-"""Obstacles around the arm and shapes fixed to its flange, validated on construction."""
+"""Obstacles around the arm and shapes fixed to its flange. Validated on construction."""
 
 from __future__ import annotations
 
@@ -11,14 +11,23 @@ from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import SIZES, hull_of_body
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import check_sizes, frozen, placement, sized
-from joulepath.optimizer.problem.clouds import MOST_PARTS_IN_SCENE, Cloud, parts_of
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Cloud, parts_of
 from joulepath.optimizer.problem.names import check_name, first_repeated
 
-# most obstacles in a scene, and most vertices of a mesh: they bound the work of a request
-MOST_OBSTACLES, MOST_VERTICES = 64, 256
-# clearance [m] that an obstacle asks for unless told otherwise: what the place of a body in a cell
-# is known to
-DEFAULT_MARGIN = 5e-3
+
+@dataclass(frozen=True)
+class SceneRanges:
+    """Ranges of obstacles and of their shapes."""
+
+    max_obstacles: int = 64
+    """Most obstacles of a scene; the limits bound the work of a request."""
+    max_vertices: int = 256
+    """Most vertices of a mesh."""
+    default_margin: float = 5e-3
+    """Default clearance of an obstacle [m]: the accuracy of the placement of bodies in a cell."""
+
+
+SCENE_RANGES = SceneRanges()
 
 
 @dataclass(frozen=True)
@@ -33,7 +42,7 @@ class Sphere:
 
 @dataclass(frozen=True)
 class _AlongZ:
-    """A body of revolution of `radius` and `length` [m] along z, centred at the origin."""
+    """Body of revolution of `radius` and `length` [m] along z, centred at the origin."""
 
     radius: float
     length: float
@@ -67,21 +76,25 @@ class Box:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """All points below z = 0: a floor, or a wall whose z axis points into the free space."""
+    """All points below z = 0: a floor, or a wall with its z axis into free space."""
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """The convex hull of `vertices` (n, 3) [m]. Raises InvalidProblem if they lie in a plane, or
-    close together.
+    """Convex hull of `vertices` (n, 3) [m].
+
+    Raises:
+        InvalidProblem: the vertices lie in a plane, or close together.
     """
 
     vertices: Array
 
     def __post_init__(self) -> None:
         vertices = frozen(self.vertices, (-1, 3), "vertices")
-        if not 4 <= len(vertices) <= MOST_VERTICES:
-            raise InvalidProblem("vertices", f"vertices must be 4 to {MOST_VERTICES} points.")
+        if not 4 <= len(vertices) <= SCENE_RANGES.max_vertices:
+            raise InvalidProblem(
+                "vertices", f"vertices must be 4 to {SCENE_RANGES.max_vertices} points."
+            )
         if np.abs(vertices).max() > SIZES.largest:
             raise InvalidProblem(
                 "vertices", f"vertices must lie within {SIZES.largest:g} m of the origin."
@@ -95,17 +108,22 @@ Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh | Cloud
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A shape at `T_base_shape` (4, 4) in the base frame; its clearance from the arm must be at
-    least `margin` [m].
+    """A shape in the base frame with a required clearance.
 
-    Answers call it `name`: see `joulepath.optimizer.problem.names`. Raises InvalidProblem, with the
-    field named.
+    Attributes:
+        name: name in answers; see `joulepath.optimizer.problem.names`.
+        shape: the shape.
+        T_base_shape: its pose in the base frame, shape (4, 4).
+        margin: required clearance from the arm [m].
+
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
     """
 
     name: str
     shape: Shape
     T_base_shape: Array = field(default_factory=lambda: np.eye(4))
-    margin: float = DEFAULT_MARGIN
+    margin: float = SCENE_RANGES.default_margin
 
     def __post_init__(self) -> None:
         check_name("name", self.name)
@@ -116,10 +134,16 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Attachment:
-    """A shape fixed to the flange at `T_flange_shape` (4, 4): part of a tool, or the payload.
+    """A shape fixed to the flange: part of a tool, or the payload.
 
-    `touches` names the links that it touches by design: their distance from it is not checked. None
-    stands for the link that carries the flange.
+    Attributes:
+        shape: the shape.
+        T_flange_shape: its pose in the flange frame, shape (4, 4).
+        touches: names of the links it touches by design, with unchecked distances; None for the
+            link of the flange.
+
+    Raises:
+        InvalidProblem: the shape cannot be carried, or a value is malformed.
     """
 
     shape: Shape
@@ -140,22 +164,26 @@ class Attachment:
 
 @dataclass(frozen=True)
 class Scene:
-    """Obstacles, each with a name of its own. Raises InvalidProblem if two names read alike."""
+    """Obstacles with distinct names.
+
+    Raises:
+        InvalidProblem: two names are equal in normalized form, or there are too many obstacles.
+    """
 
     obstacles: Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
-        if len(self.obstacles) > MOST_OBSTACLES:
+        if len(self.obstacles) > SCENE_RANGES.max_obstacles:
             raise InvalidProblem(
-                "scene.obstacles", f"A scene has at most {MOST_OBSTACLES} obstacles."
+                "scene.obstacles", f"A scene has at most {SCENE_RANGES.max_obstacles} obstacles."
             )
         parts = sum(parts_of(o.shape) for o in self.obstacles if isinstance(o.shape, Cloud))
-        if parts > MOST_PARTS_IN_SCENE:
+        if parts > CLOUD_RANGES.max_parts_in_scene:
             raise InvalidProblem(
                 "scene.obstacles",
                 f"The points, voxels and triangles of a scene are {parts}: give at most "
-                f"{MOST_PARTS_IN_SCENE} in all.",
+                f"{CLOUD_RANGES.max_parts_in_scene} in all.",
             )
         repeated = first_repeated(self.names)
         if repeated is not None:
@@ -178,15 +206,15 @@ def capsule_between(
 
     Args:
         first: one end of the segment in the flange frame, shape (3,) [m].
-        second: the other end; where both coincide, the shape is a sphere.
+        second: the other end; if both coincide, the shape is a sphere.
         radius: radius of the capsule [m].
-        touches: names of the links that it touches by design, as in `Attachment`.
+        touches: names of the links it touches by design, as in `Attachment`.
 
     Returns:
         The shape, for `Arm(tool=[…])`.
 
     Raises:
-        InvalidProblem: an end is not finite, or the size is not that of a body.
+        InvalidProblem: an end is not finite, or no body has this size.
     """
     ends = frozen([first, second], (2, 3), "tool.capsules")
     along = ends[1] - ends[0]
@@ -196,7 +224,7 @@ def capsule_between(
     if length < SIZES.smallest:
         return Attachment(Sphere(radius + length / 2), T, touches)
     z = along / length
-    # any x axis normal to z
+    # any x axis orthogonal to z
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])

@@ -1,4 +1,4 @@
-"""A path of the TCP at a stop of a cycle, like that of a bead of glue."""
+"""A path of the TCP at a stop of a cycle, such as a bead of glue."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.targets import PosesAround, Target, members
+from joulepath.optimizer.problem.targets import SampledPoses, Target, members
 from joulepath.optimizer.problem.tool_path import ToolPath
 
 STRAIGHT = ToolPath()
@@ -17,21 +17,25 @@ STRAIGHT = ToolPath()
 
 @dataclass(frozen=True, kw_only=True)
 class StopPath:
-    """The TCP goes from the stop's target, which is one pose then, over `path.via` to `goal`, and
-    rests at both ends.
+    """Path of the TCP from the target of a stop over `path.via` to `goal`, with rests at both ends.
 
-    Where the tool may turn about an axis on the way, either end may leave the rotation about it
-    free, too. Of a stop with several targets, a path leads from each of them to the one of `goals`
-    in its place.
+    The target of the stop is then a single pose. If the tool may turn about an axis on the path,
+    either end may leave the rotation about this axis free.
 
-    `speed` [m/s] bounds the speed of the TCP on the way. With `split`, a path that no configuration
-    follows whole is divided by reconfigurations: moves between configurations of one pose.
+    Attributes:
+        goal: end of the path.
+        goals: ends for a stop with several targets, one for every target in order.
+        path: shape, intermediate poses and tolerances.
+        speed: speed limit of the TCP [m/s]; None without one.
+        split: whether a path that no configuration follows whole is divided by reconfigurations,
+            moves between configurations of one pose.
 
-    Raises InvalidProblem, with the field named.
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
     """
 
     goal: Pose | ConeOrientedPose
-    goals: PosesAround | None = None
+    goals: SampledPoses | None = None
     path: ToolPath = STRAIGHT
     speed: float | None = None
     split: bool = False
@@ -43,10 +47,13 @@ class StopPath:
             )
 
     def check_ends(self, target: Target) -> None:
-        """Raises InvalidProblem, with the field named, for poses at the ends between which there is
-        no path.
+        """Check the poses at both ends of the path.
 
-        `target` is that of the stop.
+        Args:
+            target: target of the stop.
+
+        Raises:
+            InvalidProblem: there is no path between the poses; names the field.
         """
         several = self.goals is not None and len(members(target)) == len(self.goals.targets)
         if not several and not isinstance(target, Pose | ConeOrientedPose):
@@ -71,8 +78,8 @@ class StopPath:
 
 
 def at_stop(k: int, error: InvalidProblem) -> InvalidProblem:
-    """An error of a path, with the field that it has as the path of stop `k`, whose `points` begin
-    with the start.
+    """The error of a path with its field in a request: the path of stop `k`, with the start in
+    `points`.
     """
     field = error.field.removeprefix("path.via.")
     if field != error.field:

@@ -1,4 +1,4 @@
-"""The stops of a cycle, and the moves that lead over them."""
+"""Stops of a cycle, and the moves between them."""
 
 from __future__ import annotations
 
@@ -21,28 +21,38 @@ from joulepath.optimizer.problem.targets import Target
 from joulepath.optimizer.problem.tool_path import ToolPath
 
 MoveKind = Literal["move", "line", "path"]
-# what follows the name of a stop in those of the outer ends of its lines, and of the start of its
-# path
-APPROACH, RETREAT, ENTRY = "/approach", "/retreat", "/entry"
+APPROACH = "/approach"
+"""Suffix of a stop's name for the outer end of its approach."""
+RETREAT = "/retreat"
+"""Suffix of a stop's name for the outer end of its retreat."""
+ENTRY = "/entry"
+"""Suffix of a stop's name for the start of its path."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """A target at which the arm comes to rest, for `dwell` [s]. Its orientation may be free in
-    part.
+    """A target at which the arm rests, or which it passes.
 
-    `payload` is carried from here on, the dwell included: grasped, or released with a payload
-    without mass; None leaves it unchanged. `branch` restricts the inverse kinematics branches of
-    this stop. The moves into the stop, a line included, keep within `limits`, `tcp_speed` and
-    `elbow_speed` [m/s], too; position limits are the arm's.
+    The arm rests at the outer ends of its lines and at both ends of its path; it dwells and changes
+    the payload at the end of the path.
 
-    The TCP moves along the line `approach` into the stop and along `retreat` out of it, and rests
-    at their outer ends. At the stop it follows a `path`, from the target to where the path ends;
-    there it dwells, and the payload changes. At the stop, on its lines and its path the obstacles
-    named in `obstacles_ignored` do not count.
-
-    If `via`, the arm passes through the target without a rest, on its way to the next stop at which
-    it rests. The limits of all stops of such a motion hold for all of it.
+    Attributes:
+        name: name of the stop.
+        target: target, with a partly free orientation perhaps.
+        dwell: duration of the rest [s].
+        payload: payload from here on, dwell included; one without mass releases a part, None
+            changes nothing.
+        branch: allowed branches of this stop.
+        limits: joint limits of the moves into the stop, lines included; position limits are the
+            arm's.
+        tcp_speed: speed limit of the TCP in these moves [m/s].
+        elbow_speed: speed limit of the elbow in these moves [m/s].
+        approach: line of the TCP into the stop.
+        retreat: line of the TCP out of the stop.
+        path: path from the target on.
+        obstacles_ignored: names of obstacles ignored at the stop, on its lines and its path.
+        via: whether the arm passes through the target without a rest, within the limits of all
+            stops of this motion.
     """
 
     name: str
@@ -61,8 +71,8 @@ class Stop:
 
     @property
     def free_ends(self) -> tuple[bool, bool]:
-        """Whether the target leaves the orientation free in part, and whether the end of the stop's
-        path does.
+        """Whether the orientation is partly free at the target, and at the end of the stop's
+        path.
         """
         at_end = self.path is not None and isinstance(self.path.goal, ConeOrientedPose)
         return isinstance(self.target, ConeOrientedPose), at_end
@@ -74,8 +84,9 @@ class Stop:
 
     @property
     def places(self) -> list[str]:
-        """Names of the places at which the arm rests, in their order: the ends of the stop's path,
-        or the stop, and the outer ends of its lines."""
+        """Names of the places of rest in order: outer end of the approach, ends of the path or the
+        stop, and outer end of the retreat.
+        """
         return [
             *([self.name + APPROACH] if self.approach else []),
             *([self.entry] if self.path else []),
@@ -86,11 +97,18 @@ class Stop:
 
 @dataclass(frozen=True)
 class PlannedMove:
-    """A move of a cycle from one place to another, by their names, with `arm`; along a `tool_path`
-    if there is one.
+    """A move of a cycle between two places.
 
-    It passes `through` stops in their order. After it `arm_after` rests, for `dwell` [s].
-    `at_stop`: the goal is a stop, and neither an outer end nor the start.
+    Attributes:
+        start: name of the place at its start.
+        goal: name of the place at its end.
+        arm: arm with its payload during the move.
+        arm_after: arm with its payload at rest after the move.
+        dwell: duration of this rest [s].
+        kind: kind of the move.
+        tool_path: path of the TCP; None for a free move.
+        at_stop: whether the goal is a stop, not an outer end or the start.
+        through: names of the stops passed, in order.
     """
 
     start: str
@@ -105,7 +123,7 @@ class PlannedMove:
 
     @property
     def parts(self) -> list[PlannedMove]:
-        """The moves from rest to rest if the arm stops where it passes through."""
+        """The moves from rest to rest with a rest at every passed stop."""
         places = [self.start, *self.through]
         stopping = [
             PlannedMove(a, b, self.arm, self.arm, at_stop=True) for a, b in pairwise(places)
@@ -114,39 +132,51 @@ class PlannedMove:
 
 
 def passing(move: PlannedMove, stops: Sequence[Stop]) -> PlannedMove:
-    """The move that passes through stops on its way, within the limits of all of them."""
+    """The move through further stops, within the limits of all of them."""
     return replace(
-        move, arm=reduce(_within, stops, move.arm), through=tuple(stop.name for stop in stops)
+        move,
+        arm=reduce(_within_limits, stops, move.arm),
+        through=tuple(stop.name for stop in stops),
     )
 
 
 def moves_over(stop: Stop, place: str, before: Arm, after: Arm) -> list[PlannedMove]:
-    """The moves from `place` to a stop, along its lines and its path; `before` and `after` it the
-    arm carries other payloads."""
-    moves, resting, before = list[PlannedMove](), _at(after, stop), _within(before, stop)
-    there = PlannedMove(place, stop.name, before, resting, stop.dwell, at_stop=True)
+    """Moves from a place to a stop and along its lines and path.
+
+    Args:
+        stop: the stop.
+        place: place before the stop.
+        before: arm with its payload before the stop.
+        after: arm with its payload after the stop.
+    """
+    moves, resting, before = (
+        list[PlannedMove](),
+        _at_stop(after, stop),
+        _within_limits(before, stop),
+    )
+    arrival = PlannedMove(place, stop.name, before, resting, stop.dwell, at_stop=True)
     if stop.path is not None:
-        there = PlannedMove(place, stop.entry, before, _at(before, stop))
+        arrival = PlannedMove(place, stop.entry, before, _at_stop(before, stop))
     if stop.approach is not None:
         outer = stop.name + APPROACH
         moves.append(PlannedMove(place, outer, before, before))
-        on_line = _on_way(before, stop, stop.approach.speed)
-        there = replace(there, start=outer, arm=on_line, kind="line", tool_path=STRAIGHT)
-    moves.append(there)
+        on_line = _on_path(before, stop, stop.approach.speed)
+        arrival = replace(arrival, start=outer, arm=on_line, kind="line", tool_path=STRAIGHT)
+    moves.append(arrival)
     if stop.path is not None:
-        on_path, way = _on_way(before, stop, stop.path.speed), stop.path.path
+        on_path, way = _on_path(before, stop, stop.path.speed), stop.path.path
         moves.append(
             PlannedMove(stop.entry, stop.name, on_path, resting, stop.dwell, "path", way, True)
         )
     if stop.retreat is not None:
-        on_line = _on_way(after, stop, stop.retreat.speed)
+        on_line = _on_path(after, stop, stop.retreat.speed)
         moves.append(
             PlannedMove(stop.name, stop.name + RETREAT, on_line, after, 0.0, "line", STRAIGHT)
         )
     return moves
 
 
-def _within(arm: Arm, stop: Stop) -> Arm:
+def _within_limits(arm: Arm, stop: Stop) -> Arm:
     """The arm on its way to a stop, within the limits of both."""
     if stop.limits is not None:
         own, rates = arm.active_limits, ("v_max", "a_max", "j_max", "tau_max")
@@ -159,14 +189,13 @@ def _within(arm: Arm, stop: Stop) -> Arm:
     return arm.no_faster_than(stop.tcp_speed)
 
 
-def _on_way(arm: Arm, stop: Stop, speed: float | None) -> Arm:
-    """The arm on a line of a stop or on its path: no faster than this allows."""
-    return _at(arm, stop).no_faster_than(speed)
+def _on_path(arm: Arm, stop: Stop, speed: float | None) -> Arm:
+    """The arm on a line or path of a stop, within its speed limit."""
+    return _at_stop(arm, stop).no_faster_than(speed)
 
 
-def _at(arm: Arm, stop: Stop) -> Arm:
-    """The arm at a stop, on its lines and its path: without the obstacles that do not count
-    there."""
+def _at_stop(arm: Arm, stop: Stop) -> Arm:
+    """The arm at a stop, on its lines and its path: without ignored obstacles."""
     if not stop.obstacles_ignored:
         return arm
     return replace(

@@ -1,4 +1,6 @@
-"""Targets, at which a motion may start or end: joint positions, a pose, or any one of several."""
+"""Targets for the start or the end of a motion: joint positions, a pose, or one of several
+targets.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 
-# targets of one `AnyOf`
 MOST_TARGETS = 64
+"""Most targets of one `AnyOf`."""
 
 Side = Literal["start", "goal"]
 Single = Array | Pose | ConeOrientedPose
@@ -21,10 +23,11 @@ Single = Array | Pose | ConeOrientedPose
 
 @dataclass(frozen=True)
 class AnyOf:
-    """The one of `targets` that needs the least energy: 1 to MOST_TARGETS joint positions (nq,)
-    [rad] or poses, mixed.
+    """The target of least energy among `targets`: 1 to MOST_TARGETS joint positions (nq,) [rad] or
+    poses.
 
-    Raises InvalidProblem if there are none, too many, or one of them is itself an AnyOf.
+    Raises:
+        InvalidProblem: there are no targets, too many, or nested ones.
     """
 
     targets: tuple[Single, ...]
@@ -38,25 +41,29 @@ class AnyOf:
 
 
 @dataclass(frozen=True)
-class PosesAround(AnyOf):
-    """Some of the poses that `around` allows; the bound of a cycle that has them is that of all
-    configurations of all of these poses. Without it, they are some of infinitely many that are not
-    bounded."""
+class SampledPoses(AnyOf):
+    """Samples of the poses allowed by `free_pose`.
 
-    around: ConeOrientedPose | None = None
+    The lower bound of a cycle then holds for all configurations of all poses allowed by
+    `free_pose`. Without it, the poses are samples of infinitely many poses without a common bound.
+    """
+
+    free_pose: ConeOrientedPose | None = None
 
 
 Target = Single | AnyOf
 
 
 def members(target: Target) -> tuple[Single, ...]:
-    """The targets of an AnyOf; of any other target, only itself."""
+    """The targets of an AnyOf; any other target alone."""
     return target.targets if isinstance(target, AnyOf) else (target,)
 
 
 def single(target: Target) -> Single:
-    """The target itself. Raises ValueError for an AnyOf, which must be narrowed to one target
-    first.
+    """The target itself.
+
+    Raises:
+        ValueError: the target is an AnyOf, and must be narrowed to one target first.
     """
     if isinstance(target, AnyOf):
         raise ValueError("narrow the problem to one of its targets first")
@@ -64,11 +71,19 @@ def single(target: Target) -> Single:
 
 
 def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Target:
-    """The target `name` (start or goal) of a problem, with its joint positions as read-only arrays.
+    """A target of a problem, with its joint positions as read-only arrays.
 
-    Raises InvalidProblem, also for a start with an orientation tolerance unless it is `on_path`,
-    and OutsideLimits for joint positions out of range. Joint positions of an AnyOf may be out of
-    range: they count as unreachable.
+    Joint positions of an AnyOf may be out of range: they count as unreachable.
+
+    Args:
+        arm: arm of the problem.
+        name: `start`, `goal`, or another field.
+        target: the target.
+        on_path: whether the target is an end of a tool path; a start may then be free in part.
+
+    Raises:
+        InvalidProblem: the target is malformed, or a start with an orientation tolerance.
+        OutsideLimits: joint positions are out of range.
     """
     if (
         name == "start"
@@ -95,3 +110,40 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
     q = frozen(target, (arm.robot.nq,), f"{name}.q")
     arm.check_inside(name, q)
     return q
+
+
+def validated_in_cycle(arm: Arm, field: str, target: Target) -> Target:
+    """A target of a cycle, with its joint positions as read-only arrays.
+
+    Args:
+        arm: arm of the cycle.
+        field: `start`, or the field of a stop's target.
+        target: the target.
+
+    Raises:
+        InvalidProblem: the target is malformed, or a start or a member of several targets has a
+            free orientation.
+        OutsideLimits: joint positions are out of range.
+    """
+    if field == "start" and isinstance(target, ConeOrientedPose):
+        raise InvalidProblem(
+            field,
+            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or "
+            "joint positions.",
+        )
+    if isinstance(target, AnyOf) and any(
+        isinstance(member, ConeOrientedPose) for member in target.targets
+    ):
+        raise InvalidProblem(
+            field,
+            "Of several targets, each has its orientation in full: give a quaternion, rpy or "
+            "rotvec.",
+        )
+    try:
+        return validated(arm, "goal", target)
+    except OutsideLimits as error:
+        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
+    except InvalidProblem as error:
+        raise InvalidProblem(
+            error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)
+        ) from None

@@ -1,4 +1,4 @@
-"""The cone in which an axis of the tool stays along the motion."""
+"""Cone for an axis of the tool along the motion."""
 
 from __future__ import annotations
 
@@ -10,17 +10,21 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import unit_vector
 
-# a narrower cone [rad] cannot be kept in double precision
 LEAST_HALF_ANGLE = 1e-3
+"""Least half angle [rad]; a narrower cone cannot be kept in double precision."""
 
 
 @dataclass(frozen=True)
 class ToolCone:
-    """The tool's `axis` (3,), in the TCP frame, stays within `half_angle` [rad] of `direction`
-    (3,), in the base frame.
+    """Cone within which an axis of the tool stays. Both vectors are normalised.
 
-    Both vectors are normalised. Raises InvalidProblem if one of them is zero, or if `half_angle` is
-    not between LEAST_HALF_ANGLE and pi.
+    Attributes:
+        axis: axis of the tool in the TCP frame, shape (3,).
+        direction: axis of the cone in the base frame, shape (3,).
+        half_angle: half angle of the cone [rad].
+
+    Raises:
+        InvalidProblem: a vector is zero, or `half_angle` is not between LEAST_HALF_ANGLE and pi.
     """
 
     axis: Array

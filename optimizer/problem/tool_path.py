@@ -1,5 +1,4 @@
-"""A path that the TCP must follow: straight lines with smooth corners, a smooth curve, or an
-arc."""
+"""Path of the TCP: straight lines with smooth corners, a smooth curve, or an arc."""
 
 from __future__ import annotations
 
@@ -15,32 +14,43 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 
 PathShape = Literal["lines", "curve", "arc"]
-# poses between start and goal at most
 MOST_POINTS: dict[PathShape, int] = {"lines": 20, "curve": 500, "arc": 1}
-# finest tolerances [m, rad]: ten times what a motion may bend between two samples of its
-# certificate
-LEAST_TOLERANCE = 1e-5
-# tolerances [m, rad] unless given: a tenth of a millimetre and of a degree
-POSITION_TOLERANCE, ROTATION_TOLERANCE = 1e-4, 1.745e-3
-# how much path [m] a radian of turning counts as: so a turn in place is a path, too
-TURNING = 0.25
-# m: way at either end of a path on which it may be slower than its least speed, unless given, and
-# least of it
-RAMP, LEAST_RAMP = 0.02, 1e-3
-# a fixed speed is held within this share of it
-SPEED_TOLERANCE = 1e-3
-# a greatest speed must be so many times the least one: a motion needs some freedom between them
-SPEED_RANGE = 1.05
-# two axes are the same, or opposite ones, if the cosine of their angle differs from one by less
-SAME_AXIS = 1e-12
-# poses that are nearer than this [m] along the path are one
-SAME_POSE = 1e-6
+"""Most poses between start and goal, by the shape of the path."""
+
+
+@dataclass(frozen=True)
+class ToolPathSettings:
+    """Defaults and limits of tool paths."""
+
+    least_tolerance: float = 1e-5
+    """Least tolerance [m, rad]: ten times the bend of a motion between two certificate samples."""
+    position_tolerance: float = 1e-4
+    """Default tolerance of the position [m]."""
+    rotation_tolerance: float = 1.745e-3
+    """Default tolerance of the rotation [rad]: a tenth of a degree."""
+    ramp: float = 0.02
+    """Default length at either end on which the TCP may be slower than its least speed [m]."""
+    least_ramp: float = 1e-3
+    """Least length of a ramp [m]."""
+    speed_range: float = 1.05
+    """Least ratio of the greatest speed to the least one; a motion needs some freedom."""
+    same_axis: float = 1e-12
+    """Deviation of |cos| from 1 below which two axes are parallel."""
+    meters_per_radian: float = 0.25
+    """Length of path per radian of rotation [m/rad], so that a rotation in place is a path too."""
+    speed_tolerance: float = 1e-3
+    """Relative tolerance of a fixed speed [1]."""
+    same_pose: float = 1e-6
+    """Distance along the path below which two poses count as one [m]."""
+
+
+TOOL_PATH = ToolPathSettings()
 
 
 @dataclass(frozen=True)
 class Section:
-    """The part of a path from the fraction `first` to `last` of its way; all of it leads from
-    `start` to `goal`.
+    """Part of a path from `start` to `goal`, between the fractions `first` and `last` of its
+    length.
     """
 
     start: Pose
@@ -51,32 +61,40 @@ class Section:
 
 @dataclass(frozen=True, kw_only=True)
 class ToolPath:
-    """How the TCP goes from the start of a motion to its goal over the poses `via` in the base
-    frame.
+    """Path of the TCP from the start of a motion to its goal.
 
-    `shape` is "lines", "curve" or "arc". On lines the position moves straight between two poses,
-    and the orientation turns evenly about one axis; within `blend` [m] of path before and after a
-    pose of `via`, a smooth curve leads past it. A curve goes through every pose, with continuous
-    acceleration. An arc is part of the circle through the start, the one pose of `via` and the
-    goal. The motion may be off by at most `position_tolerance` [m] and `rotation_tolerance` [rad].
-    With `about`, an axis (3,) of the TCP, the tool may turn about it between the ends as it likes:
-    the tolerance is for the direction of the axis then. The TCP is no slower than `least_speed`
-    [m/s], but within `ramp` [m] of either end. A `fixed_speed` [m/s] is held between the ramps
-    within SPEED_TOLERANCE of it, and not exceeded by more on them. With a `section` only this part
-    of the path is followed.
+    On "lines" the position moves straight between two poses, and the orientation turns evenly about
+    one axis; within `blend` of a pose, a smooth curve rounds the corner. A "curve" goes through
+    every pose with continuous acceleration. An "arc" is part of the circle through the start, the
+    single pose of `via` and the goal.
 
-    Raises InvalidProblem, with the field named.
+    Attributes:
+        via: poses between start and goal in the base frame.
+        shape: "lines", "curve" or "arc".
+        blend: length of path before and after a pose on which a corner of lines is rounded [m].
+        position_tolerance: greatest deviation of the position [m].
+        rotation_tolerance: greatest deviation of the rotation [rad].
+        about: axis in the TCP frame about which the tool may turn freely between the ends, shape
+            (3,); the rotation tolerance is then for the direction of the axis. None without one.
+        least_speed: least speed of the TCP except on the ramps [m/s]; None without one.
+        fixed_speed: speed of the TCP between the ramps, within `speed_tolerance`, and an upper
+            bound with the same tolerance on the ramps [m/s]; None without one.
+        ramp: length of the ramps at both ends [m].
+        section: part of the path to be followed; None for the whole path.
+
+    Raises:
+        InvalidProblem: a value is malformed; names the field.
     """
 
     via: Sequence[Pose] = ()
     shape: PathShape = "lines"
     blend: float = 0.0
-    position_tolerance: float = POSITION_TOLERANCE
-    rotation_tolerance: float = ROTATION_TOLERANCE
+    position_tolerance: float = TOOL_PATH.position_tolerance
+    rotation_tolerance: float = TOOL_PATH.rotation_tolerance
     about: Sequence[float] | None = None
     least_speed: float | None = None
     fixed_speed: float | None = None
-    ramp: float = RAMP
+    ramp: float = TOOL_PATH.ramp
     section: Section | None = None
 
     def __post_init__(self) -> None:
@@ -100,24 +118,28 @@ class ToolPath:
             )
         for name in ("position_tolerance", "rotation_tolerance"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= LEAST_TOLERANCE):
+            if not (np.isfinite(value) and value >= TOOL_PATH.least_tolerance):
                 field = f"path.tolerance.{name.removesuffix('_tolerance')}"
-                raise InvalidProblem(field, f"{field} must be at least {LEAST_TOLERANCE:g}.")
+                raise InvalidProblem(
+                    field, f"{field} must be at least {TOOL_PATH.least_tolerance:g}."
+                )
         if self.fixed_speed is not None:
             if not (np.isfinite(self.fixed_speed) and self.fixed_speed > 0):
                 raise InvalidProblem(
                     "path.speed", "path.speed must be a positive number of metres per second."
                 )
-            object.__setattr__(self, "least_speed", self.fixed_speed * (1 - SPEED_TOLERANCE))
+            object.__setattr__(
+                self, "least_speed", self.fixed_speed * (1 - TOOL_PATH.speed_tolerance)
+            )
         if self.least_speed is not None and not (
             np.isfinite(self.least_speed) and self.least_speed > 0
         ):
             raise InvalidProblem(
                 "path.speed.min", "path.speed.min must be a positive number of metres per second."
             )
-        if not (np.isfinite(self.ramp) and self.ramp >= LEAST_RAMP):
+        if not (np.isfinite(self.ramp) and self.ramp >= TOOL_PATH.least_ramp):
             raise InvalidProblem(
-                "path.speed.ramp", f"path.speed.ramp must be at least {LEAST_RAMP:g} m."
+                "path.speed.ramp", f"path.speed.ramp must be at least {TOOL_PATH.least_ramp:g} m."
             )
         if not (np.isfinite(self.blend) and self.blend >= 0):
             raise InvalidProblem(
@@ -137,13 +159,17 @@ class ToolPath:
             )
 
     def check_free(self, name: str, end: ConeOrientedPose) -> None:
-        """Raises InvalidProblem unless the rotation about the path's free axis is all that an end
-        leaves free.
+        """Check that an end leaves only the rotation about the path's free axis free.
 
-        `name` is that of the end: start or goal.
+        Args:
+            name: `start` or `goal`.
+            end: pose of the end.
+
+        Raises:
+            InvalidProblem: another rotation is free.
         """
         along = 0.0 if self.about is None else abs(float(end.axis @ np.array(self.about)))
-        if end.half_angle > 0 or along < 1 - SAME_AXIS:
+        if end.half_angle > 0 or along < 1 - TOOL_PATH.same_axis:
             raise InvalidProblem(
                 f"{name}.pose.orientation",
                 f"With a path, the {name}'s orientation may be free about the axis "
@@ -152,26 +178,28 @@ class ToolPath:
             )
 
     def check_speed(self, most: float | None) -> None:
-        """Raises InvalidProblem if the least speed leaves no room below the greatest one, `most`
-        [m/s].
+        """Check that the least speed leaves room below the greatest one, `most` [m/s].
+
+        Raises:
+            InvalidProblem: it does not.
         """
         if self.fixed_speed is not None:
-            if most is not None and most < self.fixed_speed * (1 + SPEED_TOLERANCE):
+            if most is not None and most < self.fixed_speed * (1 + TOOL_PATH.speed_tolerance):
                 raise InvalidProblem(
                     "path.speed",
                     f"On the path the TCP may be no faster than {most:.4g} m/s: give a fixed "
                     "path.speed of at most "
-                    f"{most / (1 + SPEED_TOLERANCE):.4g} m/s.",
+                    f"{most / (1 + TOOL_PATH.speed_tolerance):.4g} m/s.",
                 )
             return
         if (
             self.least_speed is not None
             and most is not None
-            and most < SPEED_RANGE * self.least_speed
+            and most < TOOL_PATH.speed_range * self.least_speed
         ):
             raise InvalidProblem(
                 "path.speed.min",
                 f"On the path the TCP may be no faster than {most:.4g} m/s: give a path.speed.min "
                 "of at most "
-                f"{most / SPEED_RANGE:.4g} m/s.",
+                f"{most / TOOL_PATH.speed_range:.4g} m/s.",
             )

@@ -1,1 +1,1 @@
-"""Motions played in MuJoCo: a second opinion on torques, energy, contacts and savings."""
+"""Replay of motions in MuJoCo: an independent check of torques, energy, contacts and savings."""

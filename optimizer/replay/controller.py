@@ -1,6 +1,4 @@
-"""The controllers under which a motion is played: torques known in advance with a PD loop, or the
-loop alone.
-"""
+"""Controllers of a replay: a PD loop, with torques known in advance or alone."""
 
 from __future__ import annotations
 
@@ -16,13 +14,26 @@ from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.replay.reference import Reference
 
 ControlName = Literal["feed_forward", "pd"]
-# error [rad] at which the loop asks for the whole torque of a joint, and the time [s] over which it
-# looks ahead: some 2000 N·m/rad and 400 N·m·s/rad for the large joints of an arm of 5 kg, 400 and
-# 80 for its wrist
-FULL_TORQUE, LOOK_AHEAD = 0.07, 0.2
-# greatest part of a joint's speed error that one step takes away; from twice the error on, a loop
-# is unstable
-MOST_DAMPING = 0.25
+
+
+@dataclass(frozen=True)
+class ControllerSettings:
+    """Settings of the PD loop.
+
+    The defaults give some 2000 N·m/rad and 400 N·m·s/rad for the large joints of an arm for 5 kg,
+    and 400 and 80 for its wrist.
+    """
+
+    full_torque_error: float = 0.07
+    """Position error for which the loop commands the whole torque of a joint [rad]."""
+    damping_time: float = 0.2
+    """Damping over stiffness [s]."""
+    max_damping: float = 0.25
+    """Largest share of a joint's speed error removed per step [1]; a loop is unstable from twice
+    the error on."""
+
+
+CONTROLLER = ControllerSettings()
 
 
 @dataclass(frozen=True)
@@ -35,10 +46,13 @@ class Gains:
 
 @dataclass(frozen=True)
 class Command:
-    """Torques [N·m] per step: `torque` (n, nq) - stiffness · q - damping · v, then cut to between
-    the two bounds.
+    """Torques per step: `torque` - stiffness · q - damping · v, clipped to two bounds.
 
-    The bounds (n, nq) are the torque limits on the side of the motor.
+    Attributes:
+        torque: constant part of the torques (n, nq) [N·m].
+        lowest: lower bounds (n, nq) by the torque limits, on the side of the motor [N·m].
+        highest: upper bounds (n, nq) [N·m].
+        gains: gains of the loop.
     """
 
     torque: Array
@@ -48,10 +62,14 @@ class Command:
 
 
 def gains(plant: Plant, q: Array, step: float) -> Gains:
-    """Gains of the PD loop that starts at q (nq,) [rad] and looks at the arm every `step` [s].
+    """Gains of the PD loop, proportional to the torque limits.
 
-    They are in proportion to the torque limits. The damping is less where the joint's inertia is
-    too small for the step.
+    The damping is smaller where the inertia of a joint is too small for the step.
+
+    Args:
+        plant: dynamics of the arm.
+        q: configuration at the start (nq,) [rad].
+        step: period of the controller [s].
     """
     arm, model = plant.arm, plant.model
     inertia = (
@@ -59,13 +77,22 @@ def gains(plant: Plant, q: Array, step: float) -> Gains:
         - model.armature
         + arm.drives.rotor_inertia
     )
-    stiffness = arm.active_limits.tau_max / FULL_TORQUE
-    return Gains(stiffness, np.minimum(stiffness * LOOK_AHEAD, MOST_DAMPING * inertia / step))
+    stiffness = arm.active_limits.tau_max / CONTROLLER.full_torque_error
+    return Gains(
+        stiffness,
+        np.minimum(stiffness * CONTROLLER.damping_time, CONTROLLER.max_damping * inertia / step),
+    )
 
 
 def command(plant: Plant, motion: Reference, control: ControlName, loop: Gains) -> Command:
-    """What a controller asks for along a motion; it knows the arm of `plant`, which may not be the
-    one that moves.
+    """Commands of a controller along a motion.
+
+    Args:
+        plant: dynamics of the arm that the controller knows, which may differ from the simulated
+            arm.
+        motion: the motion.
+        control: the controller.
+        loop: gains of the PD loop.
     """
     arm = plant.arm
     torque = loop.stiffness * motion.q + loop.damping * motion.v_before
@@ -77,10 +104,10 @@ def command(plant: Plant, motion: Reference, control: ControlName, loop: Gains) 
 
 
 def _between_motor_and_limit(plant: Plant, motion: Reference) -> Array:
-    """Torque [N·m] between the motor and the side of the joint that its limit is for."""
+    """Torque (n, nq) [N·m] between the motor and the side of the joint with the torque limit."""
     arm = plant.arm
     if arm.robot.torque_side == "motor":
         return np.zeros_like(motion.v)
     tau = plant.torques(motion.q, motion.v, motion.a)
-    lost = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
-    return np.asarray(arm.drives.rotor_inertia * motion.a + lost)
+    tau_friction = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
+    return np.asarray(arm.drives.rotor_inertia * motion.a + tau_friction)

@@ -1,4 +1,4 @@
-"""Planned motions of solutions, with what they are compared with."""
+"""Planned motions of solutions, with their baselines."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from joulepath.optimizer.result.solution import Solution
 
 
 def planned_motion(solution: Solution, arm: Arm, objective: Objective) -> PlannedMotion:
-    """The motion of a solution as it was planned.
+    """The planned motion of a solution.
 
     Args:
         solution: solution of a problem.
-        arm: arm of this problem.
-        objective: objective of this problem, which the savings are of.
+        arm: arm of the problem.
+        objective: objective of the problem, to which the savings refer.
 
     Returns:
         The motion, with the baselines whose motions are known.
 
     Raises:
-        NotCertified: the solution is not one of this arm.
+        NotCertified: the solution does not belong to the arm.
     """
     samples, energy = solution.trajectory, solution.energy
     torques = PlannedTorques(samples.q, samples.v, samples.a, samples.tau)

@@ -1,4 +1,4 @@
-"""What a played motion amounts to: how far it went off, its torques, energy and contacts."""
+"""Outcome of a simulated motion: deviations, torques, energy and contacts."""
 
 from __future__ import annotations
 
@@ -19,21 +19,27 @@ from joulepath.optimizer.replay.play import Contact, Played
 from joulepath.optimizer.replay.reference import Reference
 from joulepath.optimizer.result.energy import Energy
 
-# depth [m] of a contact that no good tracking explains: motions may be planned closer than any
-# controller follows them
-TOUCH = 2.5e-4
-# rounds in which friction that grows with the load is found: each leaves a tenth of the error or
-# less
-ROUNDS = 12
-# configurations of which the pose is computed at a time
-POSES = 8192
+
+@dataclass(frozen=True)
+class OutcomeSettings:
+    """Settings of the evaluation of a simulated motion."""
+
+    max_touch: float = 2.5e-4
+    """Depth of a contact that tracking errors explain [m]; motions may be planned closer to
+    obstacles than any controller follows them."""
+    friction_iterations: int = 12
+    """Fixed-point iterations for friction that grows with the load; each leaves at most a tenth of
+    the error."""
+    poses_at_once: int = 8192
+    """Configurations whose poses are computed at once."""
+
+
+OUTCOME = OutcomeSettings()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """The motion as the simulated arm went it. Lists have one number per joint, from base to
-    flange.
-    """
+    """The motion of the simulated arm. Lists have one number per joint, from base to flange."""
 
     electrical: Joules = field(init=False)
     """Energy drawn from the supply, without waiting at the goal."""
@@ -56,7 +62,7 @@ class Outcome:
     limit_ratio: Annotated[PerJoint, Unit("1")]
     """Largest torque / limit, on the side of the robot's `limits.torque_side`, per joint."""
     saturated: Annotated[PerJoint, Unit("s")]
-    """For how long the motor gave its largest torque and the controller asked for more, per
+    """Time during which the motor gave its largest torque and the controller commanded more, per
     joint."""
     collides: bool = field(init=False)
     """Whether a contact is deeper than 0.25 mm, or than `tcp_error` if that is less: a planned
@@ -66,7 +72,7 @@ class Outcome:
 
     def __post_init__(self) -> None:
         contact, energy = self.contact, self.energy
-        collides = contact is not None and contact.depth > min(self.tcp_error, TOUCH)
+        collides = contact is not None and contact.depth > min(self.tcp_error, OUTCOME.max_touch)
         object.__setattr__(self, "electrical", energy.electrical.total)
         object.__setattr__(self, "mechanical", energy.mechanical.total)
         object.__setattr__(self, "collides", collides)
@@ -79,8 +85,15 @@ class Outcome:
 
 
 def outcome(arm: Arm, motion: Reference, played: Played, planned: PlannedMotion) -> Outcome:
-    """What a planned motion amounts to that the simulated `arm` played."""
-    off = _distances(arm, played.q, motion.q)
+    """Outcome of a planned motion.
+
+    Args:
+        arm: the simulated arm.
+        motion: the planned motion on the grid of the simulation.
+        played: the simulated motion.
+        planned: the planned motion with its energies.
+    """
+    deviation = _distances(arm, played.q, motion.q)
     limited = limited_torque(arm, _without_friction(arm, played), played.v, played.a)
     energy = played_energy(arm, played)
     return Outcome(
@@ -88,8 +101,8 @@ def outcome(arm: Arm, motion: Reference, played: Played, planned: PlannedMotion)
         mechanical_error=_relative(energy.mechanical.total, planned.mechanical),
         contact=played.contact,
         joint_error=np.abs(played.q - motion.q).max(axis=0),
-        tcp_error=float(off.max()),
-        end_error=float(off[-1]),
+        tcp_error=float(deviation.max()),
+        end_error=float(deviation[-1]),
         peak_torque=np.abs(played.tau_motor).max(axis=0),
         limit_ratio=np.abs(limited).max(axis=0) / arm.active_limits.tau_max,
         saturated=played.saturated.sum(axis=0) * played.step,
@@ -98,7 +111,7 @@ def outcome(arm: Arm, motion: Reference, played: Played, planned: PlannedMotion)
 
 
 def played_energy(arm: Arm, played: Played) -> Energy:
-    """The energy of a motion that the simulated `arm` played, by the trapezoidal rule."""
+    """Energy of a motion of the simulated arm, by the trapezoidal rule."""
     plant, q = Plant(arm), played.q
     weights = np.full(len(q), played.step)
     weights[[0, -1]] /= 2
@@ -112,13 +125,13 @@ def _relative(value: float, reference: float) -> float:
 
 
 def _without_friction(arm: Arm, played: Played) -> Array:
-    """Torques of rigid bodies and rotors (n, nq) [N·m], to which friction adds up to that of the
-    motors.
+    """Torques of rigid bodies and rotors (n, nq) [N·m]: motor torques without friction.
 
-    Friction that grows with the load depends on these themselves; it is a small part of them.
+    Friction that grows with the load depends on these torques and is a small part of them, so they
+    are found by fixed-point iteration.
     """
     tau = played.tau_motor
-    for _ in range(1 if arm.friction_law.load is None else ROUNDS):
+    for _ in range(1 if arm.friction_law.load is None else OUTCOME.friction_iterations):
         tau = played.tau_motor - friction_torque(
             arm.friction_law, arm.drives, tau, played.v, played.a
         )
@@ -126,10 +139,10 @@ def _without_friction(arm: Arm, played: Played) -> Array:
 
 
 def _distances(arm: Arm, q: Array, others: Array) -> Array:
-    """Distances (k,) [m] between the TCP at q (k, nq) [rad] and at others (k, nq) [rad]."""
+    """Distances (k,) [m] between the TCP at two lists of configurations (k, nq) [rad]."""
     found = np.empty(len(q))
-    for low in range(0, len(q), POSES):
-        block = slice(low, low + POSES)
+    for low in range(0, len(q), OUTCOME.poses_at_once):
+        block = slice(low, low + OUTCOME.poses_at_once)
         ours, theirs = (tcp_pose(arm, each[block])[:, :3, 3] for each in (q, others))
         found[block] = np.linalg.norm(ours - theirs, axis=1)
     return found

@@ -1,4 +1,4 @@
-"""A motion as it was planned: what a replay needs to know of an answer."""
+"""A planned motion: the part of an answer that a replay needs."""
 
 from __future__ import annotations
 
@@ -14,48 +14,50 @@ from joulepath.optimizer.result.solution import BaselineName
 
 @dataclass(frozen=True)
 class PlannedTorques:
-    """Samples of an answer: q [rad], v [rad/s], a [rad/s²], tau [N·m] of rigid bodies and rotors,
-    (k, nq) each.
-    """
+    """Samples of an answer: q [rad], v [rad/s], a [rad/s²], (k, nq) each."""
 
     q: Array
     v: Array
     a: Array
     tau: Array
+    """Torques of rigid bodies and rotors (k, nq) [N·m]."""
 
 
 @dataclass(frozen=True)
 class PlannedBaseline:
-    """A baseline of an answer: its motion over `duration` [s], and what the answer saves against
-    it, `saving` [1].
-
-    `waiting` [J] of its electrical energy is drawn after the motion.
-    """
+    """A baseline of an answer."""
 
     name: BaselineName
     course: Course
+    """Motion of the baseline."""
     duration: float
+    """Duration of the motion [s]."""
     saving: float
+    """Saving of the answer against the baseline [1]."""
     waiting: float = 0.0
+    """Electrical energy drawn after the motion [J]."""
 
 
 @dataclass(frozen=True)
 class PlannedMotion:
-    """A motion of an answer: `course` over `duration` [s], by `arm`, with the energies [J] that the
-    answer reports.
-
-    `waiting` [J] of the electrical energy is drawn after the motion. `objective` is the energy that
-    savings are of. `compared`: the answer has baselines; `baselines` are those whose motions are
-    known. `torques` are None for an answer without samples.
-    """
+    """A motion of an answer."""
 
     arm: Arm
     course: Course
+    """The motion."""
     duration: float
+    """Duration of the motion [s]."""
     electrical: float
+    """Electrical energy of the motion in the answer [J]."""
     mechanical: float
+    """Mechanical work of the motion in the answer [J]."""
     objective: Objective = "electrical"
+    """Kind of energy that savings refer to."""
     waiting: float = 0.0
+    """Electrical energy drawn after the motion [J]."""
     compared: bool = False
+    """Whether the answer has baselines."""
     torques: PlannedTorques | None = None
+    """Samples of the answer; None if it has none."""
     baselines: Sequence[PlannedBaseline] = field(default_factory=tuple)
+    """Baselines with known motions."""

@@ -1,4 +1,4 @@
-"""One motion under one controller, played in MuJoCo step by step."""
+"""Simulation of one motion under one controller in MuJoCo, step by step."""
 
 from __future__ import annotations
 
@@ -14,8 +14,16 @@ from joulepath.optimizer.replay.reference import Reference
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm
 from joulepath.optimizer.replay.simulator import mujoco
 
-# steps between two looks at the deadline: some ten milliseconds
-STEPS_PER_CHECK = 512
+
+@dataclass(frozen=True)
+class PlaySettings:
+    """Settings of the simulation."""
+
+    steps_per_check: int = 512
+    """Steps between two checks of the deadline: some ten milliseconds."""
+
+
+PLAY = PlaySettings()
 
 
 @dataclass(frozen=True)
@@ -25,35 +33,44 @@ class Contact:
     pair: tuple[str, str]
     """Names of the two bodies: links, `tool`, `payload` or obstacles."""
     depth: Metres
-    """How deep they go into each other."""
+    """Depth of their overlap."""
     time: Seconds
     """Time, from the start of the motion."""
 
 
 @dataclass(frozen=True)
 class Played:
-    """What the simulated arm did at n instants, `step` [s] apart.
-
-    q [rad], v [rad/s], a [rad/s²], torque of the motors [N·m], (n, nq) each; `saturated` (n, nq)
-    where this was cut to its limit. The `contact` is None if there was none.
-    """
+    """Motion of the simulated arm at n instants."""
 
     step: float
+    """Time between two instants [s]."""
     q: Array
+    """Positions (n, nq) [rad]."""
     v: Array
+    """Velocities (n, nq) [rad/s]."""
     a: Array
+    """Accelerations (n, nq) [rad/s²]."""
     tau_motor: Array
+    """Torques of the motors (n, nq) [N·m]."""
     saturated: Mask
+    """Whether a torque was clipped to its limit (n, nq)."""
     contact: Contact | None
+    """The deepest contact; None if there was none."""
 
 
-def play(simulated: SimulatedArm, motion: Reference, asked: Command) -> Played:
-    """What the simulated arm does from the start of a motion on, under a command.
+def play(simulated: SimulatedArm, motion: Reference, commanded: Command) -> Played:
+    """Simulate a motion from its start under a command.
 
-    Ends by DeadlinePassed if the watched deadline passes.
+    Args:
+        simulated: the simulated arm.
+        motion: the motion to follow.
+        commanded: torques of the controller.
+
+    Raises:
+        DeadlinePassed: the watched deadline passed.
     """
     step_on, model, data = mujoco().mj_step, simulated.model, simulated.data
-    stiffness, damping = asked.gains.stiffness, asked.gains.damping
+    stiffness, damping = commanded.gains.stiffness, commanded.gains.damping
     q, torque, speeds = (
         np.empty_like(motion.q),
         np.empty_like(motion.q),
@@ -66,20 +83,21 @@ def play(simulated: SimulatedArm, motion: Reference, asked: Command) -> Played:
     data.qpos[:], data.qvel[:] = motion.q[0], motion.v_before[0]
     position, speed, applied = data.qpos, data.qvel, data.qfrc_applied
     speeds[0], deepest = speed, None
+    steps_per_check = PLAY.steps_per_check
     for k in range(len(q)):
-        if k % STEPS_PER_CHECK == 0:
+        if k % steps_per_check == 0:
             checkpoint()
         q[k] = position
-        wanted = asked.torque[k] - stiffness * position - damping * speed
-        torque[k] = np.minimum(np.maximum(wanted, asked.lowest[k]), asked.highest[k])
+        wanted = commanded.torque[k] - stiffness * position - damping * speed
+        torque[k] = np.minimum(np.maximum(wanted, commanded.lowest[k]), commanded.highest[k])
         applied[:] = torque[k]
-        # what the joints carried in the step before: friction may depend on it
+        # torque that the joints carried in the previous step, on which friction may depend
         carried = (
             torque[k]
             - model.dof_damping * speed
             - rotors * (speeds[k] - speeds[max(k - 1, 0)]) / motion.step
         )
-        simulated.rub(2 * speeds[k] - speeds[max(k - 1, 0)], carried)
+        simulated.set_friction(2 * speeds[k] - speeds[max(k - 1, 0)], carried)
         step_on(model, data)
         speeds[k + 1] = speed
         if data.ncon:
@@ -90,13 +108,13 @@ def play(simulated: SimulatedArm, motion: Reference, asked: Command) -> Played:
         v=(speeds[1:] + speeds[:-1]) / 2,
         a=np.diff(speeds, axis=0) / motion.step,
         tau_motor=torque,
-        saturated=(torque <= asked.lowest) | (torque >= asked.highest),
+        saturated=(torque <= commanded.lowest) | (torque >= commanded.highest),
         contact=deepest,
     )
 
 
 def _deeper(known: Contact | None, simulated: SimulatedArm, time: float) -> Contact | None:
-    """The deeper one of a contact and those of this instant."""
+    """The deepest of a known contact and the contacts of this instant."""
     found = simulated.data.contact
     k = int(np.argmin(found.dist))
     depth = -float(found.dist[k])

@@ -1,4 +1,4 @@
-"""What a controller follows: a motion on the grid of the simulation's steps."""
+"""Reference of a controller: a motion on the time grid of the simulation."""
 
 from __future__ import annotations
 
@@ -15,19 +15,28 @@ from joulepath.optimizer.motion.spline import Spline, sample
 Course = Callable[[Array], tuple[Array, Array, Array]]
 """A motion as a function of time: q [rad], v [rad/s], a [rad/s²], (k, nq) each, at times (k,)
 [s]."""
-# most steps of a motion: its states take some 100 MB
-MOST_STEPS = 400_000
-# a last step shorter than this fraction of a step is rounding
-ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class TimeGridSettings:
+    """Settings of the time grid of a simulation."""
+
+    max_steps: int = 400_000
+    """Largest number of steps of a motion; its states take some 100 MB."""
+    step_tolerance: float = 1e-9
+    """Last step over a step, up to which it is a rounding error [1]."""
+
+
+TIME_GRID = TimeGridSettings()
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A motion on n instants, `step` [s] apart: q [rad], v [rad/s], a [rad/s²], (n, nq) each.
+    """A motion on n instants.
 
-    `v_before` (n, nq) is the speed half a step before each instant. A step of MuJoCo changes the
-    speed by the acceleration at an instant, and the position by the new speed: its speeds lie in
-    the middle between the instants.
+    `v_before` is the speed half a step before each instant: a step of MuJoCo changes the speed by
+    the acceleration at an instant, and the position by the new speed, so its speeds lie in the
+    middle between the instants.
     """
 
     step: float
@@ -38,15 +47,22 @@ class Reference:
 
 
 def reference(course: Course, duration: float, step: float) -> Reference:
-    """The motion of `duration` > 0 [s] in equal steps of at most `step` [s]. Raises InvalidProblem
-    if they are many.
+    """Divide a motion into equal steps.
+
+    Args:
+        course: the motion.
+        duration: duration > 0 of the motion [s].
+        step: largest step [s].
+
+    Raises:
+        InvalidProblem: there are too many steps.
     """
-    count = math.ceil(duration / step * (1 - ROUNDING))
-    if count > MOST_STEPS:
+    count = math.ceil(duration / step * (1 - TIME_GRID.step_tolerance))
+    if count > TIME_GRID.max_steps:
         raise InvalidProblem(
             "step",
-            f"The motion takes {count} steps, of at most {MOST_STEPS}: give a step of at least "
-            f"{duration / MOST_STEPS:.3g} s.",
+            f"The motion takes {count} steps, of at most {TIME_GRID.max_steps}: give a step of at "
+            f"least {duration / TIME_GRID.max_steps:.3g} s.",
         )
     t = np.linspace(0.0, duration, count + 1)
     q, v, a = course(t)

@@ -1,4 +1,4 @@
-"""Public entry point: `replay(motion)` plays a motion in MuJoCo, on the planned and on other
+"""Public entry point: `replay(motion)` simulates a motion in MuJoCo, on the planned and other
 arms."""
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class ReplayedRun(Outcome):
 
 @dataclass(frozen=True)
 class SimulatedSaving:
-    """What the motion saves against a baseline."""
+    """Saving of the motion against a baseline."""
 
     name: BaselineName
     """Name of the baseline."""
@@ -51,20 +51,19 @@ class SimulatedSaving:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayedChange(Outcome):
-    """The motion on a changed arm, under the first controller, which does not know of the
-    change."""
+    """The motion on a changed arm, under the first controller, which does not know the change."""
 
     quantity: Quantity
-    """What is changed."""
+    """Changed quantity."""
     factor: Ratio
-    """By how much it is multiplied."""
+    """Factor on the quantity."""
     savings: list[SimulatedSaving]
     """Savings on this arm, against every baseline on this arm."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SavingRange:
-    """What the answer saves against a baseline, as planned and as simulated."""
+    """Saving of the answer against a baseline, as planned and as simulated."""
 
     name: BaselineName
     """Name of the baseline."""
@@ -109,19 +108,23 @@ class Replay:
     duration: Seconds
     """Duration of the motion."""
     planned: AsPlanned
-    """What the answer says."""
+    """Energies and torques in the answer."""
     torque_error: Ratio | None
-    """Largest difference of MuJoCo's torques from those of the answer's samples / limit; null
+    """Largest difference of MuJoCo's torques from the torques of the answer's samples / limit; null
     without samples."""
     runs: Annotated[list[ReplayedRun], NotEmpty]
     """The motion under each controller."""
     changes: list[ReplayedChange]
     """The motion on changed arms; empty without `perturb`."""
     savings: list[SavingRange]
-    """What is saved against each baseline; empty without `perturb`."""
+    """Savings against each baseline; empty without `perturb`."""
 
     def under(self, control: ControlName) -> ReplayedRun:
-        """The run under a controller. Raises LookupError for one that was not asked for."""
+        """The run under a controller.
+
+        Raises:
+            LookupError: the controller was not requested.
+        """
         for run in self.runs:
             if run.control == control:
                 return run
@@ -168,7 +171,7 @@ def replay(
     *,
     problem: Problem | None = None,
 ) -> Replay | list[Replay]:
-    """Play a motion in MuJoCo under controllers, and on arms that differ from the planned one.
+    """Simulate a motion in MuJoCo under controllers, and on arms that differ from the planned arm.
 
     MuJoCo shares the figures of the robot with the optimiser, and nothing else.
 
@@ -179,16 +182,16 @@ def replay(
         perturb: fraction by which a quantity of the arm is raised and lowered, one at a time, under
             the first controller, which does not know of it.
         deadline: wall time after which the replay is given up [s].
-        clock: function that returns the time [s].
-        problem: problem that a `Solution` solves, which names its arm. The others name theirs.
+        clock: function for the current time [s].
+        problem: problem of a `Solution`, which contains its arm; other motions contain theirs.
 
     Returns:
-        Deviation, torques, contacts and energy under each controller and of each change, and what
-        is left of the savings; of a cycle, one replay for each of its moves.
+        Deviations, torques, contacts and energy under each controller and of each change, and the
+        remaining savings; for a cycle, one replay for each of its moves.
 
     Raises:
         InvalidProblem: the motion takes too many steps, or `problem` is missing.
-        NotCertified: the solution is not one of this problem's arm.
+        NotCertified: the solution does not belong to the arm of the problem.
         DeadlineExceeded: the deadline passed first.
     """
     try:
@@ -219,7 +222,7 @@ def _planned(
 
 
 class _Replayer:
-    """One simulated arm for all that is played on it."""
+    """Simulation of one planned motion with one simulated arm."""
 
     def __init__(self, planned: PlannedMotion, step: float) -> None:
         self._planned, self._step, self._plant = planned, step, Plant(planned.arm)
@@ -229,7 +232,7 @@ class _Replayer:
         self._loop = gains(self._plant, self._motion.q[0], self._motion.step)
 
     def replay(self, controls: Sequence[ControlName], perturb: Mapping[Quantity, float]) -> Replay:
-        """The replay under these controllers."""
+        """The replay under given controllers."""
         torque_error, planned = self._torque_error(), self._planned
         runs = [
             ReplayedRun.extended(self._outcome(control), control=control)
@@ -240,7 +243,7 @@ class _Replayer:
         changes = [
             self._changed(quantity, factor, first) for quantity, factor in self._factors(perturb)
         ]
-        self._simulated.carry(planned.arm)
+        self._simulated.use_figures(planned.arm)
         return Replay(
             step=self._motion.step,
             duration=planned.duration,
@@ -264,7 +267,7 @@ class _Replayer:
             yield quantity, 1 + fraction
 
     def _changed(self, quantity: Quantity, factor: float, control: ControlName) -> ReplayedChange:
-        self._simulated.carry(with_changes(self._planned.arm, **{quantity: factor}))
+        self._simulated.use_figures(with_changes(self._planned.arm, **{quantity: factor}))
         found = self._outcome(control)
         savings = self._savings(found, control)
         return ReplayedChange.extended(
@@ -285,11 +288,11 @@ class _Replayer:
         return played
 
     def _savings(self, ours: Outcome, control: ControlName) -> dict[BaselineName, float]:
-        """The saving of a simulated motion against every baseline, simulated on the same arm."""
+        """Saving of a simulated motion against every baseline, simulated on the same arm."""
         planned, found = self._planned, {}
         own = ours.energy.of(planned.objective) + planned.waiting
         for each in planned.baselines:
-            # a motion that no planner checked may run into something: its energy then means nothing
+            # baselines are not checked for collisions, and the energy of a collision means nothing
             with self._simulated.without("contact"):
                 played = self._played(reference(each.course, each.duration, self._step), control)
             theirs = played_energy(self._simulated.arm, played)

@@ -1,8 +1,8 @@
-"""The bodies of the collision model as MuJoCo's geoms, and the pairs of them that are checked.
+"""Bodies of the collision model as MuJoCo geoms, and the pairs that are checked.
 
-A geom collides with those it is paired with and with no other. Margins are left out: a contact is a
-touch. Obstacles of many parts (point clouds, voxels, mesh files) are left out, too, because MuJoCo
-knows convex shapes only.
+A geom collides only with the geoms of its pairs. Margins are left out: a contact is a touch.
+Obstacles with many parts (point clouds, voxels, mesh files) are left out, too, because MuJoCo
+supports convex shapes only.
 """
 
 from __future__ import annotations
@@ -20,17 +20,23 @@ from joulepath.optimizer.problem.clouds import Cloud
 
 
 def unsimulated(arm: Arm) -> list[str]:
-    """Names of the obstacles that have no geom."""
+    """Names of the obstacles without a geom."""
     if not arm.collisions:
         return []
     return [obstacle.name for obstacle in arm.scene.obstacles if isinstance(obstacle.shape, Cloud)]
 
 
 def add_shapes(simulator: Any, spec: Any, links: list[Any], arm: Arm) -> list[str]:
-    """Adds geoms to the bodies `links` of an MjSpec, from the world to the last link, and their
-    pairs.
+    """Add geoms and their pairs to an MjSpec.
 
-    Returns the names of the bodies by the number of their geom.
+    Args:
+        simulator: the module `mujoco`.
+        spec: the MjSpec.
+        links: bodies of the MjSpec, from the world to the last link.
+        arm: the arm with its scene.
+
+    Returns:
+        Names of the bodies by the number of their geom.
     """
     if not arm.collisions:
         return []
@@ -78,7 +84,7 @@ def _add_geom(simulator: Any, spec: Any, link: Any, body: Body, name: str) -> No
         if own["type"] == kinds.mjGEOM_SPHERE:
             centre[:3, 3] = core.points[0]
         own |= pose(body.T_link_core @ centre)
-    # no bits: a geom collides only with those that it is paired with
+    # no collision bits: a geom collides only with the geoms of its pairs
     link.add_geom(name=name, contype=0, conaffinity=0, mass=0.0, **own)
 
 

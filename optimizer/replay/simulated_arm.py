@@ -1,12 +1,10 @@
-"""An arm as a MuJoCo model: its links with the inertias of the figures, rotors as armature,
-friction, bodies.
-"""
+"""MuJoCo model of an arm: links with the inertias of the figures, rotors as armature, friction."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,14 +16,23 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.shapes import add_shapes, pose
 from joulepath.optimizer.replay.simulator import mujoco
 
-# speed [rad/s] below which the slope of friction is that at rest
-AT_REST = 1e-9
+
+@dataclass(frozen=True)
+class FrictionSettings:
+    """Settings of simulated friction."""
+
+    min_speed: float = 1e-9
+    """Speed up to which the ratio of friction to speed is that of standstill [rad/s]."""
+
+
+FRICTION = FrictionSettings()
 
 
 class SimulatedArm:
-    """A MuJoCo model of an arm. `carry` changes its masses and friction without compiling it again.
+    """A MuJoCo model of an arm.
 
-    `bodies` are the names of the bodies by the number of their geom.
+    `use_figures` changes masses and friction without a new compilation. `bodies` are the names of
+    the bodies by the number of their geom.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -36,9 +43,8 @@ class SimulatedArm:
         for k in range(1, joints + 1):
             placement = np.asarray(arm.robot.model.jointPlacements[k].homogeneous)
             link = links[-1].add_body(name=f"link {k}", explicitinertial=True, **pose(placement))
-            # a placeholder: the compiler refuses figures that no rigid body has, such as those of a
-            # published link. It must not coincide with the link's frame, because a model remembers
-            # that it does
+            # a placeholder: the compiler refuses inconsistent bodies, such as some published links.
+            # It must not coincide with the link's frame, because a model would keep that property
             link.mass, link.inertia, link.ipos, link.iquat = (
                 1.0,
                 [1.0, 1.1, 1.2],
@@ -54,12 +60,11 @@ class SimulatedArm:
         self.model = spec.compile()
         self.data = self._simulator.MjData(self.model)
         self.model.body_sameframe[:] = 0
-        self.carry(arm)
+        self.use_figures(arm)
 
-    def carry(self, arm: Arm) -> None:
-        """Takes masses, inertias, gravity and friction from another arm of the same robot and
-        shapes.
-        """
+    def use_figures(self, arm: Arm) -> None:
+        """Take masses, inertias, gravity and friction from another arm of the same robot and
+        shapes."""
         self.arm = arm
         figures = rigid_body_model(arm)
         for k in range(1, figures.njoints):
@@ -84,20 +89,23 @@ class SimulatedArm:
         finally:
             self.model.opt.disableflags = flags
 
-    def rub(self, v: Array, tau_link: Array) -> None:
-        """Sets the friction for a step that ends at about v (nq,) [rad/s], of joints that carry
-        tau_link (nq,) [N·m].
+    def set_friction(self, v: Array, tau_link: Array) -> None:
+        """Set the friction for one step.
 
-        It is damping, the law's torque over the speed, which MuJoCo multiplies by the speed at the
-        end of the step. The knee of the law is a hundred times too steep for a torque that is known
-        at the beginning.
+        Friction is set as damping, the torque of the law over the speed, which MuJoCo multiplies by
+        the speed at the end of the step. The knee of the law is a hundred times too steep for a
+        torque known at the beginning of the step.
+
+        Args:
+            v: expected speed at the end of the step (nq,) [rad/s].
+            tau_link: torque that the joints carry (nq,) [N·m].
         """
-        v = np.maximum(np.abs(v), AT_REST)
+        v = np.maximum(np.abs(v), FRICTION.min_speed)
         self.model.dof_damping[:] = self.arm.friction_law.torque(v, tau_link) / v
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
-        """Rigid body and rotor torques (k, nq) [N·m] by MuJoCo's inverse dynamics, friction and
-        contacts left out.
+        """Rigid-body and rotor torques (k, nq) [N·m] by MuJoCo's inverse dynamics, without friction
+        and contacts.
         """
         found = np.empty_like(q)
         with self.without("constraint"):
@@ -109,8 +117,7 @@ class SimulatedArm:
 
 
 def with_changes(arm: Arm, payload: float = 1.0, friction: float = 1.0) -> Arm:
-    """The arm with mass and inertia of its payload, and with its friction, multiplied by
-    factors."""
+    """The arm with the payload's mass and inertia, and with its friction, multiplied by factors."""
     load, robot = arm.payload, arm.robot
     law = arm.friction_law
     scaled = replace(

@@ -1,6 +1,4 @@
-"""MuJoCo, which is imported when the first motion is played: no other request needs its 20 MB of
-memory.
-"""
+"""MuJoCo, imported at the first replay: no other request needs its 20 MB of memory."""
 
 from __future__ import annotations
 
@@ -9,5 +7,5 @@ from typing import Any
 
 
 def mujoco() -> Any:
-    """The module, which has no annotations that mypy could read."""
+    """The module `mujoco`, which has no annotations for mypy."""
     return importlib.import_module("mujoco")

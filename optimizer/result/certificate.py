@@ -1,4 +1,4 @@
-"""The independent check of a motion."""
+"""Independent check of a motion."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ class Clearance:
 
     @property
     def message(self) -> str:
-        """The two bodies and the missing clearance [m]."""
+        """The two bodies, and the missing clearance [m]."""
         first, second = self.pair
         return f"{first} and {second}: clearance {max(-self.sampled, 0.0):.4f} m too small"
 
 
 class WorstRatio(TypedDict):
-    """Largest value / limit over all joints and instants: at most 1 + 1e-6. What follows `torque`
-    is there only if the request limits it."""
+    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The fields after
+    `torque` are present only if the request limits their quantity.
+    """
 
     position: Ratio
     """Joint position: distance from the middle of the range / half of the range."""

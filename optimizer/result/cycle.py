@@ -1,4 +1,4 @@
-"""What is answered of a cycle: its places, legs, certificate and the effort of its search."""
+"""Parts of the answer to a cycle: places, legs, certificate and effort of the search."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class StopConfiguration(Configuration):
 
 @dataclass(frozen=True, kw_only=True)
 class Pass(StopConfiguration):
-    """A stop that a move passes through, and in which arm configuration."""
+    """A stop passed by a move, with the arm configuration there."""
 
     t: Seconds
     """When it passes, from the start of the move."""

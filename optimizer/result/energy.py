@@ -1,4 +1,4 @@
-"""The energy of a motion, its parts, and how well it is known."""
+"""Energy of a motion, its parts and its uncertainty."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
 
-# what is minimised: energy drawn from the supply, or mechanical work
+# minimised quantity: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
 
 JointJoules = Annotated[PerJoint, Unit("J")]
@@ -16,9 +16,12 @@ JointJoules = Annotated[PerJoint, Unit("J")]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How an electrical energy depends on the figures of the arm: its `gradient` (p,) in the order
-    of `joulepath.models.uncertainty.parameters`, and by how much the mean over their errors is
-    above the energy itself [J]."""
+    """Dependence of an electrical energy on the figures of the arm.
+
+    Attributes:
+        gradient: gradient in the order of `joulepath.models.uncertainty.parameters`, shape (p,).
+        shift: mean of the energy over the errors of the figures minus the energy itself [J].
+    """
 
     gradient: Array
     shift: float
@@ -29,7 +32,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class EnergyInterval:
-    """How well the energy is known, from the errors that the figures of the arm may have."""
+    """Uncertainty of the energy from the errors of the arm's figures."""
 
     p5: Joules
     """The energy is above this with 95 % probability."""
@@ -91,7 +94,7 @@ class ElectricalEnergy:
 
     @property
     def parts_sum(self) -> float:
-        """Sum of the parts [J]: equal to `total` up to quadrature."""
+        """Sum of the parts [J]; equal to `total` up to quadrature."""
         return (
             self.idle
             + self.potential
@@ -163,11 +166,11 @@ class Energy:
     """Mean power drawn from the supply during the motion."""
 
     def of(self, objective: Objective) -> float:
-        """The part of the energy that an objective minimises [J]."""
+        """The energy that an objective minimises [J]."""
         return self.electrical.total if objective == "electrical" else self.mechanical.total
 
     def with_dwell(self, dwell: float) -> Energy:
-        """The same with energy [J] drawn while the arm waits afterwards."""
+        """The same with the energy [J] of a dwell afterwards."""
         electrical = self.electrical
         return replace(
             self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell)

@@ -1,4 +1,4 @@
-"""The front of energy over duration, in SI units."""
+"""Front of energy over duration, in SI units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from joulepath.optimizer.result.solution import Solution
 
 @dataclass(frozen=True)
 class Dropped:
-    """A duration that was solved and is not a point of the front."""
+    """A solved duration without a point on the front."""
 
     duration: Seconds
     """The duration."""
@@ -34,11 +34,15 @@ class FrontSolver:
 
 @dataclass(frozen=True)
 class Front:
-    """Motions of which none is both slower and of no less energy than another, fastest first.
+    """Motions in ascending duration and descending energy.
 
-    `shortest` [s] is the least feasible duration over all candidates. `status` is `optimal` when
-    every duration chosen was solved and every motion is optimal, `feasible` if the deadline passed
-    before.
+    Attributes:
+        status: `optimal` if every chosen duration was solved and every motion is optimal;
+            `feasible` if the deadline passed before.
+        shortest: least feasible duration over all candidates [s].
+        points: the motions, fastest first.
+        dropped: solved durations without a point.
+        solver: effort.
     """
 
     status: Literal["optimal", "feasible"]

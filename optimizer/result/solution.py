@@ -1,4 +1,4 @@
-"""The solution of a problem: the motion with its samples, baselines and limits, in SI units."""
+"""The solution of a problem: motion, samples, baselines and limits, in SI units."""
 
 from __future__ import annotations
 
@@ -66,10 +66,23 @@ class Configuration:
     q: Annotated[PerJoint, Unit("rad")]
     """Joint positions."""
     target: int = 0
-    """Index in `any_of` of the target that it reaches, from 0; 0 for a single target."""
+    """Index in `any_of` of the reached target, from 0; 0 for a single target."""
 
 
-BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]
+@dataclass(frozen=True)
+class Standing:
+    """Arm at rest at q (nq,) [rad] with motor torques tau (nq,) [N·m] and a total power of `power`
+    [W].
+    """
+
+    q: Annotated[PerJoint, Unit("rad")]
+    tau: Annotated[PerJoint, Unit("N·m")]
+    power: float
+
+
+BaselineName = Literal[
+    "trapezoid", "quintic", "ruckig", "ruckig_slowed", "straight", "controller_default"
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,26 +94,34 @@ class Baseline:
     """`trapezoid`: trapezoidal velocity, in the duration of the answer. `quintic`: polynomial of
     degree 5, in the duration of the answer. `ruckig`: time-optimal within the velocity,
     acceleration and jerk limits. `ruckig_slowed`: the same motion, uniformly slowed down to the
-    duration of the answer. `controller_default`: the robot's own controller with its default speed
+    duration of the answer. `straight`: the fastest motion within the same limits along the straight
+    line in joints, all joints in step, slowed down to the duration of the answer.
+    `controller_default`: the robot's own controller with its default speed
     and acceleration."""
     duration: Seconds
     """Duration of this motion."""
     electrical: Joules
-    """Electrical energy of this motion, drawn from the supply."""
+    """Electrical energy of this motion, drawn from the supply; with a `dwell`, also of the wait
+    after it."""
     mechanical: Joules
     """Mechanical work of this motion."""
     within_limits: bool = field(init=False)
     """Whether this motion is within every limit; collisions are checked at sample points."""
     reason: str | None
-    """What keeps this motion from being within every limit, in words: limits that it breaks, and
-    two bodies that come closer than allowed, by how much. Null if nothing does."""
-    saving: Ratio
-    """1 - energy of the answer / energy of this motion, of the objective."""
+    """Limits that this motion breaks, and the two bodies closer than allowed, with the amount. Null
+    if it is within every limit.
+    """
+    saving: Ratio | None
+    """1 - energy of the answer / energy of this motion, of the objective, in the same cycle time:
+    the shorter motion also waits at its goal, held by the motors, until the longer one ends. Null
+    if this motion is not within every limit, since it is then no valid comparison.
+    """
     sensitivity: Annotated[Sensitivity, Internal] = field(repr=False)
     """Sensitivity of the electrical energy."""
+    at_goal: Annotated[Standing, Internal] = field(repr=False)
+    """Arm at rest at the goal of this motion."""
     saving_interval: SavingInterval | None = None
-    """How well the saving is known. Null for the objective `mechanical`, and in answers of an
-    earlier version."""
+    """Uncertainty of the saving. Null without a saving, and for the objective `mechanical`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "within_limits", self.reason is None)
@@ -108,8 +129,9 @@ class Baseline:
 
 @dataclass(frozen=True)
 class LimitsInForce:
-    """The limits that the motion was held to: those of the robot, or the tighter ones of the
-    request. Lists are per joint, from base to flange; null: no limit."""
+    """Limits of the motion: the robot's, or the tighter limits of the request. Lists are per joint,
+    from base to flange; null: no limit.
+    """
 
     position_min: Annotated[PerJoint, Unit("rad")]
     """Least joint position."""
@@ -132,8 +154,7 @@ class LimitsInForce:
     def of(
         cls, joints: Limits, tcp_speed: float | None, elbow_speed: float | None
     ) -> LimitsInForce:
-        """The limits of the joints, and those on the speeds of TCP and elbow [m/s]; None: no
-        limit."""
+        """Limits of the joints and of the speeds of TCP and elbow [m/s]; None is no limit."""
         rates = (joints.v_max, joints.a_max, joints.j_max, joints.tau_max)
         return cls(joints.q_min, joints.q_max, *rates, tcp_speed, elbow_speed)
 
@@ -158,10 +179,25 @@ class SolverReport:
 class Solution:
     """The motion of least energy, with its lower bound and certificate.
 
-    Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or
-    goal. Then `status` is `feasible`, and the lower bound covers the motions between those that may
-    be missing. `sensitivity` is that of the electrical energy. `unmodelled` are contacts of bodies
-    that stand in for a tool or a payload without a shape, see `collision.stand_ins`.
+    Attributes:
+        status: `optimal` if no candidate can need less energy.
+        start: configuration at the start.
+        goal: configuration at the goal.
+        trajectory: the motion and its samples.
+        energy: energy of the motion.
+        limits: limits of the motion.
+        sensitivity: sensitivity of the electrical energy.
+        lower_bound: proven lower bound of the objective [J]. If not `complete`, it also covers
+            motions between configurations that may be missing.
+        baselines: motions of other planners.
+        candidates: outcome of every candidate.
+        unreachable: targets without candidates.
+        certificate: independent check of the motion.
+        unmodelled: contacts of bodies that stand in for a tool or payload without a shape; see
+            `collision.stand_ins`.
+        solver: effort.
+        complete: whether all configurations at start and goal were found. If not, `status` is
+            `feasible`.
     """
 
     status: Literal["optimal", "feasible"]
@@ -182,5 +218,5 @@ class Solution:
 
     @property
     def duration(self) -> float:
-        """Length of the motion [s]."""
+        """Duration of the motion [s]."""
         return self.trajectory.spline.duration

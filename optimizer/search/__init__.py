@@ -1,1 +1,1 @@
-"""Branch and bound over candidates: ends, lower bounds, incumbent, refinement, baselines."""
+"""Branch and bound over candidates, in stages over one state."""

@@ -1,6 +1,4 @@
-"""Best-first search over candidates: solve in order of lower bound until no bound is below the
-incumbent.
-"""
+"""Best-first search over candidates in order of their lower bounds."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.solve.methods import method_of
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import SolveResult, SolveStatus
 
 
 def explore(
@@ -22,18 +20,27 @@ def explore(
     most_solved: int | None = None,
     ended: Callable[[Candidate], None] = lambda _: None,
 ) -> Candidate | None:
-    """Solve candidates in order of lower bound until none is below the incumbent; returns it, None
-    if there is none.
+    """Solve candidates in order of lower bound until no bound is below the best energy.
 
-    After `most_solved` solved candidates the others are not solved. A candidate that is postponed
-    comes again after those to which a path is known, and, if none is known to itself, after those
-    whose goals do not seem enclosed. `ended` gets every candidate that was solved, or tried in
-    vain.
+    Postponed candidates are requeued by the outlook of their path: planned, unknown, goal enclosed.
+
+    Args:
+        prepared: problem of the motions.
+        candidates: candidates.
+        attempt: solves a candidate.
+        deadline: instant at which the search ends.
+        most_solved: number of solved candidates after which no other is solved.
+        ended: receives every candidate after its attempt.
+
+    Returns:
+        The best candidate; None if no candidate has a motion.
     """
     best = min(
-        (e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None
+        (each for each in candidates if each.energy is not None),
+        key=lambda each: each.energy or 0.0,
+        default=None,
     )
-    queue = sorted(candidates, key=lambda e: (e.lower_bound, e.shortest))
+    queue = sorted(candidates, key=lambda each: (each.lower_bound, each.shortest))
     while queue:
         candidate = queue.pop(0)
         if candidate.status is not CandidateStatus.UNVISITED or candidate.deferred:
@@ -43,7 +50,7 @@ def explore(
             continue
         if (
             most_solved is not None
-            and sum(e.status is CandidateStatus.SOLVED for e in candidates) >= most_solved
+            and sum(each.status is CandidateStatus.SOLVED for each in candidates) >= most_solved
         ):
             message = f"the method solves no more than {most_solved} candidates"
             candidate.settle(CandidateStatus.UNVISITED, Reason.ENOUGH_SOLVED, message)
@@ -55,9 +62,9 @@ def explore(
             break
         if result.status is SolveStatus.POSTPONED:
             queue.insert(0, candidate)
-            queue.sort(key=lambda e: _hopelessness(prepared, e))
+            queue.sort(key=lambda each: _path_outlook(prepared, each))
             continue
-        candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
+        candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.message)
         if result.spline is not None:
             candidate.energy = prepared.cost_of(result.spline)
             candidate.refined = not method_of(prepared.problem).may_refine(result.spline)
@@ -67,8 +74,8 @@ def explore(
     return best
 
 
-def _hopelessness(prepared: PreparedProblem, candidate: Candidate) -> int:
-    """0 if a path to a candidate's goal is known, 2 if this goal seems enclosed, else 1."""
+def _path_outlook(prepared: PreparedProblem, candidate: Candidate) -> int:
+    """0 if a path to a candidate's goal is planned, 2 if the goal seems enclosed, else 1."""
     ends = candidate.q_start, candidate.q_goal
     if prepared.surroundings.has_planned_paths(*ends):
         return 0

@@ -7,39 +7,35 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from enum import Enum
-from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.bounds.lower_bound import lower_bounds
+from joulepath.optimizer.bounds.lower_bound import bound_through_passes, lower_bounds
 from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
+from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration, joint_options
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import AnyOf, Side
 from joulepath.optimizer.result.candidates import CandidateReport, CandidateStatus
 from joulepath.optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from joulepath.optimizer.search.ends import SIDES, EndConfiguration
-from joulepath.optimizer.search.passing import bound_through
-from joulepath.optimizer.solve.methods.method import SolveResult
+from joulepath.optimizer.search.ends import SIDES
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
-FULL_TURN = 2 * np.pi
-# 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400
-# bytes
 MOST_PAIRS = 32768
-# pairs between two looks at the deadline: some ten milliseconds
+"""Largest number of pairs: 64 poses from a given start make 16384, two poses 2048.
+
+Each pair takes about 400 bytes of the answer.
+"""
 PAIRS_PER_CHECK = 1024
-# joint displacements that differ by less are the same [rad]
-SAME_TRAVEL = 1e-9
+"""Number of pairs between two checks of the deadline: about ten milliseconds."""
 
 
 class Reason(Enum):
-    """Why a candidate has its status. The value is the message; a candidate may carry a more exact
-    one beside it.
-    """
+    """Why a candidate has its status; the value is the default message."""
 
     NOT_REACHED = "not reached before the deadline"
     DEFERRED = "other samples of the target have smaller lower bounds"
@@ -53,75 +49,95 @@ class Reason(Enum):
     NOT_CONFIRMED = "the certificate did not confirm it"
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Candidate:
-    """A start and goal configuration with the state of their search; `energy` [J] is the exact
-    value of the objective.
+    """A start and a goal configuration with the state of their search.
 
-    `shortest` [s] is a proven least duration. `holdable`: both ends are feasible. A candidate that
-    is `deferred` is not solved yet, because similar candidates have a smaller lower bound.
-    `sampled`: an end is one of infinitely many configurations that reach its target. `refined`: the
-    motion is not only a first one, which the method refines. `tightened`: it was solved again,
-    within tighter limits, since the certificate rejected its motion.
+    Two candidates are equal only if they are the same object, so that they can be keys.
     """
 
     start: EndConfiguration
     goal: EndConfiguration
     q_start: Array
+    """Joint positions at the start, shape (nq,) [rad]."""
     q_goal: Array
+    """Joint positions at the goal, shape (nq,) [rad]."""
     lower_bound: float = 0.0
+    """Proven bound of its motions [J]."""
     shortest: float = 0.0
+    """Proven least duration [s]."""
     status: CandidateStatus = CandidateStatus.UNVISITED
     reason: Reason = Reason.NOT_REACHED
     message: str = Reason.NOT_REACHED.value
     energy: float | None = None
+    """Objective of its motion [J]."""
     attempt: SolveResult | None = field(default=None, repr=False)
+    """Result of the last attempt."""
     holdable: bool = True
+    """Whether both ends are feasible."""
     deferred: bool = False
+    """Whether it waits, because similar candidates have smaller lower bounds."""
     earlier: Candidate | None = field(default=None, repr=False)
+    """The candidate with its last motion before this one."""
     refused: bool = False
+    """Whether the certificate rejected a motion."""
     refined: bool = False
+    """Whether the method has refined the motion."""
     tightened: bool = False
+    """Whether it was solved again within tighter limits, after a motion was rejected."""
     sampled: bool = field(init=False)
+    """Whether an end is one of infinitely many configurations of its target."""
 
     def __post_init__(self) -> None:
         self.sampled = self.start.sampled or self.goal.sampled
 
     def settle(self, status: CandidateStatus, reason: Reason, message: str | None = None) -> None:
-        """Set the status with its reason; the `message` is the reason's own unless given."""
+        """Set the status with its reason and message, by default the message of the reason."""
         self.status, self.reason, self.message = (
             status,
             reason,
             reason.value if message is None else message,
         )
 
+    def defer(self) -> None:
+        """Let the candidate wait until it is activated."""
+        self.deferred = True
+        self.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+
+    def activate(self) -> None:
+        """Open the candidate, which was deferred, to a solve."""
+        self.deferred = False
+        self.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+
+    @property
+    def motion(self) -> Spline | None:
+        """Motion of the last attempt; None if it found none."""
+        return None if self.attempt is None else self.attempt.spline
+
     @property
     def spline(self) -> Spline:
-        """The motion of a solved candidate."""
+        """The motion; only for a solved candidate."""
         assert self.attempt is not None and self.attempt.spline is not None
         return self.attempt.spline
 
     @property
     def duration(self) -> float:
-        """Duration of the motion found [s]; NaN if there is none."""
+        """Duration of the motion [s]; NaN without a motion."""
         return self.attempt.spline.duration if self.attempt and self.attempt.spline else np.nan
 
     def move(self, to: Candidate) -> None:
-        """Take the ends and the bounds of another candidate for the same targets."""
+        """Take the ends and bounds of another candidate for the same targets."""
         self.start, self.goal, self.q_start, self.q_goal = to.start, to.goal, to.q_start, to.q_goal
         self.lower_bound, self.shortest, self.sampled = to.lower_bound, to.shortest, to.sampled
 
     def take(self, result: SolveResult, energy: float) -> None:
-        """Take a motion of a result, whose objective is `energy` [J]; the one before stays in
-        hand."""
+        """Take a motion with its objective [J]; the candidate keeps the earlier motion."""
         self.earlier = None if self.energy is None else copy(self)
         self.attempt, self.energy = result, energy
-        self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
+        self.settle(CandidateStatus.SOLVED, Reason.METHOD, result.message)
 
     def refuse(self) -> None:
-        """Go back to the motion before the last one, which the certificate did not confirm; without
-        one, it failed.
-        """
+        """Return to the motion before the last one; without one, the candidate failed."""
         before, self.refused = self.earlier, True
         if before is None:
             self.energy = self.attempt = None
@@ -153,25 +169,26 @@ class Candidate:
 def pairs(
     prepared: PreparedProblem, starts: Sequence[EndConfiguration], goals: Sequence[EndConfiguration]
 ) -> list[Candidate]:
-    """Every pair of branches, with every full-turn alternative that makes a motion of its own.
+    """Pairs of end configurations with all full turns that make distinct motions.
 
-    The dynamics has period 2π in every joint. If both ends are poses, pairs with equal joint
+    The dynamics has the period 2π in every joint. If both ends are poses, pairs of equal joint
     displacement are one candidate. Pairs that move a joint by more than 2π are left out: without
-    that full turn, the same branches have less displacement in this joint, no more in the others,
+    this full turn, the same branches have less displacement in the joint, no more in the others,
     and a bound that is never higher. Without `windings`, and for samples of a free orientation or
     of a self-motion, only the pair of least displacement is kept.
 
-    Raises InvalidProblem if several targets make too many pairs.
+    Raises:
+        InvalidProblem: several targets make too many pairs.
     """
     result: list[Candidate] = []
     due = PAIRS_PER_CHECK
-    only = {id(end): _only_choice(end) for end in (*starts, *goals)}
+    only = {end: _only_choice(end) for end in (*starts, *goals)}
     for start in starts:
         for goal in goals:
             if len(result) > due:
                 checkpoint()
                 due = len(result) + PAIRS_PER_CHECK
-            q_start, q_goal = only[id(start)], only[id(goal)]
+            q_start, q_goal = only[start], only[goal]
             if q_start is None or q_goal is None:
                 windings = prepared.problem.windings and not (start.sampled or goal.sampled)
                 q_start, q_goal = _combined(start, goal, windings, MOST_PAIRS)
@@ -185,14 +202,13 @@ def pairs(
             new = [Candidate(start, goal, *both) for both in zip(q_start, q_goal, strict=True)]
             if new[0].sampled:
                 for candidate in new:
-                    candidate.deferred = True
-                    candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+                    candidate.defer()
             result += new
     return result
 
 
 def _only_choice(end: EndConfiguration) -> Array | None:
-    """The joint positions (1, nq) [rad] of an end without full-turn alternatives; else None."""
+    """The joint positions (1, nq) [rad] of an end without other full turns; else None."""
     return (
         None
         if any(len(each) > 1 for each in end.choices)
@@ -203,8 +219,10 @@ def _only_choice(end: EndConfiguration) -> Array | None:
 def _combined(
     start: EndConfiguration, goal: EndConfiguration, windings: bool, most: int
 ) -> tuple[Array, Array]:
-    """Starts and goals (k, nq) [rad] of all combinations of the options of each joint, the last
-    joint's first; of some of them, if there are more than `most`."""
+    """Starts and goals (k, nq) [rad] of all combinations of the full turns of joints.
+
+    They vary the last joint first. Of more than `most` combinations, only some are returned.
+    """
     options = [
         joint_options(s, g, start.fixed or goal.fixed, windings)
         for s, g in zip(start.choices, goal.choices, strict=True)
@@ -219,46 +237,30 @@ def _combined(
     return q_start, q_goal
 
 
-def joint_options(
-    starts: list[float], goals: list[float], fixed: bool, windings: bool
-) -> list[tuple[float, float]]:
-    """(start, goal) [rad] of one joint for each displacement, least first."""
-    both = sorted(
-        product(starts, goals),
-        key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])),
-    )
-    if not windings:
-        return both[:1]
-    if fixed:
-        return both
-    kept: list[tuple[float, float]] = []
-    for s, g in both:
-        fresh = all(abs((g - s) - (other[1] - other[0])) > SAME_TRAVEL for other in kept)
-        if fresh and (not kept or abs(g - s) < FULL_TURN + SAME_TRAVEL):
-            kept.append((s, g))
-    return kept
-
-
 def bound(
     prepared: PreparedProblem, candidates: Sequence[Candidate], checked: Sequence[Side] = SIDES
 ) -> None:
-    """Mark the candidates with an infeasible start or goal, and give each its lower bound and least
-    duration.
+    """Give candidates lower bounds and least durations, and mark those with an infeasible end.
 
-    An end that keeps its margins, but not the reserve beyond them, is infeasible, although there
-    may be motions to it: its candidates keep their bounds.
+    An end that keeps its margins, but not the reserve beyond them, is infeasible although there may
+    be motions to it: its candidates keep their bounds.
 
-    Ends that are not to be `checked` are known to be feasible.
+    Args:
+        prepared: problem of the motions.
+        candidates: candidates.
+        checked: ends to check; the others are known to be feasible.
 
-    Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible if no candidate is
-    left.
+    Raises:
+        InvalidProblem: no candidate is left, for example because of the tool cone.
+        InCollision: no candidate is left because of collisions.
+        TorqueInfeasible: no candidate is left because of the load.
     """
     sides = {
         "start": _Ends.of([each.start for each in candidates]),
         "goal": _Ends.of([each.goal for each in candidates]),
     }
     levels = np.array([sides[name].potential(prepared) for name in SIDES]).T
-    # joining takes half the time of making an array of arrays
+    # concatenation takes half the time of an array of arrays
     q_start = np.concatenate([each.q_start for each in candidates]).reshape(len(candidates), -1)
     q_goal = np.concatenate([each.q_goal for each in candidates]).reshape(len(candidates), -1)
     hold = prepared.holding_power(q_goal) if prepared.problem.dwell else None
@@ -266,7 +268,7 @@ def bound(
     if prepared.problem.objective == "mechanical":
         bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_goal, levels))
     if prepared.problem.passes:
-        bounds = np.maximum(bounds, bound_through(prepared, q_start[0], q_goal[0]))
+        bounds = np.maximum(bounds, bound_through_passes(prepared, q_start[0], q_goal[0]))
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
         if not math.isfinite(value):
@@ -274,7 +276,7 @@ def bound(
                 CandidateStatus.INFEASIBLE, Reason.TOO_SLOW, f"takes at least {least:.4f} s"
             )
     ruled = {name: check_configurations(prepared, sides[name].q) for name in checked}
-    for name in reversed(checked):  # of a candidate with two such ends, the start is named
+    for name in reversed(checked):  # the message of the start replaces that of the goal
         for row, ruling in enumerate(ruled[name]):
             if ruling is not None:
                 _rule_out(
@@ -291,20 +293,18 @@ def bound(
 
 @dataclass(frozen=True)
 class _Ends:
-    """The configurations at one side of candidates, each once, and the row (P,) of that of each
-    candidate.
-    """
+    """The distinct configurations at one side of candidates."""
 
     all: list[EndConfiguration]
-    rows: npt.NDArray[np.intp]
+    rows: Indices
+    """Index of the configuration of each candidate, shape (P,)."""
 
     @classmethod
     def of(cls, ends: Sequence[EndConfiguration]) -> _Ends:
-        """From the end of each candidate."""
-        _, first, rows = np.unique(list(map(id, ends)), return_index=True, return_inverse=True)
-        # in the order in which they come
-        order = np.argsort(first)
-        return cls([ends[k] for k in first[order].tolist()], np.argsort(order)[rows])
+        """The distinct configurations among those of all candidates, in their order."""
+        index: dict[EndConfiguration, int] = {}
+        rows = [index.setdefault(end, len(index)) for end in ends]
+        return cls(list(index), np.array(rows, dtype=np.intp))
 
     @property
     def q(self) -> Array:
@@ -312,13 +312,13 @@ class _Ends:
         return np.array([end.q for end in self.all])
 
     def potential(self, prepared: PreparedProblem) -> Array:
-        """Potential energy (P,) [J] at the end of each candidate."""
+        """Potential energies (P,) [J] at the ends of the candidates."""
         return np.array([prepared.potential(end.q) for end in self.all])[self.rows]
 
 
 def _rule_out(candidates: Sequence[Candidate], marked: Mask, message: str, possible: bool) -> None:
-    """Settle the `marked` (P,) candidates as infeasible. They keep their bounds if it is `possible`
-    to be there.
+    """Settle the `marked` (P,) candidates as infeasible; if motions are possible, they keep their
+    bounds.
     """
     for row in np.flatnonzero(marked).tolist():
         candidate = candidates[row]

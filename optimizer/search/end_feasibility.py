@@ -1,5 +1,4 @@
-"""Whether a start or goal configuration is feasible: tool within its cone, no collision, torque to
-hold the load.
+"""Feasibility of start and goal configurations: tool cone, collisions, torque to hold the load.
 
 Infeasible configurations are ruled out before any motion is computed.
 """
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import ClosestPair
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
@@ -20,38 +19,39 @@ from joulepath.optimizer.kinematics.path_constraints import ToolConeConstraint
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.errors import CollidingBranch, TorqueInfeasible, in_collision
 
-# rounding of the angle in a cone, relative to its half angle
-EDGE = 1e-9
+CONE_TOLERANCE = 1e-9
+"""Rounding error of an angle in the tool cone, relative to the half angle of the cone."""
 
 
 @dataclass(frozen=True)
 class InvalidReason:
-    """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a
-    pair, a joint).
-
-    `possible`: the margins are kept, but not RESERVE beyond them. No motion is sought, although
-    there may be one.
-    """
+    """Reason why a configuration is infeasible."""
 
     reason: str
+    """Message."""
     cause: float | ClosestPair | TorqueInfeasible
+    """Angle beyond the tool cone [rad], closest pair of bodies, or overloaded joint."""
     possible: bool = False
+    """Whether the margins hold, and only the reserve beyond them is missing.
+
+    Then no motion is searched for, although there may be one.
+    """
 
 
 def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
-    """The reason why each configuration of q (n, nq) [rad] is infeasible; None for a feasible
-    one."""
+    """The reasons why configurations q (n, nq) [rad] are infeasible; None for a feasible one."""
     result: list[InvalidReason | None] = [*_overloads(prepared, q)]
-    # later reasons replace earlier ones: they do not depend on the load
+    # a collision or the cone replaces an overload as reason, because it does not depend on the load
     for k, contact in enumerate(
-        prepared.surroundings.model.closest_pairs(q, within=RESERVE)
+        prepared.surroundings.model.closest_pairs(q, within=CLEARANCE_CONSTRAINT.reserve)
         if prepared.problem.arm.collisions
         else ()
     ):
-        if contact.distance < RESERVE:
+        if contact.distance < CLEARANCE_CONSTRAINT.reserve:
             first, second = contact.pair
             message = (
-                f"{first} and {second}: clearance {RESERVE - contact.distance:.5f} m too small"
+                f"{first} and {second}: clearance "
+                f"{CLEARANCE_CONSTRAINT.reserve - contact.distance:.5f} m too small"
             )
             result[k] = InvalidReason(message, contact, contact.distance >= 0 and result[k] is None)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
@@ -63,10 +63,17 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
 def raise_if_none_is_left(
     name: str, branches: Sequence[tuple[str, int, Array]], ruled: Sequence[InvalidReason | None]
 ) -> None:
-    """Raise the error for the branches (label, target, q) at the `name`, start, goal or a stop, if
-    none is feasible.
+    """Raise the error for an end whose configurations are all infeasible.
 
-    Raises InvalidProblem, InCollision or TorqueInfeasible.
+    Args:
+        name: `start`, `goal`, or the name of a stop.
+        branches: label, target and q of each configuration.
+        ruled: reason of each configuration, None for a feasible one.
+
+    Raises:
+        InvalidProblem: the tool is outside of its cone in all configurations.
+        InCollision: all configurations collide or are infeasible otherwise.
+        TorqueInfeasible: some configuration is infeasible only because of the load.
     """
     causes = [None if each is None else each.cause for each in ruled]
     if any(cause is None for cause in causes):
@@ -83,7 +90,7 @@ def raise_if_none_is_left(
     if overloads:
         raise min(overloads, key=lambda error: error.needed / error.available)
     colliding = [
-        CollidingBranch(label, target, q, cause.pair, RESERVE - cause.distance)
+        CollidingBranch(label, target, q, cause.pair, CLEARANCE_CONSTRAINT.reserve - cause.distance)
         for (label, target, q), cause in zip(branches, causes, strict=True)
         if isinstance(cause, ClosestPair)
     ]
@@ -91,7 +98,7 @@ def raise_if_none_is_left(
 
 
 def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
-    """For each of q (n, nq) [rad] the joint that cannot hold the load, if any."""
+    """The joint that cannot hold the load in each configuration q (n, nq) [rad], if any."""
     tau_max, joints = (
         prepared.problem.arm.active_limits.tau_max,
         prepared.problem.arm.robot.joint_names,
@@ -109,7 +116,7 @@ def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None
 
 
 def _beyond_cone(prepared: PreparedProblem, q: Array) -> list[float]:
-    """Angle [rad] of the tool beyond its cone at each of q (n, nq); empty without a cone."""
+    """Angles [rad] of the tool beyond its cone at q (n, nq) [rad]; empty without a cone."""
     problem = prepared.problem
     if problem.arm.tool_cone is None:
         return []
@@ -119,5 +126,7 @@ def _beyond_cone(prepared: PreparedProblem, q: Array) -> list[float]:
     )[:, 0]
     return [
         float(each)
-        for each in np.where(share > 1 + EDGE, (share - 1) * problem.arm.tool_cone.half_angle, 0.0)
+        for each in np.where(
+            share > 1 + CONE_TOLERANCE, (share - 1) * problem.arm.tool_cone.half_angle, 0.0
+        )
     ]

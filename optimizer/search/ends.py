@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import (
@@ -14,13 +12,13 @@ from joulepath.optimizer.exceptions import (
     UnreachablePose,
     UnreachableTargets,
 )
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
     required_inverse_kinematics,
 )
-from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations
-from joulepath.optimizer.kinematics.self_motion import SelfMotion
-from joulepath.optimizer.kinematics.six.full_turns import full_turn_alternatives
+from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations, within_cone
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
@@ -28,63 +26,60 @@ from joulepath.optimizer.problem.targets import AnyOf, Side, Single, Target
 from joulepath.optimizer.result.candidates import UnreachableTarget
 
 SIDES: tuple[Side, ...] = ("start", "goal")
-# orientations sampled of a pose that leaves it free, and of each of several such poses at least
-SAMPLES, LEAST_SAMPLES = 96, 12
-# members of the self-motion of a pose, and of each sample of a pose of free orientation
-MEMBERS, FEW_MEMBERS = 24, 4
-# samples between two looks at the deadline: some ten milliseconds
-SAMPLES_PER_CHECK = 24
-# share of the tool's cone that a goal of free orientation may use: on its edge the motion could not
-# leave the goal
-INSIDE = 0.999
-# label of joint positions of an arm without named branches
-GIVEN = "given"
 
 
 @dataclass(frozen=True)
-class EndConfiguration:
-    """One branch at the start or goal: its label, and per joint its full-turn alternatives within
-    the limits [rad].
+class SamplingSettings:
+    """Settings of the samples of targets that infinitely many configurations reach."""
 
-    `fixed`: the joint positions are given. `target` is the index of the target that it reaches.
-    `tolerance` is this target if its orientation is free in part: then the configuration is a
-    sample of it. Of a pose that is held on a `self_motion`, too, the configuration is a sample.
+    orientations: int = 96
+    """Number of orientations sampled of all poses of partly free orientation together."""
+    least_orientations: int = 12
+    """Least number of orientations sampled of one pose."""
+    members: int = 24
+    """Number of members sampled of the self-motion of a pose."""
+    members_per_orientation: int = 4
+    """Number of members sampled of the self-motion of each sampled orientation."""
+    orientations_per_check: int = 24
+    """Number of orientations between two checks of the deadline: about ten milliseconds."""
+    cone_share: float = 0.999
+    """Share of the tool's cone for goals of free orientation.
+
+    On the edge of the cone no motion could leave the goal.
     """
 
-    label: str
-    q: Array
-    choices: list[list[float]]
-    fixed: bool
-    target: int = 0
-    tolerance: ConeOrientedPose | None = None
-    self_motion: SelfMotion | None = None
 
-    @property
-    def sampled(self) -> bool:
-        """Whether it is one of infinitely many configurations that reach the target."""
-        return self.tolerance is not None or self.self_motion is not None
+SAMPLING = SamplingSettings()
+GIVEN = "given"
+"""Label of joint positions of an arm without named branches."""
 
 
 def ends(
     prepared: PreparedProblem, name: str
 ) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
-    """The branches at `start` or `goal` that the problem allows; and the targets without any: see
-    `ends_of`.
+    """The end configurations at `start` or `goal` of a problem, and its targets without any.
+
+    See `ends_of`.
     """
     return ends_of(prepared, name, getattr(prepared.problem, name))
 
 
 def ends_of(
-    prepared: PreparedProblem, name: str, target: Target, samples: int = SAMPLES
+    prepared: PreparedProblem, name: str, target: Target, samples: int = SAMPLING.orientations
 ) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
-    """The branches of a target, called `name`, that the problem allows; and its members without
-    any.
+    """The end configurations of a target that a problem allows, and its members without any.
 
-    Of all of its poses of free orientation together so many `samples` are taken, or a few more.
+    Args:
+        prepared: the problem.
+        name: name of the target in errors.
+        target: target.
+        samples: number of orientations sampled of all poses of partly free orientation together.
 
-    Raises UnreachableTargets if none of several targets has a branch; for a single pose
-    UnreachablePose (also if the branch asked for does not reach it) or SingularPose; InvalidProblem
-    for a pose of an arm without inverse kinematics.
+    Raises:
+        UnreachableTargets: none of several targets has a configuration.
+        UnreachablePose: no configuration of the branches asked for reaches a single pose.
+        SingularPose: a single pose is singular.
+        InvalidProblem: a pose of an arm without inverse kinematics.
     """
     if not isinstance(target, AnyOf):
         return _ends_of(prepared, name, target, 0, samples), []
@@ -95,7 +90,11 @@ def ends_of(
         checkpoint()
         try:
             reached += _ends_of(
-                prepared, name, member, index, max(samples // max(tolerance, 1), LEAST_SAMPLES)
+                prepared,
+                name,
+                member,
+                index,
+                max(samples // max(tolerance, 1), SAMPLING.least_orientations),
             )
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
@@ -105,7 +104,7 @@ def ends_of(
 
 
 def label_of(robot: Robot, q: Array) -> str:
-    """The branch of joint positions q (nq,); `given` for an arm whose branches have no names."""
+    """The branch of joint positions q (nq,) [rad]; `given` for an arm without named branches."""
     kinematics = inverse_kinematics_for(robot)
     return GIVEN if kinematics is None else str(kinematics.label(q))
 
@@ -115,11 +114,18 @@ def _ends_of(
     name: str,
     target: Single,
     index: int,
-    samples: int = SAMPLES,
-    on_curve: int = MEMBERS,
+    samples: int = SAMPLING.orientations,
+    on_curve: int = SAMPLING.members,
 ) -> list[EndConfiguration]:
-    """The branches of one target: `samples` orientations of a free one, `on_curve` members of a
-    self-motion.
+    """The end configurations of one target.
+
+    Args:
+        prepared: the problem.
+        name: name of the target in errors.
+        target: target.
+        index: index of the target.
+        samples: number of orientations sampled if the orientation is partly free.
+        on_curve: number of members sampled of a self-motion.
     """
     problem = prepared.problem
     robot, limits = problem.arm.robot, problem.arm.active_limits
@@ -161,21 +167,23 @@ def _ends_of(
 def _ends_of_samples(
     prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, samples: int
 ) -> list[EndConfiguration]:
-    """The branches of orientations sampled evenly from those that the pose and the tool's cone
-    allow.
-    """
-    pose = within_cone(prepared, pose, INSIDE)
+    """The end configurations of orientations sampled evenly within the cones of pose and tool."""
+    pose = within_cone(prepared.arm, pose, SAMPLING.cone_share)
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
-    tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
+    tried = samples if pose.freedom > 1 else max(samples // 4, SAMPLING.least_orientations)
     for k, R in enumerate(sample_orientations(pose, tried)):
-        if k % SAMPLES_PER_CHECK == SAMPLES_PER_CHECK - 1:
+        if k % SAMPLING.orientations_per_check == SAMPLING.orientations_per_check - 1:
             checkpoint()
         try:
             found += [
                 replace(end, tolerance=pose, self_motion=None)
                 for end in _ends_of(
-                    prepared, name, pose.with_orientation(R), index, on_curve=FEW_MEMBERS
+                    prepared,
+                    name,
+                    pose.with_orientation(R),
+                    index,
+                    on_curve=SAMPLING.members_per_orientation,
                 )
             ]
         except (UnreachablePose, SingularPose) as error:
@@ -192,26 +200,4 @@ def _ends_of_samples(
         f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to "
         "the robot's "
         "workspace, widen limits.position or leave `branch` out.",
-    )
-
-
-def within_cone(
-    prepared: PreparedProblem, pose: ConeOrientedPose, share: float = 1.0
-) -> ConeOrientedPose:
-    """The pose with no more freedom than a share of the tool's cone leaves it, if both have the
-    same axes.
-
-    Else few samples of a free orientation would lie in a narrow cone, and a bound would count what
-    the cone excludes.
-    """
-    cone = prepared.problem.arm.tool_cone
-    if cone is None:
-        return pose
-    free = pose.half_angle == np.pi
-    if not free and not (
-        np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)
-    ):
-        return pose
-    return ConeOrientedPose(
-        pose.position, cone.axis, cone.direction, min(pose.half_angle, share * cone.half_angle)
     )

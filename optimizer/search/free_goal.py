@@ -1,18 +1,21 @@
-"""Goals that infinitely many configurations reach: how the best samples are refined.
+"""Refinement of the best samples of goals that infinitely many configurations reach.
 
-The configurations of a goal whose orientation is free in part, or that is held on a self-motion,
-form a manifold. From the best solved samples, the goal configuration becomes a decision variable of
-the nonlinear program, restricted to the tangent space of the goal manifold. Inverse kinematics
-projects the new goal onto the manifold, and the motion is solved again with this goal fixed, until
-the energy no longer decreases.
+The configurations of a goal of partly free orientation, or of a goal on a self-motion, form a
+manifold. From the best solved samples, the goal configuration becomes a decision variable of the
+nonlinear program, restricted to the tangent space of the goal manifold. Inverse kinematics projects
+the new goal onto the manifold, and the motion is solved again with this goal fixed, until the
+energy no longer decreases.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.orientation_tolerance import tilt
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from joulepath.optimizer.motion import bspline
@@ -22,156 +25,184 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.search.attempts import settled, solver_of
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.ends import EndConfiguration
-from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
+from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import (
     DurationInterval,
     duration_intervals,
 )
-from joulepath.optimizer.solve.methods.free_spline import COARSE, FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.guess import Guess
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.sqp import solve
 
-# rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
-ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
-# relative decrease of the energy below which no further round follows, and that a step to a
-# proposal must promise: the motion to it is solved again
-GAIN, PROGRESS = 2e-4, 5e-4
-# relative decrease of the energy that is worth another solve, and share of the promised decrease
-# below which the manifold bends too much within the trust region
-LEAST_GAIN, KEPT = 1e-4, 0.1
-# a goal that moves by less is where it should be [rad]
-LEAST_MOVE = 1e-3
-# shares of the way to a proposed goal that are tried
-SHARES = (1.0, 0.9, 0.5)
+
+@dataclass(frozen=True)
+class GoalRefinementSettings:
+    """Settings of the refinement of goals."""
+
+    rounds: int = 8
+    """Largest number of rounds."""
+    radius: float = 0.6
+    """First trust region of a goal joint [rad]."""
+    least_radius: float = 0.01
+    """Trust region below which the refinement ends [rad]."""
+    shrinking: float = 4.0
+    """Divisor of the trust region where the manifold bends too much."""
+    gain: float = 2e-4
+    """Relative decrease of the energy below which no further round follows."""
+    progress: float = 5e-4
+    """Relative decrease of the energy that a step to a proposal must promise."""
+    least_gain: float = 1e-4
+    """Relative decrease of the energy that is worth another solve."""
+    kept_share: float = 0.1
+    """Share of the promised decrease below which the manifold bends too much."""
+    least_move: float = 1e-3
+    """Displacement [rad] below which a goal has settled."""
+    step_shares: tuple[float, ...] = (1.0, 0.9, 0.5)
+    """Shares of the step to a proposed goal tried in turn."""
+    fit_samples: int = 201
+    """Number of instants at which a motion of another method is sampled."""
+    cone_sides: int = 12
+    """Number of sides of the polygon that stands for a cone's circle."""
+
+
+GOALS = GoalRefinementSettings()
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
 REFINED = "converged; refined along the self-motion that holds the pose"
-# instants at which a motion of another method is sampled
-FIT_SAMPLES = 201
-# sides of the polygon that stands for a cone's circle
-SIDES = 12
 
 
-def refine_goals(incumbent: Incumbent) -> list[Candidate]:
+def refine_goals(state: SearchState) -> list[Candidate]:
     """New candidates, found by refining the goal orientation of the best solved samples.
 
-    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of
-    less energy than their sample are returned.
+    One sample per pair of branches is refined. Only candidates of less energy than their sample are
+    returned.
     """
     solved = [
         each
-        for each in incumbent.candidates
+        for each in state.candidates
         if each.energy is not None and each.goal.tolerance is not None
     ]
     return refine_best(
         solved,
         lambda each: (each.start.label, each.goal.label, each.goal.target),
-        lambda each: refine_goal(incumbent, each),
+        lambda each: refine_goal(state, each),
     )
 
 
-def refine_goal(incumbent: Incumbent, candidate: Candidate, rounds: int = ROUNDS) -> Candidate:
-    """The candidate with its goal moved over the goal set while the energy decreases; itself if it
-    never does.
+def refine_goal(state: SearchState, candidate: Candidate, rounds: int = GOALS.rounds) -> Candidate:
+    """The candidate with its goal moved over the goal set while the energy decreases.
 
-    The candidate must be solved, and its goal a sample.
+    It is the candidate itself if the energy never decreases.
+
+    Args:
+        state: state of the search.
+        candidate: solved candidate whose goal is a sample.
+        rounds: largest number of rounds.
     """
-    best, radius = candidate, RADIUS
+    best, radius = candidate, GOALS.radius
     for _ in range(rounds):
-        if incumbent.deadline.passed or radius < LEAST_RADIUS:
+        if state.deadline.passed or radius < GOALS.least_radius:
             break
         try:
-            with watch(incumbent.deadline):
-                fresh, promised = _moved(incumbent, best, radius)
+            with watch(state.deadline):
+                fresh, promised = _moved(state, best, radius)
         except DeadlinePassed:
             break
         before = best.energy or 0.0
         gain = 0.0 if fresh is None else before - (fresh.energy or 0.0)
         if fresh is not None and gain > 0:
             best = fresh
-        if gain < GAIN * abs(before) and before - promised < GAIN * abs(before):
+        if gain < GOALS.gain * abs(before) and before - promised < GOALS.gain * abs(before):
             break
-        if gain < KEPT * (before - promised):
-            radius /= 4
+        if gain < GOALS.kept_share * (before - promised):
+            radius /= GOALS.shrinking
     return best
 
 
 def _moved(
-    incumbent: Incumbent, candidate: Candidate, radius: float
+    state: SearchState, candidate: Candidate, radius: float
 ) -> tuple[Candidate | None, float]:
-    """The candidate with its goal moved by at most `radius` [rad] in each joint, solved, None if it
-    has no motion; and the energy [J] that was promised to first order, -inf if the first order has
-    no motion either."""
-    guess, promised = _proposal(incumbent, candidate, radius)
+    """The candidate with its goal moved by at most `radius` [rad] in each joint, solved.
+
+    Returns:
+        The candidate, None if it has no motion; and the energy promised to first order [J], -inf if
+        there is no motion to first order.
+    """
+    guess, promised = _proposal(state, candidate, radius)
     if guess is None:
         return None, -np.inf
-    if promised > (1 - LEAST_GAIN) * (candidate.energy or 0.0):
+    if promised > (1 - GOALS.least_gain) * (candidate.energy or 0.0):
         return None, promised
-    if np.abs(guess.points[-1] - candidate.q_goal).max() < LEAST_MOVE:
+    if np.abs(guess.points[-1] - candidate.q_goal).max() < GOALS.least_move:
         return None, candidate.energy or 0.0
-    for share in SHARES:
-        # where the set bends, its configuration next to the proposed one may be outside of a limit
-        # that this one is on
+    for share in GOALS.step_shares:
+        # the set may bend out of a limit that the proposed goal is on
         asked = candidate.q_goal + share * (guess.points[-1] - candidate.q_goal)
-        found = _nearest_goal(incumbent, candidate, asked)
+        found = _nearest_goal(state, candidate, asked)
         if found is not None:
-            return _solved(incumbent, candidate, *found, guess), promised
+            return _solved(state, candidate, *found, guess), promised
     return None, promised
 
 
 def _nearest_goal(
-    incumbent: Incumbent, candidate: Candidate, q: Array
+    state: SearchState, candidate: Candidate, q: Array
 ) -> tuple[EndConfiguration, Array] | None:
-    """The configuration (nq,) of the candidate's goal that is nearest to q (nq,), with its end;
-    None if none is within the limits.
+    """The nearest configuration (nq,) of a candidate's goal to q (nq,), with its end.
 
-    Where two curves of a redundant arm meet, it may be on the other one.
+    None if it is outside of the limits. Where two curves of a redundant arm meet, it may be on the
+    other curve.
     """
-    ends = {id(candidate.goal.self_motion): candidate.goal}
+    ends = {candidate.goal.self_motion: candidate.goal}
     if candidate.goal.self_motion is not None:
-        for each in incumbent.candidates:
+        for each in state.candidates:
             if each.goal.self_motion is not None and each.goal.target == candidate.goal.target:
-                ends.setdefault(id(each.goal.self_motion), each.goal)
-    near = [(end, nearest_configuration(incumbent.prepared, end, q)) for end in ends.values()]
+                ends.setdefault(each.goal.self_motion, each.goal)
+    near = [(end, nearest_configuration(state.prepared, end, q)) for end in ends.values()]
     held = [(end, at) for end, at in near if at is not None]
     return min(held, key=lambda each: float(np.abs(each[1] - q).max()), default=None)
 
 
 def _solved(
-    incumbent: Incumbent, candidate: Candidate, end: EndConfiguration, q_goal: Array, guess: Guess
+    state: SearchState, candidate: Candidate, end: EndConfiguration, q_goal: Array, guess: Guess
 ) -> Candidate | None:
-    """The candidate with another goal (nq,) [rad] of this end, solved; None if it has no motion."""
-    prepared = incumbent.prepared
+    """The candidate with another goal (nq,) [rad], solved; None if it has no motion."""
+    prepared = state.prepared
     to_end = Candidate(candidate.start, end, candidate.q_start, candidate.q_goal)
     fresh = with_ends(prepared, to_end, candidate.q_start, q_goal)
     if fresh is None:
         return None
-    solver = solver_of(incumbent, fresh, _interval_of(prepared, q_goal, guess.duration))
+    solver = solver_of(state, fresh, _interval_of(prepared, q_goal, guess.duration))
     guess.points[-REST_POINTS:] = q_goal
-    # the guess is a motion of the free spline's own kind; other methods only take its goal
-    result = incumbent.add_effort(
-        solver.improve(guess) if type(solver) is FreeSpline else solver.solve()
+    # a method without free control points takes the goal of the guess alone
+    result = state.add_effort(
+        solver.solve_control_points(guess.space, guess.points, guess.duration)
+        if solver.free_control_points
+        else solver.solve()
     )
     return settled(
-        incumbent, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED
+        state, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED
     )
 
 
 def _proposal(
-    incumbent: Incumbent, candidate: Candidate, radius: float
+    state: SearchState, candidate: Candidate, radius: float
 ) -> tuple[Guess | None, float]:
-    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius`
-    [rad] away, and its energy [J]; inf without a motion."""
-    prepared, spline = incumbent.prepared, candidate.spline
-    space = bspline.uniform(COARSE)
-    if incumbent.method is FreeSpline and spline.degree == space.degree:
+    """The motion of least energy to any goal in the tangent space of the goal set.
+
+    The goal is at most `radius` [rad] away in each joint.
+
+    Returns:
+        The motion, None without one, and its energy [J], inf without a motion.
+    """
+    prepared, spline = state.prepared, candidate.spline
+    space = bspline.uniform(SPLINE_SPACES.coarse_points)
+    if state.method.free_control_points and spline.degree == space.degree:
         space, points = bspline.Basis.of(spline.knots / spline.duration), spline.control_points
     else:
-        at = np.linspace(0.0, 1.0, FIT_SAMPLES)
+        at = np.linspace(0.0, 1.0, GOALS.fit_samples)
         points = space.fit(sample(spline, at * spline.duration)[0], at)
     coordinates = Coordinates.joints(
         candidate.q_start, candidate.q_goal, prepared.problem.arm.active_limits
@@ -194,15 +225,17 @@ def _proposal(
         goal_holding=interval.goal_holding,
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
-    result = solve(program, free, spline.duration, None, incumbent.deadline, PROGRESS)
-    incumbent.add_effort(SolveResult(SolveStatus.FAILED, "a proposal", result.iterations, 1))
+    result = solve(program, free, spline.duration, None, state.deadline, GOALS.progress)
+    state.add_effort(
+        SolveResult(SolveStatus.FAILED, SolveReason.GOAL_PROPOSAL, result.iterations, 1)
+    )
     if not result.feasible:
         return None, np.inf
     return Guess(space, program.points(result.free), result.duration), result.cost
 
 
 def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> DurationInterval:
-    """The interval of durations that holds `duration` [s], else the nearest."""
+    """The interval of durations that holds a duration [s], else the nearest interval."""
     return min(
         duration_intervals(prepared, q_goal),
         key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0),
@@ -210,7 +243,7 @@ def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> D
 
 
 def held_pose(prepared: PreparedProblem, q_goal: Array, radius: float) -> GoalConstraints:
-    """To first order, how the goal (nq,) may change while the TCP keeps its pose: along the
+    """Allowed changes of a goal (nq,) to first order if the TCP keeps its pose: along the
     self-motion.
     """
     return GoalConstraints(
@@ -221,8 +254,10 @@ def held_pose(prepared: PreparedProblem, q_goal: Array, radius: float) -> GoalCo
 def goal_constraints(
     prepared: PreparedProblem, pose: ConeOrientedPose, q_goal: Array, radius: float
 ) -> GoalConstraints:
-    """To first order, how the goal (nq,) may change: the TCP keeps its place, and its axis stays
-    within the cone.
+    """Allowed changes of a goal (nq,) to first order if the pose leaves its orientation partly
+    free.
+
+    The TCP keeps its position, and its axis stays within the cone.
     """
     arm = prepared.problem.arm
     R, jacobian = tcp_pose(arm, q_goal)[:3, :3], tcp_jacobian(arm, q_goal)
@@ -230,17 +265,17 @@ def goal_constraints(
     if pose.half_angle < np.pi:
         tilted, pointing = tilt(pose, R), R @ pose.axis
         angle = float(np.linalg.norm(tilted))
-        # at a right angle to the axis: the way it is tilted, and the other
+        # two directions across the axis, the first in which it is tilted
         first = tilted / angle if angle > 1e-9 else np.linalg.svd(pointing[None])[2][1]
         second = np.cross(pointing, first)
         if pose.half_angle == 0:
             normals, upper_bound = np.stack([first, second]), np.array([-angle, 0.0])
         else:
-            turn = 2 * np.pi * np.arange(SIDES) / SIDES
+            turn = 2 * np.pi * np.arange(GOALS.cone_sides) / GOALS.cone_sides
             normals = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second
             upper_bound = np.maximum(pose.half_angle - angle * np.cos(turn), 0.0)
         rows.append(normals @ jacobian[3:])
-        lower.append(upper_bound if pose.half_angle == 0 else np.full(SIDES, -1e30))
+        lower.append(upper_bound if pose.half_angle == 0 else np.full(GOALS.cone_sides, -1e30))
         upper.append(upper_bound)
     return GoalConstraints(
         np.concatenate(rows), np.concatenate(lower), np.concatenate(upper), radius

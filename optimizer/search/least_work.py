@@ -1,14 +1,13 @@
-"""Least mechanical work at a fixed duration: candidates are compared by rough motions, and few are
-solved.
+"""Least mechanical work at a fixed duration: coarse motions decide which candidates are solved.
 
-The bound on mechanical work rules out little, and a motion has many local optima. Rough motions
-take a fifth of the time of solves (`many_motions`): those of tens of candidates, then of the best
-on more control points and from random guesses. They may collide, and exceed a limit by a little. So
-the motion of least work among those that do not collide is solved, with sharp corners. Then every
-candidate is solved whose rough motion promises less than what is found.
+The bound on mechanical work rules out little, and a motion has many local optima. Coarse motions
+take a fifth of the time of solves (`ManyMotions`): first of tens of candidates, then of the best
+candidates on more control points and from random guesses. They may collide, and exceed a limit by a
+little. So the coarse motion of least work without collision is solved, with sharp corners. Then
+every candidate is solved whose coarse motion promises less than the best motion found.
 
-Where no motion is found here, all candidates are solved as with other objectives: by `outer_turns`
-and `sharpening`.
+If no motion is found here, all candidates are solved as for other objectives, by `outer_turns` and
+`sharpening`.
 """
 
 from __future__ import annotations
@@ -21,337 +20,306 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH
+from joulepath.optimizer.dynamics.plant import SMOOTHING
+from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate, Reason
-from joulepath.optimizer.search.incumbent import Incumbent
-from joulepath.optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, families_of, leave
-from joulepath.optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
-from joulepath.optimizer.search.sharpening import (
-    DENSE,
-    LAST_PROGRESS,
-    LEAST_FREEDOM,
-    MIDDLE,
-    PROGRESS,
-    follow_in_time,
+from joulepath.optimizer.search.coarse_motions import (
+    COARSE,
+    CoarseMotion,
+    CoarseSolver,
+    best_of_each,
 )
+from joulepath.optimizer.search.least_work_settings import LEAST_WORK, RestartSettings
+from joulepath.optimizer.search.outer_turns import FAMILIES, families_of, settle_waiting
+from joulepath.optimizer.search.sharpening import SHARPENING, follow_in_time
+from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sharp_motion import sharp_motion
-from joulepath.optimizer.solve.methods.sqp_method import above
-
-# time [s] that the search needs to be sure of a motion
-LEAST_TIME = 3.0
-# candidates whose rough motions are found at a time, in order of their lower bounds
-AT_ONCE = 12
-# relative decreases that a further step must promise: on few control points, from random guesses,
-# and on more control points
-COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS = 2e-2, 2e-3, 2e-3
-# motions are given up if they are expected to need more than this ratio of the least of all
-BEHIND = 1.4
-# those that need at most this ratio of the least work on few control points are solved on more of
-# them, and so many
-CONTENDING, CONTENDERS = 1.35, 8
-# motions from random guesses that need more than this ratio of the least work on few control points
-# are dropped. Half of them do: more control points take longest from there, and hardly ever make
-# the best motion of one
-HOPELESS = 1.6
-# a batch of guesses has helped if a motion from one needs at most this ratio of the least work
-# before
-HELPFUL = 0.99
-# motions without collisions that need at most this ratio of the least are followed, and so many
-NEAR_BEST, RIVALS = 1.05, 6
-# width of their corners [W] at first
-FIRST_WIDTH = 0.2
-# on as many control points as the last motion, and with sharp corners, a motion needs about this
-# ratio of its work
-PROMISE = 0.97
-# a motion that collides must be below this multiple of the best energy without clearance
-# constraints, and below this one before its corners are sharpened
-WORTH, WORTH_SHARPENING = 1.05, 1.04
+from joulepath.optimizer.solve.methods.method import above
+from joulepath.optimizer.solve.methods.refined_work import refine_work
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
 
-def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> bool:
-    """Find motions as the module says; `explore` solves the candidates that are left open. False if
-    none was found.
+def explore_least_work(state: SearchState, explore: Callable[[], object]) -> bool:
+    """Find motions of least work through coarse motions; `explore` then solves the open candidates.
 
-    Does nothing with another objective, a free duration, constraints along the path, or a tight
-    bound, for which every candidate is solved; nor with little time, as the first motion comes
-    late.
+    It does nothing for another objective, a free duration, constraints along the path, a tight
+    bound (for which every candidate is solved), or little time, since the first motion comes late.
+
+    Args:
+        state: state of the search.
+        explore: solves all candidates that are open.
+
+    Returns:
+        Whether a motion was found.
     """
-    asked = incumbent.problem
-    if incumbent.deadline.left < LEAST_TIME or not incumbent.prepared.kernel.compiled:
+    asked = state.problem
+    if state.deadline.left < LEAST_WORK.least_time or not state.prepared.kernel.compiled:
         return False
-    families = families_of(incumbent)
+    families = families_of(state)
     fixed = asked.duration_max is not None and asked.duration_min == asked.duration_max
-    free = incumbent.prepared.path is None and not asked.passes and asked.tool_path is None
+    free = state.prepared.path is None and not asked.passes and asked.tool_path is None
     if not (families and fixed and free) or any(
         each.attempt for family in families for each in family
     ):
         return False
-    work = _LeastWork(
-        incumbent, families, RoughWork(incumbent.prepared, float(asked.duration_max or 0.0))
-    )
+    solver = CoarseSolver(state.prepared, float(asked.duration_max or 0.0))
+    search = _LeastWorkSearch(state, families, solver)
     waiting = [each for family in families for each in family[1:]]
     try:
-        with watch(incumbent.deadline):
-            work.search()
+        with watch(state.deadline):
+            search.run()
     except DeadlinePassed:
-        incumbent.cut_short = True
-    if incumbent.best() is None:
+        state.cut_short = True
+    if state.best() is None:
         return False
     left = [each for each in waiting if each.status is CandidateStatus.UNVISITED]
-    behind = work.not_promising()
+    behind = search.not_promising()
     for each in [*left, *behind]:
         each.deferred = True
     explore()
-    # neither proves that they need more than the answer
-    leave(incumbent, behind, Reason.ROUGHLY)
-    leave(incumbent, left)
+    # neither reason is a proof
+    settle_waiting(state, behind, Reason.ROUGHLY)
+    settle_waiting(state, left)
     return True
 
 
-@dataclass(frozen=True)
-class _Effort:
-    """`restarts`: random guesses of the best candidate at most, in batches of `at_once`; one that
-    does not help is the last. `sharpened`: how many of all motions get sharp corners, if they need
-    at most `near` times the least before."""
-
-    restarts: int
-    at_once: int
-    sharpened: int
-    near: float
-
-
-# The motion of least work often is a wide swing. Some percent of the guesses lead to it, and on few
-# control points it does not stand out. Rough motions within some percent do not tell which needs
-# the least once its corners are sharp. Where there are several candidates, finding the best of them
-# has taken time already
-SOLE, SEVERAL = _Effort(32, 32, 4, 1.03), _Effort(32, 8, 1, 1.0)
-
-
 @dataclass(eq=False)
-class _LeastWork:
-    """The search. `rough` are the motions of least work that are known of its candidates by their
-    ids, `tried` the candidates that were solved, `behind` those that turned out to need more than
-    another one on the way."""
+class _LeastWorkSearch:
+    """Search for least work over the candidates of families."""
 
-    incumbent: Incumbent
+    state: SearchState
     families: list[list[Candidate]]
-    work: RoughWork
-    rough: dict[int, Rough] = field(default_factory=dict)
-    tried: set[int] = field(default_factory=set)
-    behind: set[int] = field(default_factory=set)
+    solver: CoarseSolver
+    coarse: dict[Candidate, CoarseMotion] = field(default_factory=dict)
+    """Coarse motion of least work of each candidate."""
+    tried: set[Candidate] = field(default_factory=set)
+    """Candidates that were solved."""
+    behind: set[Candidate] = field(default_factory=set)
+    """Candidates given up because they come to need more than another candidate."""
 
-    def search(self) -> None:
-        """Find rough motions, solve the best, then those that promise less."""
+    def run(self) -> None:
+        """Find coarse motions, solve the best, then those that promise less."""
         self._screen()
-        if not self.rough:
+        if not self.coarse:
             return
-        least = min(each.work for each in self.rough.values())
-        contenders = [each for each in self._known() if each.work <= CONTENDING * least][
-            :CONTENDERS
-        ]
-        contenders = self._note(
-            self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND)
-        )
-        effort = SOLE if len(contenders) == 1 else SEVERAL
-        again = self._restarted(contenders[0], effort)
-        self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)), effort)
+        most = LEAST_WORK.contender_ratio * min(each.work for each in self.coarse.values())
+        contenders = [each for each in self._by_work() if each.work <= most]
+        contenders = self._solve_in_middle_space(contenders[: LEAST_WORK.most_contenders])
+        settings = LEAST_WORK.sole if len(contenders) == 1 else LEAST_WORK.several
+        found = [*contenders, *self._restarted(contenders[0], settings)]
+        self._follow(self._without_collision(sorted(found, key=lambda each: each.work)), settings)
         self._solve_promising()
 
-    def _restarted(self, best: Rough, effort: _Effort) -> list[Rough]:
-        """Motions from random guesses of the best candidate, batch by batch as long as they
-        help."""
-        guesses, found, least = (
-            self.work.random(best.candidate, effort.restarts),
-            list[Rough](),
-            best.work,
-        )
-        for k in range(0, len(guesses), effort.at_once):
-            coarse = self.work.solved(
-                guesses[k : k + effort.at_once], COARSE, WIDTH, RESTART_PROGRESS, BEHIND
+    def _restarted(self, best: CoarseMotion, settings: RestartSettings) -> list[CoarseMotion]:
+        """Motions from random guesses of the best candidate, in batches as long as they improve."""
+        guesses = self.solver.random(best.candidate, settings.restarts)
+        found, least = list[CoarseMotion](), best.work
+        for k in range(0, len(guesses), settings.batch):
+            batch = self._solve(
+                guesses[k : k + settings.batch], COARSE.control_points, LEAST_WORK.restart_progress
             )
-            worth = [each for each in coarse if each.work <= HOPELESS * least]
-            middle = self._note(self.work.solved(worth, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
+            middle = self._solve_in_middle_space(
+                [each for each in batch if each.work <= LEAST_WORK.restart_ratio * least]
+            )
             found += middle
             before, least = least, min([least, *(each.work for each in middle)])
-            if least > HELPFUL * before:
+            if least > LEAST_WORK.improvement_ratio * before:
                 break
         return found
 
+    def _solve(
+        self, guesses: Sequence[CoarseMotion], count: int, progress: float
+    ) -> list[CoarseMotion]:
+        """Coarse motions from guesses on `count` control points."""
+        return self.solver.solved(
+            guesses, count, SMOOTHING.power_width, progress, LEAST_WORK.behind_ratio
+        )
+
+    def _solve_in_middle_space(self, guesses: Sequence[CoarseMotion]) -> list[CoarseMotion]:
+        """Coarse motions from guesses on more control points, which candidates keep."""
+        count, progress = SHARPENING.middle_points, LEAST_WORK.middle_progress
+        return self._keep(self._solve(guesses, count, progress))
+
     def _screen(self) -> None:
-        """Rough motions of one member of each family, then of the best families' others."""
+        """Find coarse motions of one member of each family, then of the best families' others."""
         firsts = sorted((family[0] for family in self.families), key=lambda each: each.lower_bound)
-        for k in range(0, len(firsts), AT_ONCE):
-            self._find(firsts[k : k + AT_ONCE])
+        for k in range(0, len(firsts), LEAST_WORK.batch):
+            self._find(firsts[k : k + LEAST_WORK.batch])
         works = [self._work_of(family[0]) for family in self.families]
-        near = [
-            k for k in np.argsort(works, kind="stable").tolist() if works[k] <= NEAR * min(works)
-        ]
-        self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]])
+        most = FAMILIES.energy_ratio * min(works)
+        near = [k for k in np.argsort(works, kind="stable").tolist() if works[k] <= most]
+        best = [self.families[k] for k in near[: FAMILIES.families]]
+        self._find([each for family in best for each in family[1 : FAMILIES.members]])
 
     def _find(self, candidates: Sequence[Candidate]) -> None:
-        """Find rough motions of those candidates whose bounds do not rule them out."""
-        least = min((each.work for each in self.rough.values()), default=np.inf)
-        open_ = [each for each in candidates if each.lower_bound < least]
-        self._note(self.work.solved(self.work.first(open_), COARSE, WIDTH, COARSE_PROGRESS, BEHIND))
+        """Find coarse motions of the candidates whose bounds do not rule them out."""
+        least = min((each.work for each in self.coarse.values()), default=np.inf)
+        guesses = self.solver.first([each for each in candidates if each.lower_bound < least])
+        self._keep(self._solve(guesses, COARSE.control_points, LEAST_WORK.coarse_progress))
 
-    def _note(self, found: list[Rough]) -> list[Rough]:
-        """Keep the motions of least work of each candidate; returns what was found."""
+    def _keep(self, found: list[CoarseMotion]) -> list[CoarseMotion]:
+        """Keep the motion of least work of each candidate; returns the argument."""
         for each in best_of_each(found):
             if each.work < self._work_of(each.candidate):
-                self.rough[id(each.candidate)] = each
+                self.coarse[each.candidate] = each
         return found
 
     def _work_of(self, candidate: Candidate) -> float:
-        known = self.rough.get(id(candidate))
+        known = self.coarse.get(candidate)
         return np.inf if known is None else known.work
 
-    def _known(self) -> list[Rough]:
-        """The rough motions that are known, that of least work first."""
-        return sorted(self.rough.values(), key=lambda each: each.work)
+    def _by_work(self) -> list[CoarseMotion]:
+        """The coarse motions of candidates, the motion of least work first."""
+        return sorted(self.coarse.values(), key=lambda each: each.work)
 
-    def _clear(self, found: list[Rough]) -> list[Rough]:
-        """Of motions in order of work, the first that does not collide, and others near it that do
-        not, either.
-        """
-        clear: list[Rough] = []
+    def _without_collision(self, found: list[CoarseMotion]) -> list[CoarseMotion]:
+        """The first motions without collision among motions in order of work."""
+        clear: list[CoarseMotion] = []
         for each in found:
-            if clear and (each.work > NEAR_BEST * clear[0].work or len(clear) == RIVALS):
+            if clear and (
+                each.work > LEAST_WORK.follow_ratio * clear[0].work
+                or len(clear) == LEAST_WORK.most_followed
+            ):
                 break
-            if not any(each.is_like(other) for other in clear) and self._is_clear(each):
+            if not any(each.is_equal(other) for other in clear) and self._may_sharpen(each):
                 clear.append(each)
         return clear
 
-    def _is_clear(self, rough: Rough) -> bool:
-        """Whether corners may be sharpened from a motion: it does not collide, and its time is not
-        too short.
-        """
-        roomy = self.work.duration >= LEAST_FREEDOM * rough.candidate.shortest
-        return (
-            roomy
-            and self.incumbent.prepared.surroundings.worst_violation(
-                rough.spline(self.work.duration)
-            )
-            is None
-        )
+    def _may_sharpen(self, motion: CoarseMotion) -> bool:
+        """Whether a motion does not collide and is not nearly the fastest."""
+        if self.solver.duration < SHARPENING.fast_ratio * motion.candidate.shortest:
+            return False
+        spline = motion.spline(self.solver.duration)
+        return self.state.prepared.surroundings.worst_violation(spline) is None
 
-    def _follow(self, clear: list[Rough], effort: _Effort) -> None:
+    def _follow(self, motions: list[CoarseMotion], settings: RestartSettings) -> None:
         """Follow motions to sharp corners, the best first."""
-        made, least = 0, np.inf
-        for each in clear:
-            if made == effort.sharpened or each.work > effort.near * least:
-                self.behind.add(id(each.candidate))
+        count, least = 0, np.inf
+        for each in motions:
+            if count == settings.sharpened or each.work > settings.ratio * least:
+                self.behind.add(each.candidate)
                 continue
-            made += 1
+            count += 1
             if self._sharpen(each):
-                # if there is none, there may be one with rounder corners
+                # without sharp corners, another motion may still get them
                 least = min(least, each.work)
         self.behind -= self.tried
 
-    def _sharpen(self, rough: Rough) -> bool:
-        """Follow a motion to sharp corners, unless it is left behind on the way; whether one was
-        found.
-        """
-        result = self._sharpened(rough)
+    def _sharpen(self, motion: CoarseMotion) -> bool:
+        """Follow a motion to sharp corners, unless it falls behind; whether it succeeds."""
+        result = self._sharpened(motion)
         if result.spline is not None:
-            self.tried.add(id(rough.candidate))
+            self.tried.add(motion.candidate)
         elif result.status is SolveStatus.PRUNED:
-            self.behind.add(id(rough.candidate))
+            self.behind.add(motion.candidate)
         return result.spline is not None
 
-    def _sharpened(self, rough: Rough) -> SolveResult:
-        """A candidate's solve with sharp corners, from a rough motion; by the SQP, if it collides
-        or fails.
-        """
-        incumbent, found = self.incumbent, list[Array]()
+    def _sharpened(self, motion: CoarseMotion) -> SolveResult:
+        """A candidate's solve with sharp corners; by the SQP if the motion collides or fails."""
+        state, found = self.state, list[Array]()
 
         def sharpen() -> SolveResult:
-            points, first = rough.on(DENSE), FIRST_WIDTH
-            result, points = sharp_motion(
-                incumbent.prepared, points, self.work.duration, first, self._least_known
+            result, points = refine_work(
+                state.prepared,
+                motion.on(SHARPENING.dense_points),
+                self.solver.duration,
+                LEAST_WORK.first_width,
+                self._least_energy,
             )
             found.append(points)
             return result
 
-        result = in_time(incumbent, sharpen)
+        result = in_time(state, sharpen)
         if result.spline is None and result.status is not SolveStatus.PRUNED and found:
-            return self._solved(rough, found[0], SHARPER_WIDTHS[-1], LAST_PROGRESS)
+            width, progress = SMOOTHING.sharper_power_widths[-1], SHARPENING.last_progress
+            return self._solved(motion, found[0], width, progress)
         if result.spline is not None:
-            incumbent.accept_if_better(
-                rough.candidate, result, incumbent.prepared.energy(result.spline)
-            )
-            incumbent.tell_tried(rough.candidate)
+            energy = state.prepared.energy(result.spline)
+            state.accept_if_better(motion.candidate, result, energy)
+            state.tell_tried(motion.candidate)
         return result
 
     def _solve_promising(self) -> None:
-        """Solve the candidates whose rough motions promise less than what is known, the most
-        promising first.
-        """
-        for rough in self._known():
-            candidate, known = rough.candidate, self._least_known
-            if self._is_settled(candidate) or PROMISE * rough.work >= known:
+        """Solve candidates whose coarse motions promise less than the best energy."""
+        for motion in self._by_work():
+            candidate, least = motion.candidate, self._least_energy
+            if self._is_settled(candidate) or LEAST_WORK.promise * motion.work >= least:
                 continue
-            if np.isfinite(known) and self._is_clear(rough):
-                self._sharpen(rough)
+            if np.isfinite(least) and self._may_sharpen(motion):
+                self._sharpen(motion)
             if not self._is_settled(candidate):
-                self.tried.add(id(candidate))
-                result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))
-                if result.spline is not None and (candidate.energy or np.inf) < above(
-                    known, WORTH_SHARPENING
-                ):
-                    follow_in_time(self.incumbent, candidate, known)
+                self.tried.add(candidate)
+                points = motion.on(SHARPENING.middle_points)
+                below = above(least, LEAST_WORK.colliding_ratio)
+                result = self._solved(
+                    motion, points, SMOOTHING.power_width, SHARPENING.progress, below
+                )
+                worth = above(least, LEAST_WORK.sharpening_ratio)
+                if result.spline is not None and (candidate.energy or np.inf) < worth:
+                    follow_in_time(self.state, candidate, least)
 
     def _is_settled(self, candidate: Candidate) -> bool:
-        """Whether a candidate was solved, or given up as it seems to need more than another one."""
-        return id(candidate) in self.tried | self.behind
+        """Whether a candidate was solved, or given up because it seems to need more."""
+        return candidate in self.tried or candidate in self.behind
 
     @property
-    def _least_known(self) -> float:
-        """Energy [J] of the best motion, inf without one."""
-        best = self.incumbent.best()
+    def _least_energy(self) -> float:
+        """Energy of the best motion [J]; inf without one."""
+        best = self.state.best()
         return np.inf if best is None or best.energy is None else best.energy
 
     def _solved(
-        self, rough: Rough, points: Array, width: float, progress: float, below: float = np.inf
+        self,
+        motion: CoarseMotion,
+        points: Array,
+        width: float,
+        progress: float,
+        below: float = np.inf,
     ) -> SolveResult:
-        """A candidate's solve from control points (n, nq) [rad], which it keeps; from nothing if
-        that fails while no motion is known, or time is so short that knots must be at the switches
-        of jerk."""
-        incumbent, candidate = self.incumbent, rough.candidate
-        interval = duration_intervals(incumbent.prepared, candidate.q_goal, width=width)[0]
-        solver = solver_of(incumbent, candidate, interval)
-        assert isinstance(solver, FreeSpline)
-        solver.best_known = below
-        result = SolveResult(
-            SolveStatus.FAILED, "time is too short for evenly spaced control points"
-        )
-        if self.work.duration >= TIGHT * candidate.shortest or len(points) == DENSE:
+        """A candidate's solve, which it keeps.
+
+        If it fails and no motion is known, or if time is so short that knots must be at the
+        switches of jerk, the candidate is solved from nothing.
+
+        Args:
+            motion: coarse motion of the candidate.
+            points: control points to start from, shape (n, nq) [rad].
+            width: width of the smoothed corners [W].
+            progress: relative decrease of the cost promised by a further step at least.
+            below: cost that the motion must come below [J].
+        """
+        state, candidate = self.state, motion.candidate
+        is_dense = len(points) == SHARPENING.dense_points
+        interval = duration_intervals(state.prepared, candidate.q_goal, width=width)[0]
+        solver = solver_of(state, candidate, interval, below)
+        result = SolveResult(SolveStatus.FAILED, SolveReason.TOO_SHORT_FOR_EVEN_KNOTS)
+        if is_dense or self.solver.duration >= SPLINE_SPACES.tight * candidate.shortest:
+            space, duration = bspline.uniform(len(points)), self.solver.duration
             result = in_time(
-                incumbent, partial(solver.solve_points, points, self.work.duration, progress)
+                state,
+                partial(solver.solve_control_points, space, points, duration, progress),
             )
-        if result.status is SolveStatus.FAILED and len(points) != DENSE:
-            result = in_time(incumbent, solver.solve)
-        incumbent.cut_short |= result.cut_short
+        if result.status is SolveStatus.FAILED and not is_dense:
+            result = in_time(state, solver.solve)
+        state.cut_short |= result.cut_short
         if result.spline is not None:
-            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
-        elif len(points) != DENSE and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED):
+            state.accept_if_better(candidate, result, state.prepared.energy(result.spline))
+        elif not is_dense and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED):
             candidate.attempt = result
-            candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
+            candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.message)
         if candidate.status is not CandidateStatus.UNVISITED:
-            incumbent.tell_tried(candidate)
+            state.tell_tried(candidate)
         return result
 
     def not_promising(self) -> list[Candidate]:
-        """The candidates that are left whose rough motions do not promise less than what is
-        known."""
-        known = self._least_known
+        """The open candidates whose coarse motions do not promise less than the best energy."""
+        least = self._least_energy
         return [
             each.candidate
-            for each in self._known()
+            for each in self._by_work()
             if each.candidate.status is CandidateStatus.UNVISITED
-            and (id(each.candidate) in self.behind or PROMISE * each.work >= known)
+            and (each.candidate in self.behind or LEAST_WORK.promise * each.work >= least)
         ]

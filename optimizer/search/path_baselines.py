@@ -1,6 +1,4 @@
-"""The baseline along a tool path: an even speed on the way, with ramps of a third of the duration
-each.
-"""
+"""Baseline along a tool path: even speed with ramps of a third of the duration each."""
 
 from __future__ import annotations
 
@@ -11,23 +9,22 @@ import numpy as np
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import SampledMotion, even_speed
 from joulepath.optimizer.result.solution import Baseline
-from joulepath.optimizer.search.baselines import compared
+from joulepath.optimizer.search.baselines import compared, standing
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search.state import SearchState
 
 
-def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
-    """The `trapezoid` along the path of the best candidate's joints, in its duration."""
+def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
+    """The `trapezoid` along the joint path of the best candidate, in its duration."""
     prepared, problem, path = (
-        incumbent.prepared,
-        incumbent.problem,
-        incumbent.prepared.joint_path(best.q_start),
+        state.prepared,
+        state.problem,
+        state.prepared.followed.joint_path(best.q_start),
     )
     assert path is not None and best.energy is not None
     motion = along(path, even_speed(best.duration))
     tau = prepared.torques(motion.q, motion.v, motion.a)
-    still = np.zeros_like(best.q_goal)[None]
-    held = prepared.torques(best.q_goal[None], still, still)[0]
+    held = standing(problem.arm, best.q_goal, prepared.torques)
     (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
     return [
         compared(problem, "trapezoid", motion, tau, held, best.energy, prepared.potential, broken)
@@ -35,7 +32,7 @@ def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
 
 
 def along(path: Spline, law: SampledMotion) -> SampledMotion:
-    """The motion along a path over [0, 1] whose fraction of the way is that of `law`, of one
+    """The motion along a path over [0, 1] with the fraction of the path given by `law`, one
     coordinate.
     """
     s, rate, acceleration = law.q[:, 0], law.v, law.a

@@ -1,16 +1,19 @@
-"""The candidates along a tool path: one for each configuration of its first pose from which the arm
-can follow it.
-"""
+"""Candidates along a tool path: one for each start configuration from which the arm follows it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.bounds.free_ends_bound import bound_between_free_ends, reversed_problem
+from joulepath.optimizer.bounds.free_goal_bound import bound_of_free_goals
+from joulepath.optimizer.bounds.missed_branches import bound_of_missed_branches
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     traces,
@@ -22,29 +25,33 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target
-from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import Candidate, Reason, bound, pairs
-from joulepath.optimizer.search.ends import EndConfiguration, ends, ends_of, label_of
+from joulepath.optimizer.search.candidates import Candidate, bound, pairs
+from joulepath.optimizer.search.ends import ends, ends_of, label_of
 from joulepath.optimizer.search.errors import PathAttempt, PathInfeasible
-from joulepath.optimizer.search.free_ends_bound import backwards, bound_between
-from joulepath.optimizer.search.free_goal_bound import family_bound_of
-from joulepath.optimizer.search.missed_branches import bound_of_others
 
-# rad: where a path leads, and joint positions that are given for its end
-SAME = 1e-6
-# samples of a start whose orientation is free, of any rotation: of one about an axis a quarter of
-# them
-ANGLES = 48
+
+@dataclass(frozen=True)
+class PathEndSettings:
+    """Settings of the ends of tool paths."""
+
+    equal_distance: float = 1e-6
+    """Displacement [rad] below which the end of a path is at given joint positions."""
+    orientations: int = 48
+    """Number of orientations sampled of a free start; a quarter of it about a single axis."""
+
+
+PATH_ENDS = PathEndSettings()
 
 
 def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     """A candidate for each start configuration from which the arm follows the tool path to its end.
 
-    Raises PathInfeasible with how far each one gets; the errors of `ends`.
+    Raises:
+        PathInfeasible: no configuration follows the path to its end.
     """
     course, limits = prepared.course, prepared.arm.active_limits
     assert course is not None
-    starts, _ = ends_of(prepared, "start", prepared.problem.start, ANGLES)
+    starts, _ = ends_of(prepared, "start", prepared.problem.start, PATH_ENDS.orientations)
     found, attempts = list[Candidate](), list[PathAttempt]()
     for start, trace in zip(starts, _traces(prepared, starts), strict=True):
         choices = _choices(start, trace, prepared.problem.goal)
@@ -57,7 +64,7 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
             candidate = _candidate(prepared, start, whole)
             if candidate is not None:
                 found.append(candidate)
-                prepared.traces[whole.q[0].tobytes()] = whole
+                prepared.followed.keep(whole)
                 continue
         attempts.append(attempt_of(limits, start, trace))
     if not found:
@@ -66,14 +73,14 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
 
 
 def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> list[Trace]:
-    """The tool path as it is followed from each start.
+    """The traces of the tool path from each start configuration.
 
-    From a free start the tool turns evenly; where no angle of a branch leads to the end so, as it
-    must from one.
+    From a free start the tool turns evenly. For a branch without an angle from which an even turn
+    reaches the end, a course of turning is computed from one angle.
     """
     course, arm = prepared.course, prepared.arm
     assert course is not None
-    known = [prepared.traces.get(each.q.tobytes()) for each in starts]
+    known = [prepared.followed.known_trace(each.q) for each in starts]
     found = [each for each in known if each is not None]
     if len(found) < len(starts):
         found = traces(arm, course, np.array([each.q for each in starts]))
@@ -92,22 +99,29 @@ def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> li
 def bound_beside(
     prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline, enough: float
 ) -> float:
-    """Lower bound [J] on motions along the tool path to which none of the `followed` candidates
-    leads.
+    """Lower bound on motions along the tool path between other ends than those of candidates [J].
 
-    A path may come so near to a singularity that a motion within its tolerance goes on in another
-    branch than the one that was followed; and of a self-motion at its start only samples were
-    followed. So this is the bound of all motions between the first pose and the last one, in any
-    other configurations; and where an end leaves a rotation free, of all of them: that of these
-    ends once it reaches `enough` [J].
+    A path may come so near to a singularity that a motion within its tolerance continues in another
+    branch than the followed one, and of a self-motion at the start only samples were followed. So
+    the bound covers all motions between the first and the last pose in other configurations. If an
+    end leaves a rotation free, it covers all configurations of both ends.
+
+    Args:
+        prepared: problem of the motions.
+        followed: candidates along the path.
+        deadline: instant at which the search for the bound ends.
+        enough: sufficient bound for ends with a free rotation [J].
     """
     start, goal = prepared.problem.start, prepared.problem.goal
     if isinstance(start, ConeOrientedPose) and isinstance(goal, ConeOrientedPose):
         known = prepared.freed(start=followed[0].q_start)
-        return bound_between(PreparedProblem.of(known), start, goal, deadline, enough)
+        return bound_between_free_ends(PreparedProblem.of(known), start, goal, deadline, enough)
     if isinstance(start, ConeOrientedPose):
         return _bound_to_free(
-            backwards(prepared.freed(goal, start), goal, start), followed[0].start, deadline, enough
+            reversed_problem(prepared.freed(goal, start), goal, start),
+            followed[0].start,
+            deadline,
+            enough,
         )
     problem = prepared.freed()
     if isinstance(goal, ConeOrientedPose):
@@ -121,28 +135,27 @@ def bound_beside(
         for each in candidates
         if not each.sampled and not _is_among(each, followed)
     )
-    return min([bound_of_others(free, candidates, deadline), *others])
+    return min([bound_of_missed_branches(free, candidates, deadline), *others])
 
 
 def _bound_to_free(
     problem: Problem, goal: EndConfiguration, deadline: Deadline, enough: float
 ) -> float:
-    """Lower bound [J] on motions to any configuration of a goal that is free in part, of which one
-    is given.
-    """
+    """Lower bound [J] on motions to any configuration of a partly free goal, from one of them."""
     prepared = PreparedProblem.of(problem)
     anywhere = [Candidate(start, goal, start.q, goal.q) for start in ends(prepared, "start")[0]]
     return min(
-        family_bound_of(prepared, anywhere, deadline, enough),
-        bound_of_others(prepared, anywhere, deadline),
+        bound_of_free_goals(prepared, anywhere, deadline, enough),
+        bound_of_missed_branches(prepared, anywhere, deadline),
     )
 
 
 def _is_among(pair: Candidate, followed: Sequence[Candidate]) -> bool:
-    """Whether a pair of ends is one of those that were followed, but for common full turns."""
+    """Whether a pair has the ends of a followed candidate, but for common full turns."""
     return any(
-        np.abs(wrapped(pair.q_start - each.q_start)).max() < SAME
-        and np.abs((pair.q_goal - pair.q_start) - (each.q_goal - each.q_start)).max() < SAME
+        np.abs(wrapped(pair.q_start - each.q_start)).max() < PATH_ENDS.equal_distance
+        and np.abs((pair.q_goal - pair.q_start) - (each.q_goal - each.q_start)).max()
+        < PATH_ENDS.equal_distance
         for each in followed
     )
 
@@ -150,12 +163,10 @@ def _is_among(pair: Candidate, followed: Sequence[Candidate]) -> bool:
 def _candidate(
     prepared: PreparedProblem, start: EndConfiguration, trace: Trace
 ) -> Candidate | None:
-    """The candidate of a whole trace; None if it leads to other joint positions than those given
-    for the goal.
-    """
+    """The candidate of a whole trace; None if it leads to other joint positions than the goal's."""
     q_start, q_goal, given = trace.q[0], trace.q[-1], prepared.problem.goal
     if isinstance(given, np.ndarray):
-        if np.abs(q_goal - given).max() > SAME:
+        if np.abs(q_goal - given).max() > PATH_ENDS.equal_distance:
             return None
         q_goal = given
     goal = EndConfiguration(
@@ -168,27 +179,24 @@ def _candidate(
     )
     candidate = Candidate(start, goal, q_start, q_goal)
     if start.tolerance is not None:
-        candidate.deferred = True
-        candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+        candidate.defer()
     return candidate
 
 
 def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[float]]:
-    """The positions of each joint at the start: those from which it comes to the given one of the
-    goal, if any does.
-    """
+    """Positions of each joint at the start that lead to a given goal; all if none does."""
     if not isinstance(goal, np.ndarray):
         return start.choices
     needed = goal - (trace.q[-1] - trace.q[0])
     reaching = [
-        [x for x in each if abs(x - q) < SAME]
+        [x for x in each if abs(x - q) < PATH_ENDS.equal_distance]
         for each, q in zip(start.choices, needed, strict=True)
     ]
     return [some or each for some, each in zip(reaching, start.choices, strict=True)]
 
 
 def attempt_of(limits: Limits, start: EndConfiguration, trace: Trace) -> PathAttempt:
-    """How far a path is followed from a configuration within `limits`, and what stops it."""
+    """How far a path is followed from a configuration, and the reason why it ends."""
     shift = _least_turns(trace, start.choices)
     outside = ((trace.q + shift < limits.q_min) | (trace.q + shift > limits.q_max)).any(axis=1)
     if outside.any():
@@ -198,5 +206,5 @@ def attempt_of(limits: Limits, start: EndConfiguration, trace: Trace) -> PathAtt
 
 
 def _least_turns(trace: Trace, choices: Sequence[Sequence[float]]) -> Array:
-    """Full turns (nq,) [rad] to the choice of each joint at the start that is nearest to zero."""
+    """Full turns (nq,) [rad] to the choice of each joint at the start nearest to zero."""
     return np.asarray([min(each, key=abs) for each in choices] - trace.q[0])

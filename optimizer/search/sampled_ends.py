@@ -1,83 +1,102 @@
-"""Targets that infinitely many configurations reach: which samples are solved, and configurations
-between samples.
+"""Samples of targets that infinitely many configurations reach, and configurations between samples.
 
-Such a target is a pose whose orientation is free in part, or a pose that an arm holds on a
-self-motion. Its samples are ordered by lower bound, and those of least bound are solved.
+Such a target is a pose of partly free orientation, or a pose that the arm holds on a self-motion.
+Samples of least lower bound are solved.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import Candidate, Reason, bound
-from joulepath.optimizer.search.ends import SIDES, EndConfiguration, label_of
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.search.candidates import Candidate, bound
+from joulepath.optimizer.search.ends import SIDES, label_of
+from joulepath.optimizer.solve.methods.method import above
 
-# samples solved before any is refined: in all, and of one pair of branches
-BATCH, ALIKE = 12, 2
-# solved samples that are refined, each of a kind of its own: so many, of at most this ratio of the
-# least energy
-MOST_REFINED, WORTH_REFINING = 4, 1.3
-# configurations that differ by less are the same [rad]
-SAME = 1e-6
+
+@dataclass(frozen=True)
+class SampleSettings:
+    """Settings of the choice of samples."""
+
+    batch: int = 12
+    """Number of samples solved before any is refined."""
+    per_branch_pair: int = 2
+    """Largest number of samples of one pair of branches in a batch."""
+    most_refined: int = 4
+    """Largest number of solved samples refined, each of another kind."""
+    refined_ratio: float = 1.3
+    """Largest ratio of the energy of a refined sample to the least energy."""
+    equal_distance: float = 1e-6
+    """Displacement [rad] below which configurations are equal."""
+
+
+SAMPLES = SampleSettings()
 
 
 def activate_deferred(
-    candidates: Sequence[Candidate], batch: int = BATCH, most_alike: int = ALIKE
+    candidates: Sequence[Candidate],
+    batch: int = SAMPLES.batch,
+    per_branch_pair: int = SAMPLES.per_branch_pair,
 ) -> bool:
-    """Activate the deferred samples of least lower bound; false if there are none.
+    """Activate the deferred samples of least lower bound.
 
-    At most `batch` of them, so that at most `most_alike` of a pair of branches are active then,
-    unless all are.
+    Args:
+        candidates: candidates of the search.
+        batch: largest number of samples activated.
+        per_branch_pair: largest number of active samples of one pair of branches. Below the
+            default, samples that are active already count too.
+
+    Returns:
+        Whether any sample was deferred.
     """
-    alike: Counter[tuple[str, str, int]] = Counter()
-    if most_alike < ALIKE:
-        alike.update(_kind(each) for each in candidates if not each.deferred)
-    opened = 0
+    active: Counter[tuple[str, str, int]] = Counter()
+    if per_branch_pair < SAMPLES.per_branch_pair:
+        active.update(_branch_pair(each) for each in candidates if not each.deferred)
+    activated = 0
     for candidate in sorted(
-        (e for e in candidates if e.deferred), key=lambda e: (e.lower_bound, e.shortest)
+        (each for each in candidates if each.deferred),
+        key=lambda each: (each.lower_bound, each.shortest),
     ):
-        if (
-            candidate.status is not CandidateStatus.UNVISITED
-            or alike[_kind(candidate)] >= most_alike
-        ):
+        branch_pair = _branch_pair(candidate)
+        is_open = candidate.status is CandidateStatus.UNVISITED
+        if not is_open or active[branch_pair] >= per_branch_pair:
             continue
-        alike[_kind(candidate)] += 1
-        candidate.deferred = False
-        candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
-        opened += 1
-        if opened == batch:
+        active[branch_pair] += 1
+        candidate.activate()
+        activated += 1
+        if activated == batch:
             break
-    return opened > 0
+    return activated > 0
 
 
 def fastest_samples(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The deferred samples of least proven duration: at most BATCH, and at most ALIKE of a pair of
-    branches.
-    """
-    alike, chosen = Counter[tuple[str, str, int]](), list[Candidate]()
+    """The deferred samples of least proven duration: a batch, few of each pair of branches."""
+    counts, chosen = Counter[tuple[str, str, int]](), list[Candidate]()
     for candidate in sorted(
-        (e for e in candidates if e.deferred and e.holdable), key=lambda e: e.shortest
+        (each for each in candidates if each.deferred and each.holdable),
+        key=lambda each: each.shortest,
     ):
-        alike[_kind(candidate)] += 1
-        if alike[_kind(candidate)] <= ALIKE and len(chosen) < BATCH:
+        branch_pair = _branch_pair(candidate)
+        counts[branch_pair] += 1
+        if counts[branch_pair] <= SAMPLES.per_branch_pair and len(chosen) < SAMPLES.batch:
             chosen.append(candidate)
     return chosen
 
 
-def _kind(candidate: Candidate) -> tuple[str, str, int]:
-    """The pair of branches that a candidate is of, and its target."""
+def _branch_pair(candidate: Candidate) -> tuple[str, str, int]:
+    """Branches at the start and the goal of a candidate, and its target."""
     return candidate.start.label, candidate.goal.label, candidate.goal.target
 
 
@@ -88,23 +107,33 @@ def between(
     q_goal: Array,
     among: Sequence[Candidate] | None = None,
 ) -> Candidate:
-    """The candidate (of `among`, default all) between two configurations (nq,) [rad], else the
-    nearest one.
+    """The candidate between two configurations, or else the nearest candidate.
 
-    If it is missing only because an end is not among the samples of its target, it is added to
-    `candidates`.
+    If the candidate is missing only because an end is not among the samples of its target, it is
+    appended to `candidates`.
+
+    Args:
+        prepared: problem of the motions.
+        candidates: candidates of the search.
+        q_start: start configuration, shape (nq,) [rad].
+        q_goal: goal configuration, shape (nq,) [rad].
+        among: candidates considered; by default all.
     """
     known = candidates if among is None else among
-    nearest = min(known, key=lambda e: _distance(e.q_start, q_start) + _distance(e.q_goal, q_goal))
-    if _distance(nearest.q_start, q_start) + _distance(nearest.q_goal, q_goal) < SAME:
+
+    def distance(candidate: Candidate) -> float:
+        return _distance(candidate.q_start, q_start) + _distance(candidate.q_goal, q_goal)
+
+    nearest = min(known, key=distance)
+    if distance(nearest) < SAMPLES.equal_distance:
         return nearest
-    kinds: dict[tuple[int, int, int], Candidate] = {}
+    curves: dict[tuple[SelfMotion | None, SelfMotion | None, int], Candidate] = {}
     for each in known:
-        same_start = each.start.sampled or _distance(each.q_start, q_start) < SAME
-        same_goal = each.goal.sampled or _distance(each.q_goal, q_goal) < SAME
-        if same_start and same_goal:
-            kinds[id(each.start.self_motion), id(each.goal.self_motion), each.goal.target] = each
-    for candidate in kinds.values():
+        has_start = each.start.sampled or _is_equal(each.q_start, q_start)
+        has_goal = each.goal.sampled or _is_equal(each.q_goal, q_goal)
+        if has_start and has_goal:
+            curves[each.start.self_motion, each.goal.self_motion, each.goal.target] = each
+    for candidate in curves.values():
         if _reaches(prepared, candidate.start, q_start) and _reaches(
             prepared, candidate.goal, q_goal
         ):
@@ -120,28 +149,37 @@ def refine_best(
     kind: Callable[[Candidate], Hashable],
     refine: Callable[[Candidate], Candidate],
 ) -> list[Candidate]:
-    """The candidates that `refine` makes of the best sample of each kind, at most MOST_REFINED of
-    them, if its energy is not far above that of the best of all.
+    """Refined candidates of the best sample of each kind, if they differ from the sample.
 
-    `solved` are solved samples. A sample that `refine` returns unchanged is left out.
+    Args:
+        solved: solved samples.
+        kind: kind of a sample.
+        refine: the refinement, which returns the sample itself if it does not improve.
     """
     chosen: dict[Hashable, Candidate] = {}
     least = min((each.energy or 0.0 for each in solved), default=0.0)
-    most = above(least, WORTH_REFINING)
+    most = above(least, SAMPLES.refined_ratio)
     for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
         if (candidate.energy or 0.0) <= most:
             chosen.setdefault(kind(candidate), candidate)
-    refined = [(candidate, refine(candidate)) for candidate in list(chosen.values())[:MOST_REFINED]]
+    best = list(chosen.values())[: SAMPLES.most_refined]
+    refined = [(candidate, refine(candidate)) for candidate in best]
     return [better for candidate, better in refined if better is not candidate]
 
 
 def with_ends(
     prepared: PreparedProblem, candidate: Candidate, q_start: Array, q_goal: Array
 ) -> Candidate | None:
-    """The candidate between other configurations (nq,) of its targets, with its bounds; None if
-    that is infeasible.
+    """The candidate between other configurations of its targets, with its bounds; None if
+    infeasible.
 
-    An end that is no sample stays where it is.
+    An end that is no sample does not move.
+
+    Args:
+        prepared: problem of the motions.
+        candidate: candidate for the same targets.
+        q_start: start configuration, shape (nq,) [rad].
+        q_goal: goal configuration, shape (nq,) [rad].
     """
     start, goal = (
         moved_end(prepared, candidate.start, q_start),
@@ -159,8 +197,13 @@ def with_ends(
 def nearest_configuration(
     prepared: PreparedProblem, end: EndConfiguration, q: Array
 ) -> Array | None:
-    """The configuration (nq,) of a sampled end's target that is nearest to q (nq,), if any is
-    within the limits.
+    """The nearest configuration of a sampled end's target to q; None if it is outside of the
+    limits.
+
+    Args:
+        prepared: problem of the motions.
+        end: end configuration that is a sample.
+        q: configuration, shape (nq,) [rad].
     """
     arm = prepared.problem.arm
     if end.self_motion is None:
@@ -181,15 +224,15 @@ def on_branch(prepared: PreparedProblem, q: Array) -> bool:
 
 
 def _reaches(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> bool:
-    """Whether the end's target is reached at q (nq,); true of an end that is no sample."""
+    """Whether q (nq,) [rad] reaches the target of an end; true for an end that is no sample."""
     if not end.sampled:
         return True
     nearest = nearest_configuration(prepared, end, q)
-    return nearest is not None and _distance(nearest, q) < SAME
+    return nearest is not None and _is_equal(nearest, q)
 
 
 def moved_end(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> EndConfiguration:
-    """The end at another configuration (nq,) of its target."""
+    """The end at another configuration (nq,) [rad] of its target."""
     if not end.sampled:
         return end
     label = label_of(prepared.problem.arm.robot, q) if end.self_motion is None else end.label
@@ -198,3 +241,7 @@ def moved_end(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> End
 
 def _distance(a: Array, b: Array) -> float:
     return float(np.abs(a - b).max())
+
+
+def _is_equal(a: Array, b: Array) -> bool:
+    return _distance(a, b) < SAMPLES.equal_distance

@@ -1,74 +1,95 @@
-"""Which samples of self-motions are solved: those from which the ends may slide to motions of least
-energy.
+"""Choice of samples of self-motions as seeds, from which the ends slide to motions of least energy.
 
-The energy of every pair is estimated from the rest-to-rest quintic on the straight line, of a few
-durations. Where the estimate is least along the self-motions, a motion begins. An estimate is some
-tenth too high; for pairs of one problem it is so by nearly the same ratio.
+The energy of every pair is estimated from the rest-to-rest quintic on the straight line, for a few
+durations. Pairs of locally least estimate along the self-motions are seeds. An estimate is about a
+tenth too high, by nearly the same ratio for all pairs of a problem.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.dynamics.dwell import brake_power, waits
+from joulepath.optimizer.dynamics.dwell import brake_power, holding_times
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.search.candidates import Candidate, Reason
-from joulepath.optimizer.search.ends import EndConfiguration
-from joulepath.optimizer.solve.methods.sqp_method import above
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.solve.methods.method import above
 
-# durations of the quintic, in multiples of the shortest one, and the panels and points of its
-# quadrature
-TIME_SCALES, PANELS, POINTS = (1.15, 1.5, 2.2), 4, 3
-# the same of a rough estimate
-ROUGH_SCALE, ROUGH_PANELS = 1.3, 2
-# pairs whose energies are estimated: those of least lower bound
-MOST_ESTIMATED = 384
-# seeds need at most this ratio of the least estimate, and so many of them are solved at a time
-NEAR, MOST_SEEDS = 1.12, 4
-# of mechanical work, the best motions do but a part of what the straight line does, and some a much
-# smaller one
-NEAR_IN_WORK, MOST_SEEDS_FOR_WORK = 2.5, 12
+
+@dataclass(frozen=True)
+class EstimateSettings:
+    """Settings of estimates of the energy."""
+
+    time_scales: tuple[float, ...] = (1.15, 1.5, 2.2)
+    """Durations of the quintic, in multiples of the shortest duration."""
+    panels: int = 4
+    """Panels of the quadrature."""
+    points: int = 3
+    """Points of the quadrature in a panel."""
+
+
+@dataclass(frozen=True)
+class SeedSettings:
+    """Settings of the choice of seeds."""
+
+    most_estimated: int = 384
+    """Largest number of pairs whose energy is estimated, in order of their lower bounds."""
+    ratio: float = 1.12
+    """Largest ratio of a seed's estimate to the least estimate."""
+    count: int = 4
+    """Largest number of seeds solved at a time."""
+    work_ratio: float = 2.5
+    """`ratio` for mechanical work: the best motions do far less work than the straight line."""
+    work_count: int = 12
+    """`count` for mechanical work."""
+
+
+ESTIMATE = EstimateSettings()
+ROUGH_ESTIMATE = EstimateSettings(time_scales=(1.3,), panels=2)
+SEEDS = SeedSettings()
 
 
 def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> bool:
-    """Activate the deferred candidates where the estimated energy is least; false if none is
-    deferred.
+    """Activate the deferred candidates of locally least estimated energy.
+
+    Returns:
+        Whether any candidate was deferred.
     """
     known = [
         each for each in candidates if each.deferred and each.status is CandidateStatus.UNVISITED
     ]
     if not known:
         return False
-    if len(known) > MOST_ESTIMATED:
-        # many bounds may be the same: zero, where the way down pays for everything. The others keep
-        # their order, in which neighbours are next to each other
+    if len(known) > SEEDS.most_estimated:
+        # many bounds may be zero, if the fall pays for everything: then durations decide. The
+        # chosen pairs keep their order, in which neighbours on a curve are next to each other
         by_bound = np.lexsort(
             ([each.shortest for each in known], [each.lower_bound for each in known])
         )
-        known = [known[k] for k in np.sort(by_bound[:MOST_ESTIMATED]).tolist()]
+        known = [known[k] for k in np.sort(by_bound[: SEEDS.most_estimated]).tolist()]
     energy = estimates(prepared, known)
-    least = _least(known, energy)
-    order = [k for k in np.argsort(energy, kind="stable").tolist() if least[k]]
-    near, count = how_near(prepared.problem)
-    most = above(float(energy[order[0]]), near)
+    is_least = _local_minima(known, energy)
+    order = [k for k in np.argsort(energy, kind="stable").tolist() if is_least[k]]
+    ratio, count = seed_limits(prepared.problem)
+    most = above(float(energy[order[0]]), ratio)
     chosen = [k for k in order if energy[k] <= most][:count]
     for k in chosen:
-        known[k].deferred = False
-        known[k].settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+        known[k].activate()
     return True
 
 
 def estimates(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
-    """Objectives (n,) [J] of quintics between the ends of candidates: see `estimates_between`."""
+    """Estimated objectives of candidates, shape (n,) [J]; see `estimates_between`."""
     q_start, q_goal = (
         np.array([getattr(each, name) for each in candidates]) for name in ("q_start", "q_goal")
     )
@@ -78,47 +99,52 @@ def estimates(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Arr
 
 
 def expected(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
-    """Objectives (n,) [J] that are expected of candidates: half-way from the lower bound to the
-    estimate.
-    """
+    """Expected objectives of candidates, shape (n,) [J]: the mean of lower bound and estimate."""
     return (estimates(prepared, candidates) + [each.lower_bound for each in candidates]) / 2
 
 
 def estimates_between(
     prepared: PreparedProblem, q_start: Array, q_goal: Array, shortest: Array, rough: bool = False
 ) -> Array:
-    """Objectives (n,) [J] of quintics on straight lines between configurations (n, nq) [rad], of
-    the best of a few durations by the `shortest` ones (n,) [s], raised where a torque is too high;
-    `rough`: of one duration, and half the instants."""
-    (at, rate, acceleration), weights = _quintic(ROUGH_PANELS if rough else PANELS)
-    way, count = (q_goal - q_start)[:, None], len(q_start)
-    best, q = np.full(count, np.inf), q_start[:, None] + way * at
-    for durations in _durations(
-        prepared.problem, shortest, (ROUGH_SCALE,) if rough else TIME_SCALES
-    ):
+    """Objectives of quintics on straight lines between configurations, shape (n,) [J].
+
+    Of a few durations the best counts. Where a torque is too high, the objective is raised.
+
+    Args:
+        prepared: problem of the motions.
+        q_start: start configurations, shape (n, nq) [rad].
+        q_goal: goal configurations, shape (n, nq) [rad].
+        shortest: shortest durations, shape (n,) [s].
+        rough: whether a single duration and half the instants suffice.
+    """
+    settings = ROUGH_ESTIMATE if rough else ESTIMATE
+    (at, rate, acceleration), weights = _quintic(settings)
+    displacement, count = (q_goal - q_start)[:, None], len(q_start)
+    best, q = np.full(count, np.inf), q_start[:, None] + displacement * at
+    tau_max = prepared.arm.active_limits.tau_max
+    for durations in _durations(prepared.problem, shortest, settings.time_scales):
         T = durations[:, None, None]
-        y = np.concatenate([q, way * rate / T, way * acceleration / T**2], axis=2)
+        y = np.concatenate([q, displacement * rate / T, displacement * acceleration / T**2], axis=2)
         cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
-        beyond = (
-            np.abs(tau / prepared.arm.active_limits.tau_max)
-            .max(axis=1)
-            .reshape(count, -1)
-            .max(axis=1)
-        )
+        torque_ratio = np.abs(tau / tau_max).max(axis=1).reshape(count, -1).max(axis=1)
         energy = durations * (cost.reshape(count, -1) @ weights)
-        energy += np.abs(energy) * np.maximum(beyond - 1, 0.0)
+        energy += np.abs(energy) * np.maximum(torque_ratio - 1, 0.0)
         best = np.minimum(best, energy + _waiting(prepared, q_goal, durations))
     return best
 
 
 def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Array:
-    """Energies (n,) [J] of waiting at goals (n, nq) [rad] until the cycle ends, after motions of
-    durations (n,) [s].
+    """Energies of waiting at goals until the cycle ends, shape (n,) [J].
+
+    Args:
+        prepared: problem of the motions.
+        q_goal: goal configurations, shape (n, nq) [rad].
+        durations: durations of the motions, shape (n,) [s].
     """
     problem = prepared.problem
     if problem.dwell is None or _is_work(problem):
         return np.zeros(len(durations))
-    by_motors, by_brakes = np.array([waits(problem.dwell, T) for T in durations.tolist()]).T
+    by_motors, by_brakes = np.array([holding_times(problem.dwell, T) for T in durations.tolist()]).T
     return np.asarray(
         prepared.holding_power(q_goal) * by_motors
         + brake_power(problem.dwell, prepared.arm) * by_brakes
@@ -126,10 +152,18 @@ def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Arra
 
 
 def _durations(problem: Problem, shortest: Array, scales: Sequence[float]) -> list[Array]:
-    """The durations (n,) [s] that are tried, at these multiples of the shortest ones, within those
-    that are allowed; for work and in a cycle the longest one, too."""
-    least = LEAST_DURATION if problem.duration_min is None else problem.duration_min
-    most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    """Durations for which energies are estimated, each of shape (n,) [s], within the allowed
+    interval.
+
+    For mechanical work and with a dwell, the longest duration is among them.
+
+    Args:
+        problem: the problem.
+        shortest: shortest durations, shape (n,) [s].
+        scales: multiples of the shortest durations.
+    """
+    least = DURATIONS.least if problem.duration_min is None else problem.duration_min
+    most = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     if problem.dwell is not None:
         most = min(most, problem.dwell.time)
     if least == most:
@@ -142,9 +176,11 @@ def _durations(problem: Problem, shortest: Array, scales: Sequence[float]) -> li
     )
 
 
-def how_near(problem: Problem) -> tuple[float, int]:
-    """At most this ratio of the least estimate do seeds need, and so many are solved at a time."""
-    return (NEAR_IN_WORK, MOST_SEEDS_FOR_WORK) if _is_work(problem) else (NEAR, MOST_SEEDS)
+def seed_limits(problem: Problem) -> tuple[float, int]:
+    """Largest ratio of a seed's estimate to the least, and number of seeds solved at a time."""
+    if _is_work(problem):
+        return SEEDS.work_ratio, SEEDS.work_count
+    return SEEDS.ratio, SEEDS.count
 
 
 def _is_work(problem: Problem) -> bool:
@@ -152,36 +188,29 @@ def _is_work(problem: Problem) -> bool:
 
 
 @cache
-def _quintic(panels: int) -> tuple[Array, Array]:
-    """Fraction of the way and its first two derivatives by the fraction of time (3, k, 1), and
-    weights (k,).
-    """
-    x, weights = quadrature(np.linspace(0.0, 1.0, panels + 1), POINTS)
+def _quintic(settings: EstimateSettings) -> tuple[Array, Array]:
+    """The quintic s(x) and its first two derivatives (3, k, 1), and quadrature weights (k,)."""
+    x, weights = quadrature(np.linspace(0.0, 1.0, settings.panels + 1), settings.points)
     return quintic.derivatives(x)[:, :, None], weights
 
 
-def _least(candidates: Sequence[Candidate], energy: Array) -> Mask:
-    """Which candidates (n,) need no more than their neighbours: the next samples of the same
-    self-motions.
+def _local_minima(candidates: Sequence[Candidate], energy: Array) -> Mask:
+    """Whether a candidate (n,) needs no more energy than its neighbours.
+
+    Neighbours are the next samples of the same self-motions.
     """
-    starts, goals = (
-        {id(getattr(each, name)): getattr(each, name) for each in candidates}
-        for name in ("start", "goal")
-    )
-    row, column = ({key: k for k, key in enumerate(ends)} for ends in (starts, goals))
+    starts = list(dict.fromkeys(each.start for each in candidates))
+    goals = list(dict.fromkeys(each.goal for each in candidates))
+    row, column = ({end: k for k, end in enumerate(ends)} for ends in (starts, goals))
     table = np.full((len(starts), len(goals)), np.inf)
-    places = np.array([(row[id(each.start)], column[id(each.goal)]) for each in candidates])
-    table[tuple(places.T)] = energy
-    least = (
-        _least_along(table, list(starts.values())) & _least_along(table.T, list(goals.values())).T
-    )
-    return np.asarray(least[tuple(places.T)])
+    cells = np.array([(row[each.start], column[each.goal]) for each in candidates])
+    table[tuple(cells.T)] = energy
+    is_least = _local_minima_along(table, starts) & _local_minima_along(table.T, goals).T
+    return np.asarray(is_least[tuple(cells.T)])
 
 
-def _least_along(table: Array, ends: Sequence[EndConfiguration]) -> Mask:
-    """Where a table of energies (n, m) is least among neighbours along its first axis, which are
-    samples `ends`.
-    """
+def _local_minima_along(table: Array, ends: Sequence[EndConfiguration]) -> Mask:
+    """Local minima of a table of energies (n, m) along its first axis, the samples `ends` (n,)."""
     least = np.ones(table.shape, dtype=bool)
     same = np.array(
         [a.self_motion is b.self_motion is not None for a, b in pairwise(ends)], dtype=bool

@@ -1,10 +1,9 @@
-"""Poses that the arm holds on a self-motion: how the best of their samples are refined where ends
-do not slide.
+"""Refinement of the best samples on self-motions, for ends that do not slide.
 
 The posture at the goal of a singular arm is an unknown of the program, as in `free_goal`. At the
-start, and for methods that are not the free spline, the parameter of the self-motion moves in steps
-while the energy decreases; each step is solved as a candidate of its own, and the steps are halved
-until they tell nothing.
+start, and for methods other than the free spline, the parameter of the self-motion moves in steps
+while the energy decreases. Each step is solved as a candidate of its own, and steps are halved
+until they no longer matter.
 """
 
 from __future__ import annotations
@@ -17,53 +16,53 @@ from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.attempts import settled, solve
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.ends import MEMBERS
+from joulepath.optimizer.search.ends import SAMPLING
 from joulepath.optimizer.search.free_goal import REFINED, refine_goal
-from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from joulepath.optimizer.search.sliding import slides
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.search.state import SearchState
 
-# first step of a parameter, half the way between two samples on a whole circle, and the least one
-# [rad]
-FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3
+FIRST_STEP = np.pi / SAMPLING.members
+"""First step of a parameter [rad]: half the distance of two samples on a whole circle."""
+LEAST_STEP = 2e-3
+"""Least step of a parameter [rad]."""
 
 
-def refine(incumbent: Incumbent) -> list[Candidate]:
+def refine(state: SearchState) -> list[Candidate]:
     """New candidates, found by moving the best solved samples along their self-motions.
 
-    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of
-    less energy than their sample are returned.
+    One sample per pair of branches is refined. Only candidates of less energy than their sample are
+    returned.
     """
-    prepared = incumbent.prepared
+    prepared = state.prepared
     solved = [
-        e
-        for e in incumbent.candidates
-        if e.energy is not None and _sides(e) and not slides(prepared, e)
+        each
+        for each in state.candidates
+        if each.energy is not None and _sides(each) and not slides(prepared, each)
     ]
     return refine_best(
         solved,
         lambda each: (
-            id(each.start.self_motion),
-            id(each.goal.self_motion),
+            each.start.self_motion,
+            each.goal.self_motion,
             each.start.label,
             each.goal.label,
         ),
-        lambda each: _moved_along(incumbent, each),
+        lambda each: _moved_along(state, each),
     )
 
 
-def _moved_along(incumbent: Incumbent, candidate: Candidate) -> Candidate:
-    """The candidate with its ends moved along their self-motions; itself if that never helps."""
+def _moved_along(state: SearchState, candidate: Candidate) -> Candidate:
+    """The candidate with its ends moved along their self-motions; itself if no step is better."""
     sides = _sides(candidate)
-    if incumbent.method is FreeSpline and "goal" in sides:
-        candidate = refine_goal(incumbent, candidate)
+    if state.method.free_control_points and "goal" in sides:
+        candidate = refine_goal(state, candidate)
         sides.remove("goal")
-    return _descend(incumbent, candidate, sides)
+    return _descend(state, candidate, sides)
 
 
 def _sides(candidate: Candidate) -> list[Side]:
-    """The ends that a self-motion can move."""
+    """The ends on self-motions."""
     sides: list[Side] = []
     if candidate.start.self_motion is not None:
         sides.append("start")
@@ -72,14 +71,15 @@ def _sides(candidate: Candidate) -> list[Side]:
     return sides
 
 
-def _descend(incumbent: Incumbent, candidate: Candidate, sides: Sequence[Side]) -> Candidate:
-    """The candidate of least energy found along the self-motions of these ends; itself if no step
-    is better.
+def _descend(state: SearchState, candidate: Candidate, sides: Sequence[Side]) -> Candidate:
+    """The candidate of least energy found along the self-motions of some ends, by a pattern search.
+
+    It is the candidate itself if no step is better.
     """
     best, step = candidate, float(FIRST_STEP)
-    while sides and step > LEAST_STEP and not incumbent.deadline.passed:
+    while sides and step > LEAST_STEP and not state.deadline.passed:
         steps = [(side, sign * step) for side in sides for sign in (1, -1)]
-        tried = (_moved(incumbent, best, side, by) for side, by in steps)
+        tried = (_moved(state, best, side, by) for side, by in steps)
         better = next(
             (
                 each
@@ -95,11 +95,11 @@ def _descend(incumbent: Incumbent, candidate: Candidate, sides: Sequence[Side]) 
     return best
 
 
-def _moved(incumbent: Incumbent, candidate: Candidate, side: Side, step: float) -> Candidate | None:
-    """The candidate with one end moved by `step` [rad] along its self-motion, solved; None if it
-    has no motion.
+def _moved(state: SearchState, candidate: Candidate, side: Side, step: float) -> Candidate | None:
+    """The candidate with one end moved by a step [rad] along its self-motion, solved; None if it
+    fails.
     """
-    if incumbent.deadline.passed:
+    if state.deadline.passed:
         return None
     ends = {
         "start": (candidate.start, candidate.q_start),
@@ -109,11 +109,11 @@ def _moved(incumbent: Incumbent, candidate: Candidate, side: Side, step: float) 
     motion = end.self_motion
     assert motion is not None
     member = motion.at(np.array([motion.clipped(motion.parameter(q) + step)]))[0]
-    near = nearest_configuration(incumbent.prepared, end, nearest_turn(member, q))
+    near = nearest_configuration(state.prepared, end, nearest_turn(member, q))
     if near is None or (near == q).all():
         return None
     moved = {"start": candidate.q_start, "goal": candidate.q_goal, side: near}
-    fresh = with_ends(incumbent.prepared, candidate, moved["start"], moved["goal"])
+    fresh = with_ends(state.prepared, candidate, moved["start"], moved["goal"])
     if fresh is None or fresh.lower_bound >= (candidate.energy or 0.0):
         return None
-    return settled(incumbent, fresh, solve(incumbent, fresh), REFINED)
+    return settled(state, fresh, solve(state, fresh), REFINED)

@@ -1,15 +1,16 @@
-"""Motions of least energy where every joint's power has a corner of its own: restarts, finer
-motions, sharper corners.
+"""Refinement of motions whose cost has a corner in every joint's power.
 
 The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j,
-0). The NLP smooths these corners over `WIDTH`. Every joint has one, so that the optimum of the
-smoothed cost lies some percent above the least energy. Sharp corners from the start would leave the
-SQP in poor local optima. So the optimum is followed from one width to the next, in a space fine
-enough for the short pushes of such motions.
+0). The NLP smooths these corners over `SMOOTHING.power_width`. Because every joint has one, the
+optimum of the smoothed cost lies some percent above the least energy. Sharp corners from the start
+would leave the SQP in poor local optima. So the optimum is followed from one width to the next, in
+a space fine enough for the short pushes of such motions. On an isolated bus, it is followed back to
+the first width in between: sharp corners hold a motion in an optimum that smooth corners lead out
+of.
 
 The mechanical work of a motion has many local optima. As rest costs nothing, the best of them
-swing, push and rest, which few control points hardly show. Coarse solves from random motions are
-cheap; the best of them are followed.
+swing, push and rest, which few control points hardly represent. Coarse solves from random motions
+are cheap; the best of them are followed.
 """
 
 from __future__ import annotations
@@ -21,90 +22,159 @@ from functools import partial
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH, has_corners
+from joulepath.optimizer.dynamics.plant import SMOOTHING, has_corners
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.search.attempts import in_time, solver_of
+from joulepath.optimizer.search.attempts import in_time, solve_from, solver_of
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.random_displacements import random_displacements
+from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import (
     DurationInterval,
     duration_intervals,
 )
 
-# random motions from which the coarse problem is solved, and how many of its solutions are solved
-# in the middle space
-RESTARTS, FOLLOWED = 8, 3
-# control points of the restarts, between them and the last motion, and of that
-FEW, MIDDLE, DENSE = 13, 24, 40
-# fixed durations, in multiples of the one found, in which the first motion on an isolated bus is
-# solved in the middle space, too: from one duration to the next, the optimum of a free one may be
-# in another basin, up to 1.7 % better
-AROUND = (0.93, 0.95, 0.97, 0.99, 1.0, 1.02)
-# relative decrease of the cost that a further step must promise, and in the last solve
-PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
-# first solves are rough and coarse: those that need at most this ratio of the least energy are
-# solved in the middle space, and so many of them
-CONTENDING, CONTENDERS = 1.35, 6
-# then other candidates are followed if they need at most this ratio of the least energy, and so
-# many of them; they are given up once they need more than the last ratio of what the best one
-# needed at the same width
-NEAR, RIVALS, BEHIND = 1.03, 2, 1.005
-# share by which a motion needs more before its corners are as sharp as they become
-ROUNDER = 1.015
-# a motion shorter than this ratio of the shortest duration switches at its limits: even spacing
-# cannot represent it, and there is next to nothing to gain
-LEAST_FREEDOM = 1.03
+
+@dataclass(frozen=True)
+class CornerStep:
+    """Settings of one solve that follows a motion."""
+
+    width: float
+    """Width of the smoothed corners [W]."""
+    progress: float
+    """Relative decrease of the cost promised by a further step at least."""
 
 
-def sharpen(incumbent: Incumbent, best: Candidate) -> None:
-    """Follow the best candidate, and those that need little more, to motions of sharp corners,
-    while time is left.
+@dataclass(frozen=True)
+class SharpeningSettings:
+    """Settings of the refinement of motions with corners."""
 
-    Does nothing if the objective has no corner per joint, or if the method has no evenly spaced
-    control points.
+    restarts: int = 8
+    """Number of random motions from which the coarse problem is solved."""
+    followed: int = 3
+    """Number of coarse motions solved in the middle space."""
+    coarse_points: int = 13
+    """Number of control points of coarse motions."""
+    middle_points: int = 24
+    """Number of control points of the middle space."""
+    dense_points: int = 40
+    """Number of control points of the last motion."""
+    duration_ratios: tuple[float, ...] = (0.93, 0.95, 0.97, 0.99, 1.0, 1.02)
+    """Fixed durations, in multiples of the one found, for which a motion on an isolated bus is
+    solved in the middle space too.
+
+    The optimum of a free duration may be in another basin than those of near durations, up to 1.7 %
+    better.
     """
-    problem = incumbent.problem
-    if not incumbent.method.evenly_spaced or not has_corners(problem.objective, problem.arm):
+    progress: float = 1e-3
+    """Relative decrease of the cost promised by a further step at least."""
+    last_progress: float = 2e-4
+    """Relative decrease of the cost promised by a further step of the last solves at least."""
+    coarse_ratio: float = 1.35
+    """Largest ratio of a first motion's energy to the least if it is solved in the middle space."""
+    most_coarse: int = 6
+    """Largest number of first motions solved in the middle space."""
+    rival_ratio: float = 1.03
+    """Largest ratio of a candidate's energy to the least if it is followed beside the best."""
+    most_rivals: int = 2
+    """Largest number of candidates followed beside the best."""
+    behind_ratio: float = 1.005
+    """Ratio to the best motion's energy at the same width above which a rival is given up."""
+    rounder_ratio: float = 1.015
+    """Ratio of a motion's energy before its corners are as sharp as possible to its last energy."""
+    fast_ratio: float = 1.03
+    """Ratio of the duration to the shortest below which a motion switches at its limits.
+
+    Evenly spaced knots cannot represent it, and sharper corners gain next to nothing. Knots at the
+    switches gain up to 0.3 %.
+    """
+
+    @property
+    def steps(self) -> tuple[CornerStep, ...]:
+        """Solves that follow a motion of least mechanical work."""
+        return (
+            CornerStep(SMOOTHING.sharper_power_widths[0], self.progress),
+            CornerStep(SMOOTHING.sharper_power_widths[1], self.last_progress),
+        )
+
+    @property
+    def isolated_steps(self) -> tuple[CornerStep, ...]:
+        """Solves that follow a motion on an isolated bus.
+
+        With corners that only become sharper, two of 20 motions ended 0.5 and 0.6 % too high.
+        """
+        return (
+            CornerStep(SMOOTHING.sharper_power_widths[0], self.progress),
+            CornerStep(SMOOTHING.power_width, self.last_progress),
+            CornerStep(SMOOTHING.sharper_power_widths[0], self.last_progress),
+        )
+
+
+SHARPENING = SharpeningSettings()
+
+
+def sharpen(state: SearchState, best: Candidate) -> None:
+    """Follow the best candidate, and candidates of little more energy, to motions of sharp corners.
+
+    Without corners in the objective, or without evenly spaced control points in the method, it does
+    nothing.
+    """
+    problem = state.problem
+    if not state.method.evenly_spaced or not has_corners(problem.objective, problem.arm):
         return
-    shortest = float(shortest_duration(best.q_goal - best.q_start, problem.arm.active_limits))
-    if best.spline.duration < LEAST_FREEDOM * shortest:
+    if _is_nearly_fastest(state, best):
         return
-    if len(best.spline.control_points) == DENSE and problem.objective == "mechanical":
-        # its corners are sharp
+    if (
+        len(best.spline.control_points) == SHARPENING.dense_points
+        and problem.objective == "mechanical"
+    ):
+        # its corners are sharp already
         return
-    coarse = {id(each): each.spline for each in _near(incumbent, best, CONTENDING)[:CONTENDERS]}
-    for rough in _near(incumbent, best, CONTENDING)[:CONTENDERS]:
-        _Follower(incumbent, rough).solved(rough.spline, WIDTH, MIDDLE, PROGRESS)
-    best = incumbent.best() or best
-    rivals = _near(incumbent, best, NEAR)[1 : RIVALS + 1]
-    follower, mechanical = _Follower(incumbent, best), problem.objective == "mechanical"
+    contenders = _near(state, best, SHARPENING.coarse_ratio)[: SHARPENING.most_coarse]
+    coarse = {each: each.spline for each in contenders}
+    for contender in contenders:
+        _Follower(state, contender).solve_in_middle_space()
+    best = state.best() or best
+    rivals = _near(state, best, SHARPENING.rival_ratio)[1 : SHARPENING.most_rivals + 1]
+    follower, mechanical = _Follower(state, best), problem.objective == "mechanical"
     if not mechanical:
-        follower.solve_around(coarse.get(id(best), best.spline))
-    ahead = follower.follow(restarts=RESTARTS if mechanical else 0)
+        follower.solve_around(coarse.get(best, best.spline))
+    ahead = follower.follow(restarts=SHARPENING.restarts if mechanical else 0)
     for rival in rivals:
-        _Follower(incumbent, rival).follow(restarts=0, ahead=ahead)
+        _Follower(state, rival).follow(restarts=0, ahead=ahead)
+    best = state.best() or best
+    if not mechanical and _is_nearly_fastest(state, best) and not state.deadline.passed:
+        solve_from(state, best, sampled(best.spline), fine=True)
 
 
-def follow_in_time(incumbent: Incumbent, candidate: Candidate, best: float) -> None:
-    """Follow a solved candidate to sharp corners, unless it turns out to need more than `best` [J];
-    inf if none is known."""
-    follower = _Follower(incumbent, candidate)
-    if len(candidate.spline.control_points) != MIDDLE:
-        follower.solved(candidate.spline, WIDTH, MIDDLE, PROGRESS)
-    # with rounder corners it needs more
-    follower.follow(
-        restarts=0, ahead=[ROUNDER * best] * (len(SHARPER_WIDTHS) - 1) if np.isfinite(best) else []
-    )
+def _is_nearly_fastest(state: SearchState, candidate: Candidate) -> bool:
+    """Whether the motion of a candidate is so fast that it switches at its limits."""
+    displacement = candidate.q_goal - candidate.q_start
+    shortest = shortest_duration(displacement, state.problem.arm.active_limits)
+    return candidate.spline.duration < SHARPENING.fast_ratio * float(shortest)
 
 
-def _near(incumbent: Incumbent, best: Candidate, ratio: float) -> list[Candidate]:
-    """The candidates with a motion of at most this ratio of the best one's energy, which comes
-    first.
+def follow_in_time(state: SearchState, candidate: Candidate, best: float) -> None:
+    """Follow a candidate to sharp corners, unless it comes to need more than an energy.
+
+    Args:
+        state: state of the search.
+        candidate: solved candidate.
+        best: least known energy [J]; inf if none is known.
     """
-    solved = [each for each in incumbent.candidates if each.energy is not None]
+    follower, ahead = _Follower(state, candidate), list[float]()
+    if len(candidate.spline.control_points) != SHARPENING.middle_points:
+        follower.solve_in_middle_space()
+    if np.isfinite(best):
+        # with rounder corners it needs more
+        ahead = [SHARPENING.rounder_ratio * best] * (len(SHARPENING.steps) - 1)
+    follower.follow(restarts=0, ahead=ahead)
+
+
+def _near(state: SearchState, best: Candidate, ratio: float) -> list[Candidate]:
+    """Candidates with a motion of at most a ratio of the best energy, the best first."""
+    solved = [each for each in state.candidates if each.energy is not None]
     most = ratio * (best.energy or 0.0)
     return sorted(
         (each for each in solved if each is best or (each.energy or 0.0) <= most), key=_energy_of
@@ -117,59 +187,86 @@ def _energy_of(candidate: Candidate) -> float:
 
 @dataclass(frozen=True)
 class _Follower:
-    """Solves one candidate again. Motions that need less energy become the candidate's own."""
+    """Solves one candidate again; motions of less energy become the candidate's own."""
 
-    incumbent: Incumbent
+    state: SearchState
     candidate: Candidate
 
     def follow(self, restarts: int, ahead: Sequence[float] = ()) -> list[float]:
-        """Solve with sharper and sharper corners, from the candidate's motion or from the best of
-        random ones.
+        """Solve with corners of one width after the other.
 
-        Returns the energies [J] at each width, inf without a motion. Ends early if one is far above
-        that of `ahead`.
+        It starts from the candidate's motion or the best of motions from random starts.
+
+        Args:
+            restarts: number of random starts.
+            ahead: energies of another candidate at the widths [J]; if one is far below, the
+                candidate is given up.
+
+        Returns:
+            Energies at the widths [J], inf without a motion.
         """
-        cost_of = self.incumbent.prepared.cost_of
-        coarse = sorted(self._restarted(restarts), key=cost_of)[:FOLLOWED]
-        middle = [self.solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in coarse]
+        cost_of = self.state.prepared.cost_of
+        coarse = sorted(self._restarted(restarts), key=cost_of)[: SHARPENING.followed]
+        middle = [
+            self.solved(
+                motion, SMOOTHING.power_width, SHARPENING.middle_points, SHARPENING.progress
+            )
+            for motion in coarse
+        ]
         best: Spline | None = min(
             [self.candidate.spline, *(each for each in middle if each is not None)], key=cost_of
         )
         energies: list[float] = []
-        for width in SHARPER_WIDTHS:
-            progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
-            best = None if best is None else self.solved(best, width, DENSE, progress)
+        is_mechanical = self.state.problem.objective == "mechanical"
+        for k, step in enumerate(SHARPENING.steps if is_mechanical else SHARPENING.isolated_steps):
+            if best is not None:
+                best = self.solved(best, step.width, SHARPENING.dense_points, step.progress)
             energies.append(cost_of(best))
-            if len(ahead) >= len(energies) and energies[-1] > BEHIND * ahead[len(energies) - 1]:
+            if k < len(ahead) and energies[k] > SHARPENING.behind_ratio * ahead[k]:
                 break
         return energies
 
+    def solve_in_middle_space(self) -> None:
+        """Solve from the candidate's motion in the middle space, with wide corners."""
+        motion = self.candidate.spline
+        self.solved(motion, SMOOTHING.power_width, SHARPENING.middle_points, SHARPENING.progress)
+
     def solve_around(self, coarse: Spline) -> None:
-        """Solve from a coarse motion in fixed durations around that of the candidate's motion."""
+        """Solve from a coarse motion in fixed durations around the duration of the candidate's
+        motion.
+        """
         best = self.candidate.spline.duration
         interval = self._interval(best)
-        for duration in (share * best for share in AROUND):
+        for duration in (share * best for share in SHARPENING.duration_ratios):
             if interval.t_min < duration < interval.t_max:
                 q, t = sampled(lasting(coarse, duration))
-                self._from_samples(q, t, WIDTH, MIDDLE, PROGRESS, fixed=True)
+                count, progress = SHARPENING.middle_points, SHARPENING.progress
+                self._from_samples(q, t, SMOOTHING.power_width, count, progress, fixed=True)
 
     def _restarted(self, count: int) -> list[Spline]:
         """Coarse motions from random displacements of the rest-to-rest quintic."""
         q_start, q_goal = self.candidate.q_start, self.candidate.q_goal
-        limits = self.incumbent.problem.arm.active_limits
+        limits = self.state.problem.arm.active_limits
         line = quintic_spline(q_start, q_goal, self._interval(self.candidate.spline.duration).t_max)
         q, t = sampled(line)
         found = []
         for each in random_displacements(limits, line.duration, t / line.duration, count):
             guess = np.clip(q + each, limits.q_min, limits.q_max)
-            motion = self._from_samples(guess, t, WIDTH, FEW, PROGRESS)
+            motion = self._from_samples(
+                guess, t, SMOOTHING.power_width, SHARPENING.coarse_points, SHARPENING.progress
+            )
             if motion is not None:
                 found.append(motion)
         return found
 
     def solved(self, spline: Spline, width: float, count: int, progress: float) -> Spline | None:
-        """The motion solved with corners of `width` [W] on `count` control points; None if there is
-        none in time.
+        """The motion solved from another one; None if there is none in time.
+
+        Args:
+            spline: motion to start from.
+            width: width of the smoothed corners [W].
+            count: number of control points.
+            progress: relative decrease of the cost promised by a further step at least.
         """
         interval = self._interval(spline.duration, width)
         duration = float(np.clip(spline.duration, interval.t_min, interval.t_max))
@@ -178,36 +275,41 @@ class _Follower:
     def _from_samples(
         self, q: Array, t: Array, width: float, count: int, progress: float, fixed: bool = False
     ) -> Spline | None:
-        """The motion solved from samples q (k, nq) [rad] at t (k,) [s]; None if there is none or no
-        time is left.
+        """The motion solved from samples; None if there is none or no time is left.
 
-        `fixed`: it keeps its duration.
+        Args:
+            q: samples, shape (k, nq) [rad].
+            t: their times, shape (k,) [s].
+            width: width of the smoothed corners [W].
+            count: number of control points.
+            progress: relative decrease of the cost promised by a further step at least.
+            fixed: whether the motion keeps its duration.
         """
-        incumbent, candidate = self.incumbent, self.candidate
-        if incumbent.deadline.passed:
+        state, candidate = self.state, self.candidate
+        if state.deadline.passed:
             return None
         interval = self._interval(float(t[-1]), width)
         if fixed:
             interval = replace(interval, t_min=float(t[-1]), t_max=float(t[-1]))
-        solver = solver_of(incumbent, candidate, interval)
-        solver.best_known = np.inf if candidate.energy is None else candidate.energy
-        result = in_time(incumbent, partial(solver.solve_evenly, q, t, count, progress))
+        known = np.inf if candidate.energy is None else candidate.energy
+        solver = solver_of(state, candidate, interval, known)
+        result = in_time(state, partial(solver.solve_evenly, q, t, count, progress))
         if result.spline is not None:
-            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
+            state.accept_if_better(candidate, result, state.prepared.energy(result.spline))
         return result.spline
 
-    def _interval(self, duration: float, width: float = WIDTH) -> DurationInterval:
-        """The interval of durations that holds `duration` [s]; the longest duration alone for
-        mechanical work.
+    def _interval(self, duration: float, width: float = SMOOTHING.power_width) -> DurationInterval:
+        """The interval of durations around a duration [s]; for mechanical work, the longest
+        duration.
 
-        Waiting needs no mechanical work: no duration needs less than the longest.
+        Rest needs no mechanical work: no duration needs less than the longest.
         """
-        intervals = duration_intervals(self.incumbent.prepared, self.candidate.q_goal, width=width)
+        intervals = duration_intervals(self.state.prepared, self.candidate.q_goal, width=width)
         interval = min(
             intervals, key=lambda each: max(each.t_min - duration, duration - each.t_max)
         )
         return (
             replace(interval, t_min=interval.t_max)
-            if self.incumbent.problem.objective == "mechanical"
+            if self.state.problem.objective == "mechanical"
             else interval
         )

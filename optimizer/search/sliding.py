@@ -1,10 +1,8 @@
-"""Ends of a redundant arm that slide along their self-motions while the motion between them is
-optimised.
-"""
+"""Ends of a redundant arm that slide along their self-motions during the optimisation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from operator import itemgetter
 
@@ -12,52 +10,61 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
+from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
+from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.ends import EndConfiguration
 from joulepath.optimizer.search.sampled_ends import with_ends
 from joulepath.optimizer.solve.methods import method_of
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
-# joints that a pose fixes
-FIXED = 6
-# a posture farther from a curve is not on it [rad]
-ON_CURVE = 1e-6
-SLID = "; refined along the self-motion that holds the pose"
+POSE_FREEDOMS = 6
+"""Degrees of freedom of a pose: number of joints that it fixes."""
+CURVE_TOLERANCE = 1e-6
+"""Displacement [rad] from a curve below which a posture is on the curve."""
 
 
 def slides(prepared: PreparedProblem, candidate: Candidate) -> bool:
-    """Whether an end of the candidate may slide: on a self-motion of an arm with one joint more
-    than a pose fixes.
+    """Whether an end of a candidate may slide along a self-motion.
+
+    The arm must have one joint more than a pose fixes, and the method free control points.
     """
-    able = prepared.arm.robot.nq == FIXED + 1 and method_of(prepared.problem) is FreeSpline
+    able = (
+        prepared.arm.robot.nq == POSE_FREEDOMS + 1
+        and method_of(prepared.problem).free_control_points
+    )
     return able and (
         candidate.start.self_motion is not None or candidate.goal.self_motion is not None
     )
 
 
-def released(prepared: PreparedProblem, candidate: Candidate, solver: Method) -> bool:
-    """Let the ends of a candidate slide while its solver runs, if they can; whether one does."""
-    if not isinstance(solver, FreeSpline) or not slides(prepared, candidate):
-        return False
-    if candidate.start.self_motion is not None:
-        solver.start_curve = HeldPose.of(prepared.arm, candidate.q_start)
-    if candidate.goal.self_motion is not None:
-        solver.goal_curve = HeldPose.of(prepared.arm, candidate.q_goal)
-    return True
+def with_sliding_ends(context: SolveContext, candidate: Candidate) -> SolveContext:
+    """The context of a solve with sliding ends; unchanged if none may slide."""
+    prepared = context.prepared
+    if not slides(prepared, candidate):
+        return context
+    start, goal = candidate.start.self_motion, candidate.goal.self_motion
+    return replace(
+        context,
+        start_curve=None if start is None else HeldPose.of(prepared.arm, candidate.q_start),
+        goal_curve=None if goal is None else HeldPose.of(prepared.arm, candidate.q_goal),
+    )
 
 
 def moved_to(
     prepared: PreparedProblem, candidates: Sequence[Candidate], candidate: Candidate, spline: Spline
 ) -> Candidate | None:
-    """The candidate with the ends of a motion, and its bounds; None if the problem does not allow
-    these ends.
+    """The candidate with the ends of a motion and its bounds; None if the problem forbids these
+    ends.
 
-    `candidates` are all of the problem: where curves meet, an end may go on along the next one.
+    Args:
+        prepared: problem of the motions.
+        candidates: all candidates; where curves meet, an end may continue along the next curve.
+        candidate: the candidate.
+        spline: the motion.
     """
     q_start, q_goal = spline.control_points[[0, -1]]
     start, goal = (
@@ -72,26 +79,26 @@ def moved_to(
 def _end(
     candidates: Sequence[Candidate], candidate: Candidate, side: Side, q: Array
 ) -> EndConfiguration | None:
-    """The end of the same target on whose self-motion q (nq,) is; None if it is on none that the
-    problem allows.
-    """
+    """The end of the same target whose self-motion holds q (nq,) [rad]; None if there is none."""
     own: EndConfiguration = getattr(candidate, side)
     if own.self_motion is None:
         return own
-    ends = {
-        id(end): end for each in candidates if (end := getattr(each, side)).target == own.target
-    }
-    nearest: dict[int, tuple[float, EndConfiguration]] = {}
-    for end in ends.values():
+    ends: Iterable[EndConfiguration] = dict.fromkeys(
+        end for each in candidates if (end := getattr(each, side)).target == own.target
+    )
+    nearest: dict[SelfMotion, tuple[float, EndConfiguration]] = {}
+    for end in ends:
         if end.self_motion is not None:
-            known, sample = id(end.self_motion), (float(np.abs(wrapped(end.q - q)).max()), end)
-            nearest[known] = min(nearest.get(known, sample), sample, key=itemgetter(0))
+            sample = float(np.abs(wrapped(end.q - q)).max()), end
+            known = nearest.get(end.self_motion, sample)
+            nearest[end.self_motion] = min(known, sample, key=itemgetter(0))
     for _, end in sorted(nearest.values(), key=itemgetter(0)):
         motion = end.self_motion
-        # on a joint's limit the member may be beyond it by rounding
+        # at a joint limit, rounding may take the member beyond it
         if (
             motion is not None
-            and np.abs(wrapped(motion.at(np.array([motion.parameter(q)]))[0] - q)).max() < ON_CURVE
+            and np.abs(wrapped(motion.at(np.array([motion.parameter(q)]))[0] - q)).max()
+            < CURVE_TOLERANCE
         ):
             return end
     return None

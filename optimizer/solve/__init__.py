@@ -1,1 +1,1 @@
-"""Solvers: the nonlinear programs, and the methods that pose them."""
+"""Nonlinear programs of motions, their solvers, and the methods that use them."""

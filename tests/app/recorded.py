@@ -36,7 +36,7 @@ from joulepath.app.main import create_app
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.settings import Settings
 from joulepath.optimizer.deadline import Stopped
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 from tests.app.live import COMPUTED, LOCAL, WARM_UP
 from tests.app.requests import HOME, NEAR, PATIENT
 
@@ -125,7 +125,7 @@ class RecordedWorker:
     def when_free(self, call: Callable[[], object]) -> None:
         call()
 
-    async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+    async def ask(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
         ended = await asyncio.to_thread(_ended, task, deadline)
         if isinstance(ended, TaskResult):
             return ended

@@ -132,10 +132,10 @@ def test_a_shortened_answer(server: Server, page: str, request_file: str) -> Non
     )
 
 
-def test_what_the_readme_says_of_mechanical_work(server: Server) -> None:
+def test_what_the_limitations_say_of_mechanical_work(server: Server) -> None:
     answer = answer_to(server, "optimize/mechanical_fixed_duration", {})
     counts = answer["candidate_counts"]
-    text = " ".join((ROOT / "README.md").read_text().split())
+    text = " ".join((ROOT / "docs/limitations.md").read_text().split())
     assert (
         f"{counts['infeasible']} of 256 take too long, bounds rule out {counts['pruned']}, one is "
         "solved" in text

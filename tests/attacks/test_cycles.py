@@ -20,8 +20,8 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.cycle.cycles_in_hand import simple_cycles
 from joulepath.optimizer.cycle.errors import CycleTooShort
+from joulepath.optimizer.cycle.feasible_cycles import simple_cycles
 from joulepath.optimizer.cycle.order_search import OrderSearch
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.dynamics.dwell import holding_power
@@ -144,7 +144,7 @@ def cheapest_known(asked: Cycle) -> Iterator[float]:
     search = Spied.made[-1]
     if nodes := search.least_through(search.solutions):
         timing = TimedSearch(search, asked.duration_max)
-        known = timing.as_it_is(nodes)
+        known = timing.with_known_motions(nodes)
         if known is not None:
             yield known.energy
 
@@ -174,7 +174,7 @@ def test_cycles_need_no_more_than_any_simpler_one_at_any_time(seed: int) -> None
     asked = near_cycles(seed)
     known, rng = plan_cycle(asked), np.random.default_rng(seed)
     for factor in np.sort(rng.uniform(1.0, 4.0, 3)):
-        duration = asked.dwelling + factor * (known.duration - asked.dwelling)
+        duration = asked.dwell_time + factor * (known.duration - asked.dwell_time)
         found = plan_cycle(in_time(asked, float(duration)))
         assert_no_dearer_than_its_baselines(found)
         waited = energy(known) + waiting_power(known) * (duration - known.duration)
@@ -187,13 +187,13 @@ def test_cycles_need_no_more_than_any_simpler_one_at_any_time(seed: int) -> None
 def test_more_time_does_no_more_mechanical_work(seed: int) -> None:
     """Rests do no work: a cycle may wait."""
     asked = replace(
-        near_cycles(seed), objective="mechanical", duration_max=0.2 + near_cycles(seed).dwelling
+        near_cycles(seed), objective="mechanical", duration_max=0.2 + near_cycles(seed).dwell_time
     )
     with pytest.raises(CycleTooShort) as refusal:
         plan_cycle(asked)
-    shortest = refusal.value.shortest - asked.dwelling
+    shortest = refusal.value.shortest - asked.dwell_time
     cycles = [
-        plan_cycle(replace(asked, duration_max=asked.dwelling + k * shortest))
+        plan_cycle(replace(asked, duration_max=asked.dwell_time + k * shortest))
         for k in (1.1, 1.6, 3.0)
     ]
     for each in cycles:
@@ -218,8 +218,8 @@ def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
         nodes = search.run()
         cycles = simple_cycles(TimedSearch(search, duration), [nodes], fastest=False)
         (alike,) = (each for each in cycles if each.name == "same_factor")
-        assert alike.held is confirmed and (alike.certified() is not None) is confirmed
-        assert len(cycles) == 1 + confirmed and alike.waited == 0
+        assert alike.confirmed is confirmed and (alike.certified() is not None) is confirmed
+        assert len(cycles) == 1 + confirmed and alike.wait_time == 0
 
 
 def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(

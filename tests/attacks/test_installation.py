@@ -28,7 +28,7 @@ import pytest
 from joulepath.app.cli.answer import compile_kernel_of
 from joulepath.app.exceptions.queue import ClusterUnavailable
 from joulepath.optimizer.native import library_cache
-from joulepath.optimizer.native.library_cache import Patience
+from joulepath.optimizer.native.library_cache import CacheSettings
 from tests.app.cluster.test_link import scheduler_process
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import ROOT, WARM_UP, serving, until
@@ -388,7 +388,7 @@ def test_a_command_gives_a_hung_compiler_up(
     monkeypatch.setenv("CC", str(compiler))
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("JOULEPATH_DATABASE_URL", f"sqlite:///{tmp_path}/joulepath.db")
-    monkeypatch.setattr(library_cache, "PATIENCE", replace(Patience(), command=0.3))
+    monkeypatch.setattr(library_cache, "CACHE", replace(CacheSettings(), command_timeout=0.3))
     for reason in ("does not end within 0.3 s", "hung"):
         compile_kernel_of("ur5e")
         said = capsys.readouterr().err

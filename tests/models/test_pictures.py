@@ -11,7 +11,7 @@ import trimesh
 
 from joulepath.models.capsule_cover import outside
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.pictures import FACES, KIND, picture, picture_sources
+from joulepath.models.pictures import KIND, PICTURE, picture, picture_sources
 from joulepath.models.registry import load_robot
 from tests.mesh_folders import SHIPPED, meshes
 from tests.selection import long_but
@@ -43,7 +43,7 @@ def test_every_link_stands_in_its_capsules(name: str) -> None:
         assert np.allclose(mesh.bounds, [whole.min(axis=0), whole.max(axis=0)], atol=MOVED)
         assert np.allclose(np.linalg.norm(mesh.vertex_normals, axis=1), 1, atol=1e-6)
         count += len(mesh.faces)
-    assert FACES / 2 < count < 1.6 * FACES
+    assert PICTURE.faces / 2 < count < 1.6 * PICTURE.faces
 
 
 def test_a_robot_without_meshes_has_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,7 +34,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Mesh, Obstacle, Scene
-from joulepath.optimizer.search.reserve import reserve
+from joulepath.optimizer.search.finishing_time import finishing_time
 from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock, still
@@ -213,9 +213,9 @@ def test_a_quadratic_program_gets_no_more_than_the_time_left(
 
 def test_a_longer_answer_leaves_more_time_for_its_end() -> None:
     asked = problem(deadline=10.0)
-    kept = [reserve(asked, duration, 1) for duration in (0.1, 1.0, 10.0, 100.0, 1e6)]
+    kept = [finishing_time(asked, duration, 1) for duration in (0.1, 1.0, 10.0, 100.0, 1e6)]
     assert kept == sorted(kept) and kept[0] >= 0.1 and kept[-1] < 10.0
-    assert reserve(asked, 1.0, 10_000) > reserve(asked, 1.0, 1)
+    assert finishing_time(asked, 1.0, 10_000) > finishing_time(asked, 1.0, 1)
 
 
 # --- watching ---

@@ -15,7 +15,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
-from joulepath.optimizer.search.reserve import RESERVE
+from joulepath.optimizer.search.finishing_time import FINISHING
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, assert_true, shortest, solved
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import (
@@ -102,7 +102,7 @@ def test_little_time_gives_the_best_found_so_far() -> None:
     readings = 300
     solution = optimize(replace(task, deadline=float(readings)), CountingClock())
     assert_true(solution, task)
-    assert readings - RESERVE < solution.solver.wall_time < readings + LAST_READINGS
+    assert readings - FINISHING.least < solution.solver.wall_time < readings + LAST_READINGS
     assert solution.status == "feasible"
     assert any(
         each.status == "unvisited" and "deadline" in each.reason for each in solution.candidates
@@ -145,7 +145,7 @@ def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refuse
             return replace(honest, worst_ratio=honest.worst_ratio | {"torque": 1.01})
         return honest
 
-    monkeypatch.setattr("joulepath.optimizer.search.incumbent.certify", judge)
+    monkeypatch.setattr("joulepath.optimizer.search.state.certify", judge)
     task = problem(goal=tcp_pose(GOAL), windings=False)
     if refused == "the first":
         assert optimize(task).certificate.valid and len(judged) > 1

@@ -16,8 +16,8 @@ from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError
 from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.course_tracing import chain_of
-from joulepath.optimizer.kinematics.tool_path.turning_sheet import (
-    TurningSheet,
+from joulepath.optimizer.kinematics.tool_path.turning_grid import (
+    TurningGrid,
     shortest,
     turning_through,
 )
@@ -137,7 +137,7 @@ def test_a_turning_to_a_free_end_is_the_shortest_on_its_sheet() -> None:
     problem = along(moved([0.0, 0.2, 0.0]), path=ToolPath(about=Z))
     course = PreparedProblem.of(problem).course
     assert course is not None
-    sheet = TurningSheet.of(problem.arm, chain_of(ROBOT), course, HOME, steps=4, most=0.5)
+    sheet = TurningGrid.of(problem.arm, chain_of(ROBOT), course, HOME, steps=4, most=0.5)
     middle = len(sheet.angles) // 2
 
     def total(chosen: Array) -> float:

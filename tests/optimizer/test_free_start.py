@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath.optimizer.bounds.free_ends_bound import bound_between_free_ends
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError, UnreachablePose
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
@@ -25,7 +26,6 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends_of
 from joulepath.optimizer.search.errors import PathInfeasible
-from joulepath.optimizer.search.free_ends_bound import bound_between
 from joulepath.optimizer.search.path_ends import bound_beside, path_candidates
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.moves import AMPLE, tcp_pose
@@ -129,7 +129,7 @@ def _turned(pose: Pose, angle: float) -> Pose:
 def test_the_bound_between_free_ends_is_that_of_the_best_pair_but_for_little(seed: int) -> None:
     start, goal = ends_turned(seed)
     asked = PreparedProblem.of(along(free(goal), start=HOME, tool_path=None))
-    proven = bound_between(asked, free(start), free(goal), NEVER, np.inf)
+    proven = bound_between_free_ends(asked, free(start), free(goal), NEVER, np.inf)
     known = pairs(
         asked, ends_of(asked, "goal", free(start), 72)[0], ends_of(asked, "goal", free(goal), 72)[0]
     )

@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from joulepath import DurationTooShort, Problem, optimize, optimize_many
-from joulepath.optimizer.optimize_many import AHEAD
+from joulepath.optimizer.optimize_many import OPTIMIZE_MANY
 from tests.optimizer.moves import AMPLE, problem, random_moves
 
 MOVES = [problem(start, goal, deadline=AMPLE) for start, goal in random_moves(seed=0, count=3)]
@@ -44,7 +44,7 @@ def test_problems_are_taken_as_they_are_needed() -> None:
         several = list(itertools.islice(found, 5))
         found.close()
     assert all(isinstance(each.error, DurationTooShort) for each in several)
-    assert next(taken) <= AHEAD + 5
+    assert next(taken) <= OPTIMIZE_MANY.ahead + 5
 
 
 class _Client:

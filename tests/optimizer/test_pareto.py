@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import CONVERGED, pareto
+from joulepath.optimizer.pareto import PARETO, pareto
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -100,7 +100,9 @@ def test_dropped_ones_are_beaten_or_not_found(asked_and_found: tuple[Problem, Fr
             # what `optimize` answers is the last point, also where another duration's solve stops a
             # little below
             least = objective(asked, front.points[-1])
-            assert each.energy is not None and least * (1 - CONVERGED) <= each.energy <= least
+            assert (
+                each.energy is not None and least * (1 - PARETO.same_energy) <= each.energy <= least
+            )
         elif each.energy is not None:
             better = [
                 p
@@ -272,7 +274,9 @@ def test_the_front_ends_where_optimize_ends(seed: int, kind: str) -> None:
     assert min(objective(asked, point) for point in front.points) == objective(asked, least)
     for each in front.dropped:
         # what was found to need less differs by no more than solves do
-        assert each.energy is None or each.energy > objective(asked, alone) * (1 - CONVERGED)
+        assert each.energy is None or each.energy > objective(asked, alone) * (
+            1 - PARETO.same_energy
+        )
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,8 @@ from joulepath.optimizer.progress import (
     CandidateTried,
     Event,
     Improved,
-    forward,
-    nobody,
+    no_listener,
+    only_news,
 )
 from joulepath.optimizer.search.candidates import Reason
 from tests.optimizer.cycle.cycles import pick_and_place
@@ -116,7 +116,7 @@ def test_a_front_tells_its_durations() -> None:
 
 def test_what_is_no_news_is_not_passed_on() -> None:
     events: list[Event] = []
-    tell = forward(events.append)
+    tell = only_news(events.append)
     news: list[Event] = [
         CandidatesFound(5),
         CandidateTried(3, "solved", 1.0, 9.0),
@@ -136,4 +136,4 @@ def test_what_is_no_news_is_not_passed_on() -> None:
     tell(Improved(7.0))
     assert isinstance(events[-1], Improved)
     assert (events[-1].energy, events[-1].bound) == (7.0, 3.0)
-    assert forward(nobody) is nobody
+    assert only_news(no_listener) is no_listener

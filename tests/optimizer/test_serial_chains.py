@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.kinematics.inverse import ClosedFormInverseKinematics
+from joulepath.optimizer.kinematics.confirmed_inverse import ConfirmedInverseKinematics
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -186,8 +186,8 @@ def test_joint_targets_ask_no_inverse_kinematics(monkeypatch: pytest.MonkeyPatch
     def solved(*_: Any, **__: Any) -> None:
         raise AssertionError("inverse kinematics was asked")
 
-    monkeypatch.setattr(ClosedFormInverseKinematics, "solve", solved)
-    monkeypatch.setattr(ClosedFormInverseKinematics, "branches", solved)
+    monkeypatch.setattr(ConfirmedInverseKinematics, "solve", solved)
+    monkeypatch.setattr(ConfirmedInverseKinematics, "branches", solved)
     solution = optimize(moves.problem(deadline=60.0))
     assert solution.certificate.valid
     assert solution.start.label.count("/") == solution.goal.label.count("/") == 2

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,7 +99,8 @@ def test_eight_threads_give_what_one_gives(monkeypatch: pytest.MonkeyPatch) -> N
     """Every thread does the same quick work; the rest goes round. Two threads plan paths at the
     same time.
     """
-    monkeypatch.setattr(polynomial_ga, "GENERATIONS", FEW_GENERATIONS)
+    settings = replace(polynomial_ga.POLYNOMIAL_GA, generations=FEW_GENERATIONS)
+    monkeypatch.setattr(polynomial_ga, "POLYNOMIAL_GA", settings)
     works = {each.name: each for each in all_work()}
     quick = [works[name] for name in QUICK]
     assert_as_alone([[works[name], *shuffled(quick, k)] for k, name in enumerate(SLOW)])

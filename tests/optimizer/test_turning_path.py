@@ -17,7 +17,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.course_tracing import chain_of
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.kinematics.tool_path.turning_sheet import TurningSheet, shortest
+from joulepath.optimizer.kinematics.tool_path.turning_grid import TurningGrid, shortest
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
@@ -117,7 +117,7 @@ def test_a_turning_is_the_shortest_of_all_on_its_sheet() -> None:
     problem = along(moved([0.0, 0.2, 0.0]), path=ToolPath(about=Z))
     course = PreparedProblem.of(problem).course
     assert course is not None
-    sheet = TurningSheet.of(problem.arm, chain_of(ROBOT), course, HOME, steps=5, most=0.5)
+    sheet = TurningGrid.of(problem.arm, chain_of(ROBOT), course, HOME, steps=5, most=0.5)
     poses = course.poses(sheet.at)
     for k, at in enumerate(poses):
         T = pose_of(problem.arm, sheet.q[k])

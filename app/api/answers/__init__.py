@@ -1,1 +1,1 @@
-"""`GET /answers`: answers that the service keeps."""
+"""`GET /answers`: kept answers."""

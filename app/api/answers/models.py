@@ -1,4 +1,4 @@
-"""What the routes under `/answers` take and answer."""
+"""Requests and answers of the routes under `/answers`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 
 
 class KeptAnswer(Response):
-    """An answer that is kept, without its document."""
+    """A kept answer without its document."""
 
     id: str = described("Id of the answer.", None, ANSWER_ID)
     kind: str = described(
@@ -24,7 +24,7 @@ class KeptAnswer(Response):
 
 
 class AnswerSummary(KeptAnswer):
-    """What a list shows of a kept answer. Its figures are null in answers of an earlier version."""
+    """A kept answer in a list. Its figures are null in answers of an earlier version."""
 
     robot: str | None = described("Name of the robot.", None, "ur5e")
     energy: float | None = described(
@@ -40,7 +40,7 @@ class AnswerSummary(KeptAnswer):
 
 
 class StoredAnswer(KeptAnswer):
-    """A complete answer to which another answer refers."""
+    """A complete answer, referenced by another answer."""
 
     answer: dict[str, Any] = described(
         "The answer, with the fields that this endpoint documents.",
@@ -57,7 +57,7 @@ class AnswerList(Response):
 
 
 class AnswerPage(Query):
-    """The part of the list of answers that is returned."""
+    """A page of the list of answers."""
 
     limit: int = limit_of("answers")
     after: str | None = after_of(ANSWER_ID)

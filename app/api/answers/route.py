@@ -31,8 +31,8 @@ AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore) -> AnswerList:
-    """All answers that are kept, newest first, page by page: also the motions of fronts and rounds,
-    and the answers of studies and jobs."""
+    """All kept answers, newest first, page by page, with the motions of fronts and cycles and the
+    answers of studies and jobs."""
     found, following = await store.read(partial(answers.page, limit=page.limit, after=page.after))
     names = AnswerSummary.model_fields
     listed = [AnswerSummary(**{name: getattr(answer, name) for name in names}) for answer in found]
@@ -46,7 +46,7 @@ async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore
     responses=problem_responses(UnknownAnswer, StoreUnavailable),
 )
 async def show(id: AnswerId, store: ServiceStore) -> Response:
-    """The complete answer that another answer refers to."""
+    """The complete answer with this id."""
     answer, body = await store.read(partial(answers.get, answer_id=id))
     content = {name: getattr(answer, name) for name in ("id", "kind", "created", "owner")}
     return result_response(TaskResult.of_json(content | {"answer": orjson.Fragment(body)}))

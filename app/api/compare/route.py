@@ -37,8 +37,8 @@ async def compare(
     reply: ServiceReply,
 ) -> Response:
     """Solves one request with several methods, one after another. The answer is a table of their
-    energies, durations and solve times; each motion is certified. A method that finds no motion has
-    its problem in its row. If no method finds a motion, the answer is the problem of the first
+    energies, durations and solve times, with certified motions. The row of a method without a
+    motion has its problem. If no method finds a motion, the answer is the problem of the first
     method in the request. `Accept: text/event-stream` returns events while the methods run, and
     then the answer."""
     if later.wanted:

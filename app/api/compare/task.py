@@ -1,4 +1,4 @@
-"""What `POST /compare` takes and answers, and its work in a worker."""
+"""Request and answer of `POST /compare`, and its work in a worker."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class MethodResult:
     worst_ratio: Ratio | None = None
     """Largest value / limit of the certificate."""
     problem: dict[str, Any] | None = None
-    """The error document that `POST /optimize` would return; null if there is a motion."""
+    """The error document of `POST /optimize`; null if there is a motion."""
     answer: OptimizeAnswer | None = None
     """The complete answer of `POST /optimize` if `answers` is true; else null."""
 
@@ -102,10 +102,10 @@ class CompareAnswer(Answer):
     """The results of several methods, and the baselines."""
 
     objective: Objective
-    """Energy that was minimised: electrical energy drawn from the supply, or mechanical work."""
+    """The minimised energy: electrical energy drawn from the supply, or mechanical work."""
     lower_bound: Joules
     """Lower bound of the objective: no motion of any shape and any allowed duration between these
-    targets needs less. It is the largest that a method proves, which holds for all."""
+    targets needs less. It is the largest bound of all methods."""
     best: MethodName
     """Method of least energy."""
     methods: Annotated[list[MethodResult], NotEmpty]
@@ -152,7 +152,7 @@ class CompareTask:
                 yield MethodResult(method=each.method, problem=problem)
 
     def _row(self, found: Comparison, each: Compared) -> MethodResult:
-        """The row of a method that found a motion."""
+        """The row of a method with a motion."""
         assert each.solution is not None
         solution = certified(each.solution)
         return MethodResult(

@@ -1,6 +1,4 @@
-"""The arms of the moves of a cycle, for their answers: each has a payload, limits and surroundings
-of its own.
-"""
+"""The arms of the moves of a cycle, with their payloads, limits and surroundings."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm
 
 
 def arms_of_moves(request: CycleRequest, found: CycleSolution) -> list[dict[str, Any] | None]:
-    """What `arm_fields` gives for each move, as requests for the single moves would have it."""
+    """The result of `arm_fields` for every move as a request of its own."""
     stops = {stop.name or str(k): stop for k, stop in enumerate(request.stops, 1)}
     carried, arms = request.payload, list[dict[str, Any] | None]()
     for move in found.moves:
@@ -32,7 +30,7 @@ def _arm(request: CycleRequest, arm: Arm, carried: Payload | None) -> dict[str, 
         value = getattr(limits, name)
         if (value < getattr(own, name)).any():
             given[public] = value.tolist()
-    # a storage on the bus begins each move with the charge that the last one left
+    # A storage begins a move with the final charge of the previous one.
     stored = request.bus.mode == "storage" and {
         "bus": request.bus.model_dump(mode="json", exclude_unset=True)
         | {"initial": arm.bus.initial}

@@ -9,10 +9,12 @@ from joulepath.app.api.cycle.stop import StopRequest
 from joulepath.app.convert.arm import to_arm, to_limits, to_payload
 from joulepath.app.convert.pose import to_base
 from joulepath.app.convert.request import to_branch, to_target, to_target_pose, to_tool_path
+from joulepath.app.convert.tool import with_tool
 from joulepath.app.convert.until import time_left, until
 from joulepath.app.schemas.arm import MoveLimits
 from joulepath.app.schemas.path import Line as LineRequest
 from joulepath.app.schemas.path import StopPath as StopPathRequest
+from joulepath.app.schemas.scene import Tool
 from joulepath.models.robot import Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
@@ -25,7 +27,7 @@ from joulepath.optimizer.problem.targets import Target
 
 
 def to_cycle(request: CycleRequest, deadline: float) -> Cycle:
-    """The cycle of a request, of whose time `deadline` [s] is left.
+    """The cycle of a request with a remaining time of `deadline` [s].
 
     Raises UnknownRobot, InvalidProblem, OutsideLimits or DeadlineExceeded.
     """
@@ -36,7 +38,7 @@ def to_cycle(request: CycleRequest, deadline: float) -> Cycle:
     return Cycle(
         arm=arm,
         start=to_target(request.start, arm.robot),
-        stops=[_to_stop(k, stop, arm.robot) for k, stop in enumerate(request.stops)],
+        stops=[_to_stop(k, stop, arm.robot, request.tool) for k, stop in enumerate(request.stops)],
         closed=request.closed,
         duration_min=least,
         duration_max=most,
@@ -62,10 +64,11 @@ def _to_order(request: CycleRequest) -> FreeOrder | None:
     )
 
 
-def _to_stop(k: int, stop: StopRequest, robot: Robot) -> Stop:
+def _to_stop(k: int, stop: StopRequest, robot: Robot, tool: str | Tool) -> Stop:
     try:
-        # left out: what is carried stays
-        payload = to_payload(stop.payload) if "payload" in stop.model_fields_set else None
+        # Without this field, the payload stays.
+        part = to_payload(stop.payload) if "payload" in stop.model_fields_set else None
+        payload = None if part is None else with_tool(tool, part)
         limits = None if stop.limits == MoveLimits() else to_limits(stop.limits, robot)
     except InvalidProblem as error:
         raise InvalidProblem(f"stops.{k}.{error.field}", str(error)) from None
@@ -87,7 +90,7 @@ def _to_stop(k: int, stop: StopRequest, robot: Robot) -> Stop:
 
 
 def _target(stop: StopRequest, robot: Robot) -> Target:
-    """The target of a stop: where its path starts, if it has one."""
+    """The target of a stop, or the start of its path."""
     if stop.path is not None:
         return to_target_pose(stop.path.points[0], robot)
     assert stop.target is not None

@@ -1,7 +1,8 @@
-"""What `POST /cycle` takes."""
+"""Request of `POST /cycle`."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
@@ -20,20 +21,31 @@ from joulepath.app.schemas.request import (
     which_candidates,
 )
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.problem.cycle import LONGEST_ROUND, MOST_STOPS
+from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
 
-# of a cycle with more stops, the default deadline is longer, and samples are no closer: answers
-# stay as large as before
-_MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
 
-LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
+@dataclass(frozen=True)
+class LongCycle:
+    """Rules of cycles with many stops, so that their answers stay readable."""
+
+    stops: int = 100
+    """Most stops of an ordinary cycle."""
+    deadline: float = 120.0
+    """Default deadline above it [s]."""
+    period: float = 1e-3
+    """Least period of samples above it [s]."""
+
+
+LONG_CYCLE = LongCycle()
+
+LongTime = Annotated[float, Field(gt=0, le=CYCLE_RANGES.longest)]
 
 
 class TimeRange(DurationRange):
-    """Bounds on the duration of a cycle; each is optional."""
+    """Optional bounds on the duration of a cycle."""
 
     min: LongTime | None = described("Smallest duration. Null: no bound.", "s", 10.0, default=None)
     max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
@@ -45,7 +57,7 @@ CycleTime = Annotated[
 
 
 class CycleRequest(ArmRequest):
-    """A cycle of stops. `payload` is what the arm carries to the first stop that changes it."""
+    """A cycle of stops. `payload` is carried until the first stop with another payload."""
 
     start: Target = described(
         "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of "
@@ -53,31 +65,32 @@ class CycleRequest(ArmRequest):
         None,
         {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
     )
-    stops: Annotated[list[StopRequest], Field(min_length=1, max_length=MOST_STOPS)] = described(
-        "The stops; in the order in which they are visited, unless `order` is free.",
-        None,
-        [
-            {
-                "name": "pick",
-                "target": {
-                    "pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+    stops: Annotated[list[StopRequest], Field(min_length=1, max_length=CYCLE_RANGES.max_stops)] = (
+        described(
+            "The stops; in the order in which they are visited, unless `order` is free.",
+            None,
+            [
+                {
+                    "name": "pick",
+                    "target": {
+                        "pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                    },
+                    "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
                 },
-                "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
-            },
-            {
-                "name": "place",
-                "target": {
-                    "pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                {
+                    "name": "place",
+                    "target": {
+                        "pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                    },
+                    "payload": None,
                 },
-                "payload": None,
-            },
-        ],
+            ],
+        )
     )
     order: Literal["given", "free"] = described(
         "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs "
-        "the least energy, for "
-        f"at most {MOST_FREE_STOPS} stops. The arm then carries the same between groups of stops "
-        "as at the start.",
+        f"the least energy, for at most {MOST_FREE_STOPS} stops. The arm then carries the same "
+        "between groups of stops as at the start.",
         None,
         "given",
         default="given",
@@ -95,8 +108,7 @@ class CycleRequest(ArmRequest):
         Field(max_length=MOST_FREE_STOPS),
     ] = described(
         "With a free order: lists of stops that are visited one directly after the other, as they "
-        "are listed, like the "
-        "one where a part is taken up and the one where it is put down.",
+        "are listed, like the one where a part is taken up and the one where it is put down.",
         None,
         [["pick", "place"]],
         default=[],
@@ -110,17 +122,16 @@ class CycleRequest(ArmRequest):
     )
     time: CycleTime | None = described(
         "Duration of the cycle, dwells and waiting included, or bounds on it. Time is shared among "
-        "the moves so that "
-        "the energy is least; what is left over is waited out where that costs least. Null: the "
-        "optimiser chooses.",
+        "the moves so that the energy is least; what is left over is waited out where that costs "
+        "least. Null: the optimiser chooses.",
         "s",
         12.0,
         default=None,
     )
     objective: Objective = described(
         "`electrical`: the energy drawn by the whole cycle. `mechanical`: the work of its moves, ∫ "
-        "Σ |tau_j v_j| dt; "
-        "rests need none, and slower moves less, so it needs a `time` or a `time.max`.",
+        "Σ |tau_j v_j| dt; rests need none, and slower moves less, so it needs a `time` or a "
+        "`time.max`.",
         None,
         "electrical",
         default="electrical",
@@ -149,17 +160,15 @@ class CycleRequest(ArmRequest):
     )
     windings: bool = described(
         "Whether full-turn alternatives q + 2πk within the joint range count at every stop. If "
-        "not, each configuration "
-        "has the joint positions nearest to the middle of the joint range.",
+        "not, each configuration has the joint positions nearest to the middle of the joint range.",
         None,
         True,
         default=True,
     )
     candidates: WhichCandidates = which_candidates()
     sample_period: float = described(
-        f"Time between the samples of the answers of the moves. With more than {_MANY_STOPS} "
-        "stops, at least "
-        f"{_LEAST_PERIOD:g} s.",
+        f"Time between the samples of the answers of the moves. With more than {LONG_CYCLE.stops} "
+        f"stops, at least {LONG_CYCLE.period:g} s.",
         "s",
         0.008,
         default=0.008,
@@ -168,10 +177,8 @@ class CycleRequest(ArmRequest):
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
-        "nears, the service "
-        f"returns the best certified cycle found so far. With more than {_MANY_STOPS} stops, the "
-        "default is "
-        f"{_LONG_DEADLINE:g} s.",
+        "nears, the service returns the best certified cycle found so far. With more than "
+        f"{LONG_CYCLE.stops} stops, the default is {LONG_CYCLE.deadline:g} s.",
         "s",
         60.0,
         default=60.0,
@@ -182,19 +189,19 @@ class CycleRequest(ArmRequest):
     @field_validator("sample_period")
     @classmethod
     def _few_enough_samples(cls, period: float, info: ValidationInfo) -> float:
-        if len(info.data.get("stops", ())) > _MANY_STOPS and period < _LEAST_PERIOD:
+        if len(info.data.get("stops", ())) > LONG_CYCLE.stops and period < LONG_CYCLE.period:
             raise PydanticCustomError(
                 "too_many_samples",
                 "With more than {stops} stops, `sample_period` must be at least {least} s",
-                {"stops": _MANY_STOPS, "least": _LEAST_PERIOD},
+                {"stops": LONG_CYCLE.stops, "least": LONG_CYCLE.period},
             )
         return period
 
     @model_validator(mode="after")
     def _long_enough(self) -> Self:
-        if "deadline" not in self.model_fields_set and len(self.stops) > _MANY_STOPS:
+        if "deadline" not in self.model_fields_set and len(self.stops) > LONG_CYCLE.stops:
             # still a default: it is no longer than the service allows
-            object.__setattr__(self, "deadline", _LONG_DEADLINE)
+            object.__setattr__(self, "deadline", LONG_CYCLE.deadline)
         return self
 
     @model_validator(mode="after")

@@ -52,9 +52,9 @@ async def cycle(
     reply: ServiceReply,
     cache: ServiceCache,
 ) -> Response:
-    """Finds the arm configuration at every stop of a cycle, and the motions between them, that need
-    the least electrical energy together. The configuration at one stop decides what the moves from
-    there cost, so that all are chosen at once. Each move refers to its complete answer. `Accept:
+    """Finds the arm configurations at all stops of a cycle, and the motions between them, with the
+    least total energy. The configuration at a stop affects the cost of the moves on both sides, so
+    that all are chosen together. A move refers to its complete answer. `Accept:
     text/csv` returns the samples of the cycle, `Accept: text/event-stream` events while the search
     runs, and then the answer."""
     if later.wanted:

@@ -12,8 +12,8 @@ from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.path import Line, StopPath
 from joulepath.app.schemas.request import Branch, Target
 from joulepath.optimizer.problem.names import LONGEST_NAME
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
-from joulepath.optimizer.problem.scene import MOST_OBSTACLES
+from joulepath.optimizer.problem.problem import DURATIONS
+from joulepath.optimizer.problem.scene import SCENE_RANGES
 
 PlainName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
 
@@ -30,8 +30,8 @@ class StopRequest(Request):
     )
     target: Target | None = described(
         "Joint positions, a pose of the TCP, or one of several targets. The orientation of a "
-        "single pose may be free "
-        "in part: it is then chosen for the whole cycle, and the answer is `feasible`.",
+        "single pose may be free in part: it is then chosen for the whole cycle, and the answer is "
+        "`feasible`.",
         None,
         {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
         default=None,
@@ -51,10 +51,8 @@ class StopRequest(Request):
     )
     via: bool = described(
         "Whether the arm passes through the target without a rest, on its way to the next stop at "
-        "which it rests. Then "
-        "the stop has no `dwell`, `payload`, `path`, lines or `obstacles_ignored`, and the limits "
-        "of all stops of this "
-        "motion hold for all of it.",
+        "which it rests. Then the stop has no `dwell`, `payload`, `path`, lines or "
+        "`obstacles_ignored`, and the limits of all stops of this motion hold for all of it.",
         None,
         False,
         default=False,
@@ -65,12 +63,11 @@ class StopRequest(Request):
         0.4,
         default=0.0,
         ge=0,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
     payload: Payload | None = described(
         "What the arm carries from here on, the dwell included; with a path, from its end on. "
-        "Null: nothing, it is put "
-        "down. Left out: unchanged.",
+        "Null: nothing, it is put down. Left out: unchanged.",
         None,
         {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
         default=None,
@@ -83,34 +80,33 @@ class StopRequest(Request):
     )
     limits: MoveLimits = described(
         "Limits of the moves into this stop, its line and its path included, where they are "
-        "tighter than those of the "
-        "request.",
+        "tighter than those of the request.",
         None,
         {"acceleration": 5.0, "tcp_speed": 0.5},
         default=MoveLimits(),
     )
     approach: Line | None = described(
         "Straight line of the TCP into the stop, or to the start of its path. The arm rests at its "
-        "outer end. Null: "
-        "none.",
+        "outer end. Null: none.",
         None,
         {"direction": [0.0, 0.0, 1.0], "distance": 0.08},
         default=None,
     )
     retreat: Line | None = described(
         "Straight line of the TCP out of the stop, or from the end of its path. The arm rests at "
-        "its outer end. Null: "
-        "none.",
+        "its outer end. Null: none.",
         None,
         {"direction": [0.0, 0.0, -1.0], "distance": 0.08},
         default=None,
     )
-    obstacles_ignored: Annotated[list[PlainName], Field(max_length=MOST_OBSTACLES)] = described(
-        "Names of obstacles that do not count at the stop, on its lines and its path, like the "
-        "part that is grasped.",
-        None,
-        ["part"],
-        default=[],
+    obstacles_ignored: Annotated[list[PlainName], Field(max_length=SCENE_RANGES.max_obstacles)] = (
+        described(
+            "Names of obstacles that do not count at the stop, on its lines and its path, like the "
+            "part that is grasped.",
+            None,
+            ["part"],
+            default=[],
+        )
     )
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""What `POST /cycle` answers, and its work in a worker."""
+"""Answer of `POST /cycle`, and its work in a worker."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class CycleEnergy(EnergyAndBound):
     """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
 
     lower_bound: Joules
-    """Lower bound of the objective: no cycle that rests at these stops, or goes through those with
-    `via`, of any configurations, shapes and durations, needs less."""
+    """Lower bound of the objective: no cycle with these stops and passes, of any configurations,
+    shapes and durations, needs less."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,29 +52,29 @@ class CycleAnswer(Answer):
     method: MethodName
     """How the moves are parametrised."""
     objective: Objective
-    """The energy that is minimised."""
+    """The minimised energy."""
     order: list[str]
     """Names of the stops, as they are visited."""
     duration: Seconds
     """Duration of the cycle, dwells and waiting included."""
     status: Literal["optimal", "feasible"]
     """`optimal`: every move converged, and no other chain of arm configurations has a lower bound
-    below what was found. It does not say that no better cycle exists: see `optimality_gap`.
-    `feasible`: the cycle is certified, but the search was not complete, or arm configurations may
+    below the energy of this cycle. A better cycle may still exist: see `optimality_gap`.
+    `feasible`: the cycle is certified, but the search was incomplete, or arm configurations may
     have been missed."""
     price_of_time: Watts
-    """What one more second would save; negative if it would cost energy. 0 if the cycle takes its
-    own time."""
+    """Saving of one more second; negative if it would cost energy. 0 if the cycle takes its own
+    time."""
     energy: CycleEnergy
     """Energy and power of the cycle."""
     legs: Annotated[list[CycleLeg], NotEmpty]
     """Moves and dwells in their order."""
     baselines: list[CycleBaseline]
-    """The same cycle in other ways; without what was not found in time."""
+    """The same cycle in other ways, as far as they were found in time."""
     certificate: CycleCertificate
     """Independent check of all moves."""
     warnings: list[str]
-    """Remarks on the cycle and on its moves, as in `POST /optimize`; those on a move name its ends.
+    """Remarks on the cycle and on its moves, as in `POST /optimize`, with the ends of the move.
     Empty if there are none."""
     search: CycleSearchReport
     """Size and effort of the search for the cycle."""
@@ -105,7 +105,7 @@ class CycleAnswer(Answer):
 
     @property
     def figures(self) -> AnswerFigures:
-        """What lists show of this answer."""
+        """The figures of this answer in lists."""
         return AnswerFigures(self.robot, self.energy.of(self.objective), self.duration, self.status)
 
 
@@ -113,7 +113,7 @@ class CycleAnswer(Answer):
 class CycleTask:
     """A validated request and its id; the media type of the answer is `wanted`.
 
-    `motions` are kept ones of the same cell, see `store.known_motions`.
+    `motions` are known motions of the same cell, see `store.known_motions`.
     """
 
     request: CycleRequest
@@ -142,7 +142,7 @@ class CycleTask:
 
 
 def _warnings(found: CycleSolution) -> list[str]:
-    """Warnings of the cycle, then those of single moves, which they name."""
+    """Warnings of the cycle, then warnings of moves with their names."""
     of_all = [] if found.complete else [MISSED]
     if found.moves[0].planned.arm.robot.default_motion is None:
         of_all.append(NO_DEFAULT_MOTION)
@@ -156,9 +156,7 @@ def _warnings(found: CycleSolution) -> list[str]:
 
 
 def _divided(found: CycleSolution) -> list[tuple[str, float]]:
-    """Where paths are divided: the stop at which a part ends, and the share of the path until
-    there.
-    """
+    """Divisions of paths: the stop at the end of a part, and the share of the path until there."""
     paths = [(move.planned.goal, move.planned.tool_path) for move in found.moves]
     parts = [
         (name, path.section)

@@ -14,7 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.csv_table import FIRST_ROW, header_of, line_of, numbers_of, with_points
-from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, RecordedRows
 from joulepath.optimizer.exceptions import InvalidTable
 
 LONGEST_LINE = 4096
@@ -27,10 +27,10 @@ class MotionCsv:
     """A CSV file after its header: columns t, q1 … qn, then v1 … vn, then a1 … an; or q1 … qn
     alone.
 
-    The header tells what separates the columns: a comma, a semicolon or a tab. With the latter two,
-    numbers may have a decimal comma.
+    The header determines the separator: a comma, a semicolon or a tab. With the latter two, numbers
+    may have a decimal comma.
 
-    `rows` are the lines that are not read yet, in blocks (k, columns) in the units of the file.
+    `rows` are the unread lines in blocks (k, columns) in the units of the file.
     `scale` converts joint columns to rad, rad/s, rad/s².
     """
 
@@ -82,8 +82,8 @@ def _check_header(columns: list[str], nq: int) -> None:
         f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} if they were logged, or q1,…,q{nq} alone"
     )
     wanted += (
-        ", or those of a log as POST /logs takes it. Separate columns by commas, semicolons "
-        "or tabs."
+        ", or those of a log as POST /logs takes it. Separate columns by commas, semicolons or "
+        "tabs."
     )
     if all(_NUMBER.match(name) for name in columns):
         raise InvalidTable(
@@ -110,19 +110,19 @@ def _check_header(columns: list[str], nq: int) -> None:
 
 def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterator[Array]:
     row = FIRST_ROW
-    while lines := [*islice(_lines(file, row), BLOCK)]:
+    while lines := [*islice(_lines(file, row), MOTION_LIMITS.block_rows)]:
         if separator != ",":
             lines = [*with_points(lines, row)]
         yield numbers_of(
             lines, range(row, row + len(lines)), columns, separator, range(len(columns))
         )
         row += len(lines)
-        if len(lines) < BLOCK:
+        if len(lines) < MOTION_LIMITS.block_rows:
             return
 
 
 def _lines(file: BufferedReader, row: int) -> Iterator[str]:
-    """All lines up to the end of the file, without empty ones at the end."""
+    """All lines of the file, without empty ones at the end."""
     while line := line_of(file, row, LONGEST_LINE):
         if not line.strip():
             while rest := line_of(file, row, LONGEST_LINE):

@@ -40,9 +40,7 @@ _REF = "#/components/schemas/{model}"
 
 
 def _openapi() -> dict[str, Any]:
-    """The bodies, and the settings of a CSV. FastAPI does not know them, because the body goes to a
-    file unread.
-    """
+    """The bodies, and the settings of a CSV, unknown to FastAPI as the body goes to a file."""
     return {
         "parameters": query_parameters(EvaluateCsvSettings, "With a CSV body only. "),
         "requestBody": {
@@ -58,7 +56,7 @@ def _openapi() -> dict[str, Any]:
 
 
 def _kind_of(file: IO[bytes]) -> _Kind:
-    """What a body is that nothing is said about: a JSON object, or else CSV."""
+    """Kind of a body without a declared type: a JSON object, or else CSV."""
     file.seek(0)
     begins = file.read(_BEGINNING).removeprefix(b"\xef\xbb\xbf").lstrip()
     return "json" if not begins or begins.startswith((b"{", b"[")) else "csv"
@@ -90,11 +88,11 @@ async def evaluate(
     engine: ServiceArmEngine,
     later: ServiceLater,
 ) -> Response:
-    """The energy of a given motion, per segment and in total, and the limits that it violates. The
-    motion is a list of configurations with the times between them, a trajectory, or a log of the
-    arm, whose measured energies stand beside the model's. It is sent as JSON, or as CSV with the
-    settings as query parameters: any file that `POST /logs` reads. `Accept: text/csv` returns the
-    table of energies as CSV."""
+    """The energy of a given motion, per segment and in total, and its violated limits. The motion
+    is a list of configurations with times, a trajectory, or a log of the arm, with measured
+    energies beside the model's. It is sent as JSON, or as CSV with the settings as query
+    parameters: any file of `POST /logs`. `Accept: text/csv` returns the table of energies as CSV.
+    """
     declared = media_type(request.headers)
     kind = _KINDS.get(declared)
     if kind is None and declared not in UNDECLARED:

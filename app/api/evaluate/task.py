@@ -1,11 +1,10 @@
-"""What `POST /evaluate` answers, and its work in a worker: reads the motion from the received
-body."""
+"""Answer of `POST /evaluate`, and its work in a worker, from the received body."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import reduce
 from io import StringIO
 from pathlib import Path
@@ -32,7 +31,7 @@ from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.csv_table import FIRST_ROW
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.declared import Count, Seconds
+from joulepath.optimizer.declared import Count, Ratio, Seconds
 from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
 from joulepath.optimizer.evaluate.limit_report import LimitReport
@@ -51,20 +50,30 @@ class EvaluatedInterval(IntervalEnergy):
     """Energy of one segment of the motion, or of the whole motion."""
 
     measured: MeasuredEnergy | None
-    """What was measured meanwhile; null without a log of power or efforts."""
+    """Measured energies; null without a log of power or efforts."""
+    difference: Ratio | None = field(init=False)
+    """Measured / predicted - 1 of the electrical energy, by the logged power, or else by the
+    efforts. Null without a measurement."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known, ours = self.measured, self.energy.electrical.total
+        drawn = None if known is None else known.best
+        share = None if drawn is None or ours == 0 else drawn / ours - 1
+        object.__setattr__(self, "difference", share)
 
     @classmethod
     def of(cls, interval: IntervalEnergy, known: MeasuredEnergy | None) -> Self:
-        """The energy of an interval, and what is known of it from measurements."""
+        """The energy of an interval, and its measured energies."""
         own = {each.name: getattr(interval, each.name) for each in fields(interval) if each.init}
         return cls(**own, measured=known)
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """The evaluation of a motion of the arm that was `asked` about.
+    """The evaluation of a motion of the requested arm.
 
-    Of a log, what was `measured` in each segment, and the remarks on it.
+    A log has `measured` energies of its segments, and remarks.
     """
 
     asked: EvaluateSettings
@@ -80,7 +89,7 @@ class Evaluated:
 
     @property
     def segments(self) -> list[EvaluatedInterval]:
-        """The segments that are listed."""
+        """The listed segments."""
         return [
             EvaluatedInterval.of(each, self.measured[k] if self.measured else None)
             for k, each in enumerate(self.result.segments)
@@ -89,15 +98,16 @@ class Evaluated:
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluateAnswer(MotionAnswer):
-    """The energy of a given motion, and the limits that it violates."""
+    """The energy of a given motion, and its violated limits."""
 
     duration: Seconds
     """Duration of the motion."""
     total: EvaluatedInterval
     """The whole motion."""
     segments: list[EvaluatedInterval]
-    """Segments between configurations. A trajectory is one segment, and a log has one for each move
-    and each rest. Empty if there are more than 10,000."""
+    """Segments between configurations. A trajectory is one segment, and a log has one per move and
+    rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
+    electrical energies."""
     segment_count: Count
     """Number of segments."""
     speed_jumps: Count
@@ -113,9 +123,9 @@ class EvaluateAnswer(MotionAnswer):
     """Smallest clearance at sample points; null if `collisions` is false."""
     warnings: list[str]
     """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
-    mm, one names them, their distance without margins, and the time. Others say that arm
-    configurations may have been missed, that a baseline is left out, or what a tool or payload
-    without a shape would touch. Of a log, also what `POST /logs` says of it."""
+    mm, one names them, their distance without margins, and the time. Others report possibly missed
+    arm configurations, omitted baselines, or contacts of a tool or payload without a shape. A log
+    also has the remarks of `POST /logs`."""
     samples: Samples | None
     """Samples of the motion; null without `sample_period`."""
 
@@ -142,17 +152,15 @@ class EvaluateAnswer(MotionAnswer):
 
     @property
     def figures(self) -> AnswerFigures:
-        """What lists show of this answer."""
+        """The figures of this answer in lists."""
         return AnswerFigures(self.robot, self.total.energy.electrical.total, self.duration)
 
 
 @dataclass(frozen=True)
 class EvaluateTask:
-    """A received body in `file`, of the media type `kind`, and the query's parameters; the answer's
-    is `wanted`.
+    """A received body in `file` of the media type `kind`, and the query's parameters.
 
-    `longest`: most that the body may ask for as its deadline, and what it gets if it asks for none
-    [s].
+    `wanted` is the media type of the answer, `longest` the longest and default deadline [s].
     """
 
     file: str
@@ -191,9 +199,7 @@ class EvaluateTask:
     def _evaluate_log(
         self, settings: EvaluateCsvSettings, end: Deadline, error: InvalidTable
     ) -> Evaluated:
-        """The evaluation of a file whose header is that of a log, and not that of a motion, as
-        `error` says.
-        """
+        """The evaluation of a file without the header of a motion, see `error`, as a log."""
         reading = read_csv(Path(self.file), settings, error)
         if settings.model_fields_set & {"time_per_segment", "interpolation"}:
             raise own_times()
@@ -206,13 +212,11 @@ class EvaluateTask:
         return evaluated(request, self._end(request, began, "body"))
 
     def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
-        """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it
-        may.
-        """
+        """The deadline. Raises InvalidRequest at `where` if it is too long."""
         if asked.deadline is not None and asked.deadline > self.longest:
             msg = (
-                f"deadline must be at most {self.longest:g} s: the operator of the service has "
-                "set this."
+                f"deadline must be at most {self.longest:g} s: the operator of the service has set "
+                "this."
             )
             raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
         return began.earlier_by(-(asked.deadline or self.longest))
@@ -230,7 +234,7 @@ def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluated:
 
 
 def _evaluated_log(asked: EvaluateSettings, reading: LogReading, end: Deadline) -> Evaluated:
-    """The evaluation of the motion of a log, until about `end`, and what was measured."""
+    """The evaluation of the motion of a log until about `end`, with measured energies."""
     with until(end):
         arm = to_arm(asked)
     result = evaluate(arm, reading.log.recording(), asked.sample_period, end.left)
@@ -238,12 +242,12 @@ def _evaluated_log(asked: EvaluateSettings, reading: LogReading, end: Deadline) 
 
 
 def _csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:
-    """Settings from query parameters: each is JSON, or a bare word. Raises InvalidRequest."""
+    """Settings from query parameters in JSON or as bare words. Raises InvalidRequest."""
     return _validated(lambda: EvaluateCsvSettings.model_validate(query_values(query)), "query")
 
 
 def _validated(validate: Callable[[], M], where: str) -> M:
-    """What `validate` returns. Raises InvalidRequest with the part `where` of the request."""
+    """The result of `validate`. Raises InvalidRequest at `where`."""
     try:
         return validate()
     except ValidationError as error:
@@ -268,10 +272,13 @@ def _csv_table(found: Evaluated) -> str:
     rows = [(str(k), each) for k, each in enumerate(found.segments, 1)]
     for name, interval in [*rows, ("total", found.total)]:
         row = {"segment": name, **dict(_flat("", interval))}
-        # only the whole motion has one
+        # many segments have none
         row = {
             key: value for key, value in row.items() if not key.startswith("electrical.interval")
         }
+        known = interval.energy.electrical.interval
+        for end in ("p5", "p95"):
+            row[f"electrical.interval.{end}"] = None if known is None else getattr(known, end)
         if writer is None:
             writer = csv.DictWriter(text, row.keys(), lineterminator="\n")
             writer.writeheader()

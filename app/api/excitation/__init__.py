@@ -1,1 +1,1 @@
-"""`POST /excitation`: a motion that tells the parameters of an arm apart."""
+"""`POST /excitation`: a motion for the identification of an arm."""

@@ -37,9 +37,9 @@ async def excitation(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
 ) -> Response:
-    """A periodic motion from rest to rest whose log tells friction, rotor inertias and base
-    parameters apart, within all limits and clear of everything. `Accept: text/csv` returns its
-    samples as a table, which `/evaluate` takes."""
+    """A periodic motion from rest to rest for a log with separable friction, rotor inertias and
+    base parameters, within all limits and free of collisions. `Accept: text/csv` returns its
+    samples as a table for `/evaluate`."""
     task = ExcitationTask(body, wanted, request.state.id)
     result = await unless_disconnected(
         request, engine.run(task, deadline_of(body, settings.max_deadline))

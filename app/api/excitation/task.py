@@ -1,4 +1,4 @@
-"""What `POST /excitation` takes and answers, and its work in a worker."""
+"""Request and answer of `POST /excitation`, and its work in a worker."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ from joulepath.app.schemas.common import described
 from joulepath.app.schemas.examples.values import HOME
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.excitation.excitation_problem import (
-    LEAST_DEADLINE,
+    REQUEST_LIMITS,
     Criterion,
     ExcitationProblem,
     Part,
 )
-from joulepath.optimizer.excitation.excite import Excitation, excite
+from joulepath.optimizer.excitation.excitation_result import Excitation
+from joulepath.optimizer.excitation.excite import excite
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]
 _Angles = Annotated[
@@ -37,14 +38,12 @@ _Noise = Annotated[
 
 
 class ExcitationRequest(ArmRequest):
-    """A periodic motion that tells the parameters of an arm apart. It keeps clear of the arm itself
-    and the scene.
-    """
+    """A periodic, collision-free motion for the identification of an arm."""
 
     parameters: Annotated[list[Part], Field(min_length=1, max_length=3)] = described(
         "Parameters that the motion is to tell apart: `inertials` (base parameters of the links), "
-        "`rotor` (rotor "
-        "inertias), `friction` (Coulomb, viscous, offset, and load where a joint carries enough).",
+        "`rotor` (rotor inertias), `friction` (Coulomb, viscous, offset, and load where a joint "
+        "carries enough).",
         None,
         ["rotor", "friction"],
         default=_ALL,
@@ -53,8 +52,7 @@ class ExcitationRequest(ArmRequest):
     harmonics: int = described("Number of harmonics.", "1", 3, default=5, ge=2, le=10)
     criterion: Criterion = described(
         "`d`: the determinant of the information is maximised. `condition`: the condition of the "
-        "columns, scaled to "
-        "one length, is lowered.",
+        "columns, scaled to one length, is lowered.",
         None,
         "d",
         default="d",
@@ -101,8 +99,7 @@ class ExcitationRequest(ArmRequest):
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it "
-        "passes, the service "
-        "returns the best certified motion found so far.",
+        "passes, the service returns the best certified motion found so far.",
         "s",
         5.0,
         default=60.0,
@@ -113,7 +110,7 @@ class ExcitationRequest(ArmRequest):
 
 @dataclass(frozen=True, kw_only=True)
 class ExcitationAnswer(Excitation, MotionAnswer):
-    """A motion that tells the parameters of an arm apart, from rest to rest."""
+    """A motion from rest to rest for the identification of an arm."""
 
 
 @dataclass(frozen=True)
@@ -136,12 +133,12 @@ class ExcitationTask:
 
 
 def _problem(request: ExcitationRequest, deadline: float) -> ExcitationProblem:
-    """The problem of a request, of whose time `deadline` [s] is left.
+    """The problem of a request with a remaining time of `deadline` [s].
 
     Raises UnknownRobot, InvalidProblem or DeadlineExceeded.
     """
     # it may have passed while the request waited
-    end = Deadline.after(max(deadline, LEAST_DEADLINE))
+    end = Deadline.after(max(deadline, REQUEST_LIMITS.min_deadline))
     with until(end):
         arm = to_arm(request)
     same = (
@@ -165,7 +162,7 @@ def _problem(request: ExcitationRequest, deadline: float) -> ExcitationProblem:
 
 
 def _csv(found: Excitation) -> str:
-    """CSV with the columns t, then q, v and a of every joint: what `POST /evaluate` takes."""
+    """CSV with the columns t, then q, v and a of all joints, for `POST /evaluate`."""
     samples, text = found.trajectory, StringIO()
     joints = range(1, samples.q.shape[1] + 1)
     writer = csv.writer(text, lineterminator="\n")

@@ -1,4 +1,4 @@
-"""What `POST /export/{format}` takes."""
+"""Request of `POST /export/{format}`."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class FrankaOptions(Request):
 
 
 class PointsOptions(Request):
-    """Options that `rapid` and `krl` share."""
+    """Options of both `rapid` and `krl`."""
 
     tolerance: float = described(
         "Deviation from the spline that the number of points is chosen for. The file says what is "

@@ -85,8 +85,8 @@ async def export(
     engine: ServiceArmEngine,
 ) -> Response:
     """Writes the motion of an answer as a file for a robot controller. The certificate of the
-    motion is computed again, for the speed asked for: what fails it is not exported. No format was
-    run on hardware."""
+    motion is computed again for the requested speed; a motion without a valid certificate is not
+    exported. No format was run on hardware."""
     as_json = is_wanted(request, JSON)
     task = ExportTask(body, format, as_json, request.state.id)
     work = engine.run(task, settings.max_deadline)

@@ -21,9 +21,8 @@ from joulepath.optimizer.export.program import Program
 
 @dataclass(frozen=True)
 class ExportResult(TaskResult):
-    """A file, its name, and what its response's headers say: largest ratio to a limit, speed scale,
-    notes.
-    """
+    """A file, its name, and the data of its headers: largest ratio to a limit, speed scale,
+    notes."""
 
     name: str = field(kw_only=True)
     speed_scale: float = field(kw_only=True)
@@ -44,9 +43,7 @@ class ExportTask:
     request_id: str
 
     def run(self, deadline: float) -> ExportResult:
-        """The file. Raises PartsNeeded with the answers that must be kept at hand first, and what
-        its parts raise.
-        """
+        """The file. Raises PartsNeeded with missing kept answers, and the errors of exports."""
         end = Deadline.after(deadline)
         options = to_options(self.asked, self.format, "json" if self.as_json else "yaml")
         try:

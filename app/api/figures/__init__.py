@@ -1,1 +1,1 @@
-"""`/figures`: figures of a robot that were identified on one arm."""
+"""`/figures`: figures identified on one arm."""

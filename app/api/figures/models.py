@@ -1,4 +1,4 @@
-"""What the routes under `/figures` answer."""
+"""Answers of the routes under `/figures`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from joulepath.app.schemas.examples.values import CREATED
 
 
 class FiguresSummary(Response):
-    """Figures of a robot that were identified on one arm."""
+    """Figures of a robot identified on one arm."""
 
     id: str = described(
         "Id of the figures, for the field `figures` of a request.", None, FIGURES_ID

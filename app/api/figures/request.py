@@ -1,4 +1,4 @@
-"""What `PUT /figures` takes."""
+"""Request of `PUT /figures`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _section(what: str, example: Section) -> Any:
 
 class FiguresDocument(Request):
     """Figures of a robot, some of them identified on one arm, in the form of its `figures.yaml`.
-    Each figure has `value`, `unit`, `source`, `trust`, and `sd` if it was identified. Only friction
+    A figure has `value`, `unit`, `source`, `trust`, and `sd` if it was identified. Only friction
     laws, drives, electronics and inertials may differ from the robot's own."""
 
     robot: RobotName = described("Name of the robot.", None, "ur5e")
@@ -80,5 +80,5 @@ class FiguresDocument(Request):
     parameters: int | None = described("Has no effect.", "1", 2, default=None)
 
     def document(self) -> dict[str, Any]:
-        """The document alone, without what is left out."""
+        """The document with its given fields alone."""
         return self.model_dump(exclude={"id", "created", "owner", "parameters"}, exclude_none=True)

@@ -64,8 +64,8 @@ async def put(
     store: ServiceStore,
     client: ServiceClient,
 ) -> FiguresDetail:
-    """Stores figures of a robot that were identified on one arm, as `GET /figures/{id}` of this or
-    another server gives them. The id follows from the content: the same figures are stored once.
+    """Stores figures identified on one arm, in the form of `GET /figures/{id}` of this or another
+    server. The id follows from the content: the same figures are stored once.
     Their first owner keeps them."""
     task = FiguresTask(body, request.state.id)
     result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
@@ -126,7 +126,7 @@ async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
     responses=problem_responses(UnknownFigures, FiguresInUse, NotOwner, StoreUnavailable),
 )
 async def delete(id: FiguresIdPath, store: ServiceStore, client: ServiceClient) -> None:
-    """Deletes figures that no study uses. Stored answers that used them stay."""
+    """Deletes figures not used by a study. Stored answers with these figures stay."""
     await store.write(partial(figures.delete, id=id, client=client), frees=True)
 
 

@@ -21,18 +21,15 @@ class FiguresTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """What takes the place of the robot's own figures, as JSON. `deadline` is not watched: it
-        takes milliseconds.
+        """The replacing figures as JSON, in milliseconds without a watch on `deadline`.
 
-        Raises UnknownRobot, or InvalidProblem, which names the place.
+        Raises UnknownRobot, or InvalidProblem with the place.
         """
         return TaskResult.of_json(replacing(self.request.robot, self.request.document()))
 
 
 def replacing(name: str, document: dict[str, Any]) -> dict[str, Any]:
-    """What of a document takes the place of a robot's own figures. Raises UnknownRobot, or
-    InvalidProblem.
-    """
+    """Figures of a document replacing the robot's own. Raises UnknownRobot or InvalidProblem."""
     robot = robot_named(name)
     try:
         content = replaced_in(robot.name, robot.figures, document)

@@ -1,4 +1,4 @@
-"""What the routes under `/identifications` answer."""
+"""Answers of the routes under `/identifications`."""
 
 from __future__ import annotations
 
@@ -30,9 +30,7 @@ class IdentifiedParameter(Response):
 
 
 class TorqueErrors(Response):
-    """Errors of predicted torques on held-out moves. Arrays are over joints; null where nothing
-    moved.
-    """
+    """Errors of predicted torques on held-out moves, over joints; null for joints at rest."""
 
     rmse: list[float] = described(
         "Root mean square while the joint moves.", "N·m", [0.7, 0.8, 0.4, 0.2, 0.2, 0.1]
@@ -66,7 +64,7 @@ class Prediction(Response):
 
 
 class HeldOutErrors(Response):
-    """How figures predict moves that their fit has not seen."""
+    """Prediction errors on moves outside the fit."""
 
     moves: int = described("Number of these moves.", "1", 6)
     fitted: Prediction = part("The identified figures.")
@@ -77,7 +75,7 @@ class HeldOutErrors(Response):
 
 
 class Structure(Response):
-    """What the torques of the links depend on."""
+    """Parameters of the links' torques."""
 
     standard: int = described("Number of parameters of bodies and rotors.", "1", 66)
     base: int = described("Number of their combinations that matter.", "1", 40)
@@ -103,7 +101,7 @@ class Physical(Response):
 
 
 class Residuals(Response):
-    """What the fit leaves over."""
+    """Residuals of the fit."""
 
     torque_lag_one: list[float | None] = described(
         "Correlation of neighbouring residuals of each joint's torque.",
@@ -147,7 +145,7 @@ class Temperatures(Response):
 
 
 class Advice(Response):
-    """What would help most."""
+    """The most useful further measurement."""
 
     figure: str = described(
         "The figure that, if known, would take most of the energy's variance away.", None, "copper"
@@ -174,8 +172,8 @@ class IdentificationSummary(Response):
     )
     figures: str | None = described(
         "Id of the figures that were found: every request about a motion takes it as `figures`. "
-        "Null before the end, "
-        "where the service has no room for more figures, and after they were deleted.",
+        "Null before the end, where the service has no room for more figures, and after they were "
+        "deleted.",
         None,
         FIGURES_ID,
     )
@@ -195,14 +193,14 @@ class IdentificationList(Response):
 
 
 class IdentificationPage(Query):
-    """The part of the list of identifications that is returned."""
+    """A page of the list of identifications."""
 
     limit: int = limit_of("identifications")
     after: str | None = after_of(IDENTIFICATION_ID)
 
 
 class Identification(IdentificationSummary):
-    """An identification: its state and, once it is done, what was found."""
+    """An identification: its state and, once it is done, its result."""
 
     problem: dict[str, Any] | None = described(
         "Why it failed (RFC 9457); null otherwise.",
@@ -213,7 +211,7 @@ class Identification(IdentificationSummary):
 
 
 class TorqueCurves(Response):
-    """Torques of the motors, one list for each joint."""
+    """Torques of the motors, one list per joint."""
 
     measured: list[list[float | None]] = described(
         "As measured, or from the currents; null where not logged.",
@@ -238,9 +236,7 @@ class PowerCurves(Response):
 
 
 class ResidualMove(Response):
-    """A move of a log: what was measured, and what figures make of it. The residual is the
-    difference.
-    """
+    """A move of a log: measured and modelled values. The residual is their difference."""
 
     log: str = described("Id of the log.", None, LOG_ID)
     held_out: bool = described(
@@ -255,13 +251,12 @@ class ResidualMove(Response):
 
 
 class ResidualCurves(Response):
-    """What identified figures make of the logs, over time."""
+    """Measured and modelled values of the logs over time."""
 
     id: str = described("Id of the identification.", None, IDENTIFICATION_ID)
     moves: list[ResidualMove] | None = part(
         "All moves, those that are held out last: some 3000 instants in all, evenly among the "
-        "rows. Null before it is "
-        "done, and for identifications of an earlier version."
+        "rows. Null before it is done, and for identifications of an earlier version."
     )
 
 
@@ -279,15 +274,13 @@ class FoundPayload(Response):
 
 
 class IdentificationResult(Response):
-    """What was found from logs."""
+    """The result of an identification."""
 
     robot: str = described("Name of the robot.", None, "ur5e")
     document: dict[str, Any] = described(
         "The identified figures, which `PUT /figures` of another server takes, too: in the form of "
-        "the robot's own, "
-        "with value, unit, source, trust and `sd`; `covariance`, "
-        "`session_sd` (relative, of friction from day to day) and `move_sd` (W, of the mean power "
-        "of a move).",
+        "the robot's own, with value, unit, source, trust and `sd`; `covariance`, `session_sd` "
+        "(relative, of friction from day to day) and `move_sd` (W, of the mean power of a move).",
         None,
         {"robot": "ur5e", "electronics": {"idle_power": {"value": 36.4, "unit": "W", "sd": 0.3}}},
     )

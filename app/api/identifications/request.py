@@ -1,4 +1,4 @@
-"""What `POST /identifications` takes."""
+"""Request of `POST /identifications`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DEADLINE = 60.0
 
 
 class Fraction(Request):
-    """The part of the moves that is held out."""
+    """The share of held-out moves."""
 
     fraction: float = described(
         "Fraction of the moving time; whole motions are held out.",
@@ -29,7 +29,7 @@ class Fraction(Request):
 
 
 class FrictionTerms(Request):
-    """The friction law that is fitted."""
+    """The fitted friction law."""
 
     terms: Annotated[list[Term], Field(min_length=1, max_length=5)] = described(
         "Terms of the law. `curved` is the concave rise of strain-wave gears, at the speed that "
@@ -49,13 +49,12 @@ class FrictionTerms(Request):
 
 
 class IdentifyRequest(Request):
-    """Logs of one robot, and what is to be found from them."""
+    """Logs of one robot, and the parameters to identify."""
 
     logs: LogIds = described("Ids of logs, all of one robot.", None, [LOG_ID])
     validate_: LogIds | Fraction | Literal["moves"] = described(
         "What the figures are validated on, which no fit sees: other logs, a fraction of the "
-        "moves, or `moves`: each "
-        "motion in its turn. Moves along the same motion stay together.",
+        "moves, or `moves`: each motion in its turn. Moves along the same motion stay together.",
         None,
         {"fraction": 0.3},
         default=Fraction(),
@@ -63,19 +62,16 @@ class IdentifyRequest(Request):
     )
     fit: Annotated[list[Target], Field(min_length=1, max_length=5)] = described(
         "What is found. Power is added by itself where the logs have it; asking for it refuses "
-        "logs without. "
-        "`payload`: mass and centre of mass of what the last of `logs` carried and the others did "
-        "not; friction and "
-        "rotors are found with it.",
+        "logs without. `payload`: mass and centre of mass of what the last of `logs` carried and "
+        "the others did not; friction and rotors are found with it.",
         None,
         ["friction", "rotor"],
         default=["friction", "rotor"],
     )
     method: Method = described(
         "How it is found. `automatic`: friction and rotors with the robot's own links where the "
-        "logs "
-        "have currents or torques, and power where they have it. The others are methods of the "
-        "literature, each for its own kind of log: one that does not fit is "
+        "logs have currents or torques, and power where they have it. The others are methods of "
+        "the literature, each for its own kind of log: one that does not fit is "
         "`method-not-applicable`.",
         None,
         "automatic",
@@ -127,5 +123,5 @@ class IdentifyRequest(Request):
 
     @property
     def all_logs(self) -> list[str]:
-        """Ids of the logs of the fit, then of those of the validation."""
+        """Ids of the logs of the fit, then of the validation."""
         return [*self.logs, *(self.validate_ if isinstance(self.validate_, list) else [])]

@@ -74,9 +74,8 @@ async def add(
     client: ServiceClient,
     key: Key = None,
 ) -> Identification:
-    """Finds friction, rotor inertia and power of one arm from its logs, and says how well they
-    predict moves that no fit has seen. The work is a job, whose id is the identification's: `GET
-    /jobs/{id}` knows it, too."""
+    """Finds friction, rotor inertia and power of one arm from its logs, with their prediction
+    errors on held-out moves. The work is a job with the same id: see `GET /jobs/{id}`."""
     robots = set()
     for each in body.all_logs:
         robots.add((await store.read(partial(stored_logs.about, log_id=each))).robot)
@@ -109,7 +108,7 @@ async def list_identifications(
     responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
 async def show(id: IdentificationId, store: ServiceStore) -> Identification:
-    """The state of an identification and, once it is done, what was found."""
+    """The state of an identification and, once it is done, its result."""
     return await _shown(store, id)
 
 
@@ -120,8 +119,8 @@ async def show(id: IdentificationId, store: ServiceStore) -> Identification:
     responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
 async def residuals(id: IdentificationId, store: ServiceStore) -> Response:
-    """Measured and modelled torques and power over time, move by move. Moves that were held out are
-    predicted by a fit that has not seen them."""
+    """Measured and modelled torques and power over time, move by move. Held-out moves are predicted
+    by a fit without them."""
     body = await store.read(partial(_curves, job_id=id))
     content = (
         {"id": id, "moves": None} if body is None else {"id": id, **orjson.loads(unpacked(body))}

@@ -21,7 +21,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.fits.payload_fit import Carried
+from joulepath.optimizer.identify.fits.payload_fit import IdentifiedPayload
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
@@ -32,17 +32,14 @@ _DECIMALS = 4
 
 @dataclass(frozen=True)
 class IdentifyTask:
-    """A validated request, and the logs that it names: those of the fit, then those of the
-    validation.
-    """
+    """A validated request, and its logs: of the fit, then of the validation."""
 
     request: IdentifyRequest
     logs: tuple[GivenLog, ...]
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """What was found, within about `deadline` seconds; the curves of its residuals are stored
-        beside it.
+        """The result within about `deadline` seconds, and the curves of its residuals.
 
         Raises UnknownRobot, EffortNotUsable, MethodNotApplicable, NotExcited, NothingHeldOut,
         NoPowerChannel, PayloadUnknown, InvalidRequest or DeadlineExceeded.
@@ -85,7 +82,7 @@ def _to_options(request: IdentifyRequest) -> IdentificationOptions:
 
 
 def _identification_fields(found: Identification, validation: Validation) -> dict[str, Any]:
-    """What an answer says of an identification."""
+    """Fields of an answer about an identification."""
     return {
         "robot": found.robot.name,
         "document": found.document(datetime.now(UTC).date().isoformat()),
@@ -107,9 +104,7 @@ def _identification_fields(found: Identification, validation: Validation) -> dic
 def _residual_fields(
     found: Identification, validation: Validation, logs: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """The moves of logs with these ids: those of the fit, and from the next number on those that
-    validate it alone.
-    """
+    """The moves of the logs with these ids: of the fit, then of the validation alone."""
     own = len(found.logs)
     others = own if len(logs) > own else 0
     return [*_moves(found.curves, logs, False), *_moves(validation.curves, logs[others:], True)]
@@ -132,18 +127,18 @@ def _moves(curves: Curves, logs: Sequence[str], held_out: bool) -> Iterator[dict
 
 
 def _series(measured: Array, modelled: Array) -> dict[str, Any] | None:
-    """None where nothing was measured."""
+    """The series; None without a measurement."""
     if np.isnan(measured).all():
         return None
     return {"measured": _rounded(measured), "modelled": _rounded(modelled)}
 
 
 def _rounded(values: Array) -> Array:
-    # of what sensors tell, nothing is lost; the document is half as long
+    # The resolution exceeds that of sensors, and the document is half as long.
     return np.ascontiguousarray(values.round(_DECIMALS))
 
 
-def _payload_fields(carried: Carried) -> dict[str, Any]:
+def _payload_fields(carried: IdentifiedPayload) -> dict[str, Any]:
     mass_sd, *com_sd = np.sqrt(np.diag(carried.covariance)).tolist()
     told = {
         "log": carried.log,

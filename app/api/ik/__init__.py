@@ -1,1 +1,1 @@
-"""`POST /ik`: every arm configuration that reaches a pose."""
+"""`POST /ik`: all arm configurations of a pose."""

@@ -27,9 +27,9 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 async def solve(
     request: Request, body: IKRequest, settings: ServiceSettings, engine: ServiceArmEngine
 ) -> Response:
-    """Every solution within the joint range, with its branch, its distance to the limits and its
-    smallest singular value. Of a pose that the arm holds in infinitely many configurations (wrist
-    stretched), some, with the joints that are `free`. Also the nearest or colliding pair of bodies
-    in each: links, tool, payload and obstacles."""
+    """All solutions within the joint ranges, with branch, distance to the limits and smallest
+    singular value. A pose with infinitely many configurations (stretched wrist) has some of them,
+    with the `free` joints. Every solution has its nearest or colliding pair of bodies: links, tool,
+    payload and obstacles."""
     work = engine.run(IKTask(body, request.state.id), deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))

@@ -1,5 +1,4 @@
-"""What `POST /ik` takes and answers, and its work in a worker, because its meshes may take
-seconds."""
+"""Request and answer of `POST /ik`, and its work in a worker: meshes may take seconds."""
 
 from __future__ import annotations
 
@@ -7,8 +6,9 @@ from dataclasses import dataclass
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.convert.arm import robot_named
-from joulepath.app.convert.pose import to_base_pose, to_matrix
-from joulepath.app.convert.scene import to_attachment, to_scene, to_tool
+from joulepath.app.convert.pose import to_base_pose
+from joulepath.app.convert.scene import to_attachment, to_scene
+from joulepath.app.convert.tool import to_tcp, to_tool
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.common import BasePose, described
@@ -18,7 +18,7 @@ from joulepath.models.robot import Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.inverse_kinematics import IKSolution, inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 class IKRequest(CellRequest):
@@ -48,19 +48,19 @@ class IKRequest(CellRequest):
         10.0,
         default=10.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class IKAnswer(Answer):
-    """All arm configurations within the joint range that reach the pose."""
+    """All arm configurations of the pose within the joint ranges."""
 
     solutions: tuple[IKSolution, ...]
     """One entry per configuration."""
     complete: bool
-    """Whether every branch is among them. False for an arm whose inverse kinematics is not proven
-    to find all: some may be missing."""
+    """Whether the solutions contain every branch. False for an arm without a complete inverse: some
+    may be missing."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def to_ik_arm(request: IKRequest, robot: Robot) -> Arm:
     carried = request.payload
     return Arm(
         robot=robot,
-        T_flange_tcp=to_matrix(request.tcp),
+        T_flange_tcp=to_tcp(request.tcp, request.tool),
         tool=to_tool(request.tool),
         payload=Payload(
             shape=None if carried is None else to_attachment(carried.shape, carried.touches)

@@ -39,10 +39,8 @@ class LogEffort(Response):
     )
     slope: dict[str, float | None] = described(
         "Slope of the effort against the torque of the rigid model, with friction beside it, at "
-        "the two joints next to "
-        "the base that carry most. About 1 / torque constant: current; 1: torque; 0: without "
-        "gravity. Null: the motion "
-        "does not tell.",
+        "the two joints next to the base that carry most. About 1 / torque constant: current; 1: "
+        "torque; 0: without gravity. Null: the motion does not tell.",
         "1/A or 1",
         {"shoulder_lift_joint": 0.1, "elbow_joint": 0.1},
     )
@@ -89,8 +87,7 @@ class LogDetail(LogSummary):
     effort: LogEffort | None = part("What the efforts are; null if none were logged.")
     moves: list[LogMove] = part(
         "Moves and rests, in order. A move of more than 8 s is divided into blocks of about 5 s, "
-        "with 0.5 s between "
-        "them left out."
+        "with 0.5 s between them left out."
     )
     warnings: list[str] = described(
         "What is odd: gaps, constant or saturated channels, velocities that do not fit, an unknown "

@@ -23,7 +23,7 @@ from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.store_answers import keep_answer
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.search.errors import PathInfeasible
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -67,6 +67,8 @@ async def optimize(
             result = await engine.run(task, left, tell)
             return await keep_answer(store, settings, "optimize", result, client.owner, asked)
 
-        return await cache.answer(asked, request.state.id, deadline, compute, tell is not nobody)
+        return await cache.answer(
+            asked, request.state.id, deadline, compute, tell is not no_listener
+        )
 
     return await reply.of(work)

@@ -19,7 +19,7 @@ from joulepath.app.schemas.request import DurationRange, OptimizeRequest
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.optimizer.declared import Joules, NotEmpty, Ratio, Seconds, Watts
-from joulepath.optimizer.pareto import LEAST_POINTS, MOST_POINTS, pareto
+from joulepath.optimizer.pareto import PARETO, pareto
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.front import Dropped, FrontSolver
@@ -34,8 +34,8 @@ class ParetoRequest(OptimizeRequest):
         "1",
         12,
         default=12,
-        ge=LEAST_POINTS,
-        le=MOST_POINTS,
+        ge=PARETO.least_points,
+        le=PARETO.most_points,
     )
     duration: DurationRange | None = described(
         "Bounds on the durations of the front. Null: from the shortest feasible duration to the "

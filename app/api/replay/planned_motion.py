@@ -36,7 +36,7 @@ class _Baseline(Part):
     duration: Annotated[float, Field(ge=0, le=1e6)]
     electrical: Number
     mechanical: Number
-    saving: Number
+    saving: Number | None
 
 
 class _Candidate(Part):

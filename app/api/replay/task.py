@@ -28,8 +28,7 @@ from joulepath.optimizer.replay.simulator import mujoco
 PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
 NO_BASELINES = (
     "The motions of the baselines do not follow from this answer, so that their savings are not "
-    "replayed. They do for "
-    "goals that are joint positions or whole poses, without a path."
+    "replayed. They do for goals that are joint positions or whole poses, without a path."
 )
 CONTROLS: dict[Literal["feed_forward", "pd", "both"], tuple[ControlName, ...]] = {
     "feed_forward": ("feed_forward",),
@@ -62,8 +61,7 @@ class ReplayRequest(AnswerRequest):
 
     control: Literal["feed_forward", "pd", "both"] = described(
         "Controller of the joints. `feed_forward`: torques known in advance, friction included, "
-        "and a PD loop. `pd`: "
-        "the loop alone, as simple controllers have it.",
+        "and a PD loop. `pd`: the loop alone, as simple controllers have it.",
         None,
         "feed_forward",
         default="both",

@@ -98,10 +98,8 @@ class RobotDetail(RobotSummary):
     limits: Parameters = part("Limits and rated payload.")
     collision: Parameters = part(
         "Capsules that hold each link, the mesh sets that they hold (`meshes`), the link that "
-        "carries the elbow, and "
-        "pairs of links that are never in collision. A capsule is [x1, y1, z1, x2, y2, z2, "
-        "radius]: both ends of its "
-        "axis in the link frame."
+        "carries the elbow, and pairs of links that are never in collision. A capsule is [x1, y1, "
+        "z1, x2, y2, z2, radius]: both ends of its axis in the link frame."
     )
     drives: Parameters = part("Motors, gears and inverters.")
     electronics: Parameters = part(
@@ -113,8 +111,7 @@ class RobotDetail(RobotSummary):
     )
     form: list[list[FormBody]] = part(
         "What each link looks like by these parameters, base first: tubes between the joints and "
-        "round housings with "
-        "caps at them. No collision check sees it."
+        "round housings with caps at them. No collision check sees it."
     )
     has_meshes: bool = described(
         "Whether `GET /robots/{name}/meshes.glb` has the maker's meshes of the links.", None, True

@@ -9,22 +9,24 @@ from pydantic import Field
 
 from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.examples.own_arm import URDF
-from joulepath.app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
-from joulepath.models.own_arm.description import WIDEST
+from joulepath.app.schemas.lengths import LENGTHS
+from joulepath.models.own_arm.description import PLAUSIBLE
 from joulepath.models.shape_sizes import SIZES
 
 Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
 NotNegative = Annotated[float, Field(ge=0, le=1e6)]
 PositivePerJoint = Positive | Annotated[list[Positive], Field(min_length=1, max_length=16)]
 PerJoint = NotNegative | Annotated[list[NotNegative], Field(min_length=1, max_length=16)]
-Text = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
+Text = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS), PLAIN]
 # a name in the URDF
 Named = Annotated[str, Field(min_length=1, max_length=100)]
 Length = Annotated[float, Field(ge=-10, le=10)]
 Capsule = Annotated[list[Length], Field(min_length=7, max_length=7)]
 Pair = Annotated[list[Named], Field(min_length=2, max_length=2)]
-NAME_PATTERN = re.compile(rf"^[a-z0-9][a-z0-9_-]{{0,{ROBOT_LENGTH - 1}}}$")
-OwnName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH, pattern=NAME_PATTERN.pattern)]
+NAME_PATTERN = re.compile(rf"^[a-z0-9][a-z0-9_-]{{0,{LENGTHS.robot - 1}}}$")
+OwnName = Annotated[
+    str, Field(min_length=1, max_length=LENGTHS.robot, pattern=NAME_PATTERN.pattern)
+]
 
 
 class OwnDrives(Request):
@@ -62,14 +64,13 @@ class OwnCollision(Request):
 
     capsules: dict[Named, Annotated[list[Capsule], Field(max_length=50)]] | None = described(
         "Capsules by the name of a link: [x1, y1, z1, x2, y2, z2, radius], both ends of the axis "
-        "in the link's URDF "
-        "frame.",
+        "in the link's URDF frame.",
         "m",
         {"forearm": [[0.0, 0.0, 0.05, 0.0, 0.0, 0.3, 0.05]]},
         default=None,
         max_length=200,
     )
-    radius: Annotated[float, Field(ge=SIZES.smallest, le=WIDEST)] | None = described(
+    radius: Annotated[float, Field(ge=SIZES.smallest, le=PLAUSIBLE.radius)] | None = described(
         "Radius of the capsules from joint to joint. Null: 4.5 % of the arm's length.",
         "m",
         0.05,
@@ -96,8 +97,7 @@ class OwnArm(Request):
 
     urdf: str = described(
         "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they "
-        "must be revolute or "
-        "continuous. All else that hangs on them must be fixed, or `locked`.",
+        "must be revolute or continuous. All else that hangs on them must be fixed, or `locked`.",
         None,
         URDF,
         min_length=1,
@@ -139,9 +139,8 @@ class OwnArm(Request):
     )
     torque_side: Literal["motor", "link"] | None = described(
         "What the limits on the torque are for: the `motor` behind its gear, friction and rotor "
-        "included; or the "
-        "`link`, without them, as with torque sensors. Null: the motor, nearly always the tighter "
-        "reading.",
+        "included; or the `link`, without them, as with torque sensors. Null: the motor, nearly "
+        "always the tighter reading.",
         None,
         "link",
         default=None,
@@ -178,8 +177,7 @@ class OwnArm(Request):
     )
     meshes: str | None = described(
         "Mesh files (STL, OBJ) that the URDF names, as a zip in base64. Null: a link whose shape "
-        "is a mesh has a "
-        "capsule from joint to joint.",
+        "is a mesh has a capsule from joint to joint.",
         None,
         "UEsFBgAAAAAAAAAAAAAAAAAAAAAAAA==",
         default=None,

@@ -15,6 +15,7 @@ from joulepath.optimizer.exceptions import (
     OutsideLimits,
     SingularPose,
     UnknownRobot,
+    UnknownTool,
     UnreachablePose,
     UnreachableTargets,
 )
@@ -31,6 +32,7 @@ from joulepath.optimizer.search.errors import (
 WORKER_PROBLEMS: tuple[type[DeclaredError], ...] = (
     InvalidRequest,
     UnknownRobot,
+    UnknownTool,
     BodyTooLarge,
     RequestTimeout,
     ShuttingDown,

@@ -14,7 +14,7 @@ from joulepath.app.http.event_stream import EVENT_STREAM, EventStream, Work
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.weights import is_wanted
 from joulepath.app.schemas.examples.progress import EVENTS
-from joulepath.optimizer.progress import nobody
+from joulepath.optimizer.progress import no_listener
 
 BY_EVENTS: dict[str, Any] = {EVENT_STREAM: {"schema": {"type": "string"}, "example": EVENTS}}
 """Content of the 200 of a route whose progress can be listened to."""
@@ -33,7 +33,7 @@ class Reply:
         """
         if self.by_events:
             return EventStream(self.request, work)
-        return result_response(await unless_disconnected(self.request, work(nobody)))
+        return result_response(await unless_disconnected(self.request, work(no_listener)))
 
 
 async def _reply(request: Request) -> Reply:

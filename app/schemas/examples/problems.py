@@ -20,6 +20,7 @@ from joulepath.optimizer.exceptions import (
     OutsideLimits,
     SingularPose,
     UnknownRobot,
+    UnknownTool,
     UnreachablePose,
     UnreachableTargets,
 )
@@ -51,8 +52,7 @@ from joulepath.optimizer.search.errors import (
 
 _OUT_OF_REACH = (
     "The goal pose is 0.12 m out of reach in this orientation: move the position closer to the "
-    "robot's workspace, or "
-    "change the orientation."
+    "robot's workspace, or change the orientation."
 )
 _COLLIDES = "it collides: table and forearm miss 0.031 m of clearance"
 _CANDIDATE = CandidateReport(
@@ -83,6 +83,7 @@ _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
         InvalidTable("q3 in line 17 is no finite number: correct or delete it.", 17, "q3"),
         OutsideLimits("start", "elbow_joint", 3.5, -3.1416, 3.1416),
         UnknownRobot("r2d2", ["ur10e", "ur3e", "ur5e"]),
+        UnknownTool(["franka_hand", "onrobot_rg2", "robotiq_2f_85"]),
         UnreachablePose("goal", 0.12, _OUT_OF_REACH),
         SingularPose("goal", 1e-9),
         UnreachableTargets("goal", [UnreachableTarget("goal", 0, _OUT_OF_REACH)]),

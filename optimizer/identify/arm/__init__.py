@@ -1,1 +1,1 @@
-"""An arm with fitted figures: what its torques and its power are made of."""
+"""Model of an arm with fitted figures: torques, power, base parameters and pseudo-inertias."""

@@ -1,9 +1,9 @@
-"""Base parameters: the least set of combinations on which the torques depend (Gautier 1991, by QR
-with pivoting).
+"""Base parameters: the fewest combinations of standard parameters that determine the torques.
 
-Most of the parameters of a body have no effect on any torque, or only together with others. At
-random states the regressor has as many independent columns as there are base parameters; the QR
-decomposition with column pivoting finds them, and how the other columns are combined from them.
+Most parameters of a body have no effect on any torque, or only together with others. At random
+states, the regressor has as many independent columns as there are base parameters. A QR
+decomposition with column pivoting finds these columns, and the dependent columns as combinations
+of them (Gautier 1991).
 """
 
 from __future__ import annotations
@@ -14,30 +14,44 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import qr, solve_triangular
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.dynamics.link_regressor import rigid_regressor
 
-# of the largest diagonal entry of R; between independent and dependent columns lie many orders of
-# magnitude
-TOLERANCE = 1e-8
-# coefficients of an expression below it are rounding
-LEAST_COEFFICIENT = 1e-6
-STATES = 60
-NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+STANDARD_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+
+
+@dataclass(frozen=True)
+class BaseParameterSettings:
+    """Settings of the search for base parameters."""
+
+    rank_tolerance: float = 1e-8
+    """Diagonal entry of R over the largest one, up to which a column is dependent [1]; many orders
+    of magnitude lie between independent and dependent columns."""
+    coefficient_tolerance: float = 1e-6
+    """Coefficient of a combination up to which it is a rounding error [1 or SI unit]."""
+    states: int = 60
+    """Number of random states."""
+    max_position: float = float(np.pi)
+    """Bound of the random positions [rad]."""
+    max_velocity: float = 2.0
+    """Bound of the random velocities [rad/s]."""
+    max_acceleration: float = 5.0
+    """Bound of the random accelerations [rad/s²]."""
+
+
+BASE_PARAMETERS = BaseParameterSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """`independent` (b,) numbers of the columns that are kept; `combination` (b, p): base =
-    combination @ standard.
-
-    `names` (p,) are those of the standard parameters, of bodies and, if asked for, of rotors behind
-    them.
-    """
+    """Base parameters as combinations of standard ones: base = combination @ standard."""
 
     names: tuple[str, ...]
+    """Names (p,) of the standard parameters: bodies first, then rotors if there are any."""
     independent: tuple[int, ...]
+    """Numbers (b,) of the independent standard parameters."""
     combination: Array
+    """Coefficients (b, p)."""
 
     @property
     def count(self) -> int:
@@ -52,36 +66,55 @@ class BaseParameters:
             for row, main in zip(self.combination, self.independent, strict=True)
         )
 
-    def lone(self, bodies: int) -> tuple[int, ...]:
-        """Numbers of the base parameters that are a single rotor's, behind so many parameters of
-        bodies."""
-        single = (np.abs(self.combination) > LEAST_COEFFICIENT).sum(axis=1) == 1
-        return tuple(k for k, main in enumerate(self.independent) if main >= bodies and single[k])
+    def single_rotors(self, body_count: int) -> tuple[int, ...]:
+        """Numbers of the base parameters that consist of a single rotor inertia.
+
+        Args:
+            body_count: number of standard parameters of bodies.
+        """
+        single = self._significant(self.combination).sum(axis=1) == 1
+        return tuple(
+            k for k, main in enumerate(self.independent) if main >= body_count and single[k]
+        )
+
+    @staticmethod
+    def _significant(coefficients: Array) -> Mask:
+        return np.asarray(np.abs(coefficients) > BASE_PARAMETERS.coefficient_tolerance)
 
     def _expression(self, row: Array, main: int) -> str:
-        others = [k for k in np.flatnonzero(np.abs(row) > LEAST_COEFFICIENT).tolist() if k != main]
+        others = [k for k in np.flatnonzero(self._significant(row)).tolist() if k != main]
         return "".join([self.names[main], *(f" {row[k]:+.6g}·{self.names[k]}" for k in others)])
 
 
 def base_parameters(model: pin.Model, rotors: bool = True) -> BaseParameters:
-    """The base parameters of an arm, with those of its rotors or without."""
-    generator = np.random.default_rng(0)
+    """The base parameters of an arm, of bodies and optionally of rotors."""
+    generator, settings = np.random.default_rng(0), BASE_PARAMETERS
     nq = model.nq
-    q, v, a = (generator.uniform(-reach, reach, (STATES, nq)) for reach in (np.pi, 2.0, 5.0))
+    q, v, a = (
+        generator.uniform(-bound, bound, (settings.states, nq))
+        for bound in (settings.max_position, settings.max_velocity, settings.max_acceleration)
+    )
     columns = rigid_regressor(model, q, v, a)
-    names = [f"{part}{joint}" for joint in range(1, nq + 1) for part in NAMES]
+    names = [f"{part}{joint}" for joint in range(1, nq + 1) for part in STANDARD_NAMES]
     if rotors:
         columns = np.concatenate([columns, a[:, :, None] * np.eye(nq)], axis=2)
         names += [f"Ia{joint}" for joint in range(1, nq + 1)]
-    independent, combination = independent_columns(columns.reshape(STATES * nq, -1))
+    independent, combination = independent_columns(columns.reshape(settings.states * nq, -1))
     return BaseParameters(tuple(names), independent, combination)
 
 
 def independent_columns(
-    matrix: Array, tolerance: float = TOLERANCE
+    matrix: Array, tolerance: float = BASE_PARAMETERS.rank_tolerance
 ) -> tuple[tuple[int, ...], Array]:
-    """Numbers (b,) of independent columns of a matrix (n, p), and the combination (b, p) of all
-    columns from them.
+    """Independent columns of a matrix, by QR decomposition with column pivoting.
+
+    Args:
+        matrix: the matrix (n, p).
+        tolerance: diagonal entry of R over the largest one, up to which a column is dependent.
+
+    Returns:
+        Numbers (b,) of the independent columns, and the coefficients (b, p) that combine all
+        columns from them.
     """
     _, R, order = qr(matrix, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(R))

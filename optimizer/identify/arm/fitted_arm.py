@@ -1,4 +1,4 @@
-"""An arm with fitted figures: its torques and its power on rows."""
+"""Arm with fitted figures: its torques and its power for rows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, column
-from joulepath.optimizer.identify.arm.power_model import Electrics, Motion, friction, power
+from joulepath.optimizer.identify.arm.power_model import (
+    PowerParameters,
+    TorqueParts,
+    bus_power,
+    friction_torque,
+)
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.options import Coupling
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -18,12 +23,10 @@ FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
 
 @dataclass(frozen=True, eq=False)
 class FittedArm:
-    """Figures (nq,) of an arm: those of the friction law, `rotor_inertia`, `torque_constant`; and
-    its electrics.
+    """Figures of an arm, per joint (nq,) unless stated otherwise.
 
-    `couplings` has the terms of motors that several joints share, `bodies` (10 nq,) the change of
-    the links' parameters from the robot's own; None for its own links. `links` is a factor on their
-    masses.
+    The friction law has the terms `coulomb`, `curved`, `offset` [N·m], `viscous` [N·m·s/rad],
+    `load` [1], with the `speed` [rad/s] at which the curved term bends.
     """
 
     coulomb: Array
@@ -33,54 +36,65 @@ class FittedArm:
     speed: Array
     offset: Array
     rotor_inertia: Array
+    """Inertia of the rotors at the joints [kg·m²]."""
     torque_constant: Array
-    electrics: Electrics
+    """Torque constants [N·m/A]."""
+    power_parameters: PowerParameters
     regeneration: float
+    """Share of negative power that is regained [1]."""
     knee: float
+    """Speed over which Coulomb friction reverses [rad/s]."""
     couplings: tuple[tuple[Coupling, dict[str, float]], ...] = ()
-    bodies: Array | None = None
-    links: float = 1.0
+    """Motors that several joints share, with their terms."""
+    link_change: Array | None = None
+    """Change (10 nq,) of the links' parameters from the robot's own; None for the own links."""
+    link_scale: float = 1.0
+    """Factor on the masses of all links [1]."""
 
     def rigid_torque(self, rows: Rows) -> Array:
-        """Torque (n, nq) [N·m] of rigid bodies."""
-        rigid = rows.rigid if self.links == 1 else rows.rigid + (self.links - 1) * rows.links
-        if self.bodies is None:
+        """Rigid-body torque (n, nq) [N·m]."""
+        rigid = rows.rigid
+        if self.link_scale != 1:
+            rigid = rows.rigid + (self.link_scale - 1) * rows.link_torques
+        if self.link_change is None:
             return rigid
         assert rows.regressor is not None
-        return np.asarray(rigid + rows.regressor @ self.bodies)
+        return np.asarray(rigid + rows.regressor @ self.link_change)
 
     def friction_torque(self, rows: Rows) -> Array:
         """Friction torque and offset (n, nq) [N·m]."""
-        motion = self.motion(rows)
-        return motion.other + friction(motion)
+        parts = self.torque_parts(rows)
+        return parts.other + friction_torque(parts)
 
     def link_torque(self, rows: Rows) -> Array:
-        """Torque (n, nq) [N·m] of rigid bodies and rotors."""
+        """Torque (n, nq) [N·m] of rigid bodies and rotors, without friction and offset."""
         return self.rigid_torque(rows) + self.rotor_inertia * rows.a
 
     def torque(self, rows: Rows) -> Array:
         """Motor torque (n, nq) [N·m]."""
-        motion = self.motion(rows)
-        return motion.rigid + motion.rotor + motion.other + friction(motion)
+        parts = self.torque_parts(rows)
+        return parts.rigid + parts.rotor + parts.other + friction_torque(parts)
 
-    def motion(self, rows: Rows) -> Motion:
-        """What the power follows from."""
+    def torque_parts(self, rows: Rows) -> TorqueParts:
+        """Torque parts from which the power follows."""
         v, a = rows.v, rows.a
-        step, other = v / np.hypot(v, self.knee), np.tile(self.offset, (len(v), 1))
+        smooth_sign = v / np.hypot(v, self.knee)
+        other = np.tile(self.offset, (len(v), 1))
         for coupling, terms in self.couplings:
-            at, by = v @ coupling.ratios, a @ coupling.ratios
+            motor_v, motor_a = v @ coupling.ratios, a @ coupling.ratios
             motor = sum(
-                value * column(term, at, by, at, self.knee) for term, value in terms.items()
+                value * column(term, motor_v, motor_a, motor_v, self.knee)
+                for term, value in terms.items()
             )
             other += np.outer(motor, coupling.ratios)
-        dry = self.coulomb * step
+        dry = self.coulomb * smooth_sign
         if self.curved.any():
             dry += self.curved * np.arcsinh(v / self.speed)
-        return Motion(
+        return TorqueParts(
             v=v,
-            step=step,
+            smooth_sign=smooth_sign,
             rigid=self.rigid_torque(rows),
-            bodies=self.links * rows.links,
+            links=self.link_scale * rows.link_torques,
             dry=dry,
             viscous=self.viscous * v,
             rotor=self.rotor_inertia * a,
@@ -89,12 +103,21 @@ class FittedArm:
         )
 
     def power(self, rows: Rows) -> tuple[Array, Array]:
-        """Power (n,) [W] on the bus, and its derivatives (n, 2 + 7 nq) by the electrics."""
-        return power(self.electrics, self.motion(rows), self.torque_constant, self.regeneration)
+        """Power (n,) [W] on the bus, and its derivatives (n, 2 + 7 nq) by the power parameters."""
+        return bus_power(
+            self.power_parameters,
+            self.torque_parts(rows),
+            self.torque_constant,
+            self.regeneration,
+        )
+
+    def energy(self, rows: Rows) -> float:
+        """Energy [J] of the rows on the bus."""
+        return float(rows.weight @ self.power(rows)[0])
 
 
 def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
-    """The arm with the robot's own figures."""
+    """The arm with the robot's own figures; `knee` [rad/s] replaces the robot's own."""
     law, drives, nq = robot.friction, robot.drives, robot.nq
     idle = robot.electronics.idle_power + float(drives.inverter_constant.sum())
     return FittedArm(
@@ -106,7 +129,7 @@ def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
         offset=np.zeros(nq),
         rotor_inertia=drives.rotor_inertia,
         torque_constant=drives.torque_constant,
-        electrics=Electrics.plain(idle, drives.copper, drives.inverter_linear),
+        power_parameters=PowerParameters.nominal(idle, drives.copper, drives.inverter_linear),
         regeneration=robot.electronics.regeneration,
         knee=law.knee if knee is None else knee,
     )
@@ -115,8 +138,17 @@ def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
 def with_torques(
     arm: FittedArm, names: tuple[Name, ...], value: Array, couplings: tuple[Coupling, ...]
 ) -> FittedArm:
-    """The arm with the figures `names` at these values (p,). A joint whose viscous friction is
-    among them, and is not the arm's own, has no other curved part than a fitted one."""
+    """The arm with some figures replaced.
+
+    A joint with a newly fitted viscous friction loses its own curved part, unless that is fitted
+    too.
+
+    Args:
+        arm: the arm.
+        names: names of the figures.
+        value: values (p,) of the figures.
+        couplings: motors shared by several joints.
+    """
     parts = {
         name: getattr(arm, name).copy()
         for name in (*FRICTION_TERMS, "rotor_inertia", "torque_constant", "speed")

@@ -1,5 +1,4 @@
-"""Columns of a joint's or a motor's friction and inertia: the torque is linear in their
-coefficients.
+"""Columns of friction and rotor inertia: the torque is linear in their coefficients.
 
 tau = (coulomb + load·|tau_rigid|)·v/sqrt(v² + knee²) + curved·asinh(v/speed) + viscous·v + offset +
 rotor_inertia·a
@@ -14,13 +13,22 @@ import numpy as np
 from joulepath.models.robot import Array
 
 COUPLED = "coupling."
-"""Before the name of a term of a coupling, whose number takes the place of the joint's."""
+"""Prefix of a term of a coupling; the number of the coupling then replaces that of the joint."""
 UNBOUNDED = ("offset",)
 """Coefficients that may be negative."""
 
 
 def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: float = 1.0) -> Array:
-    """The column (n,) of a coefficient: v [rad/s], a [rad/s²], rigid torque [N·m] of shape (n,)."""
+    """Column (n,) of one coefficient.
+
+    Args:
+        term: name of the coefficient.
+        v: velocity (n,) [rad/s].
+        a: acceleration (n,) [rad/s²].
+        rigid: rigid-body torque (n,) [N·m].
+        knee: speed over which Coulomb friction reverses [rad/s].
+        speed: speed at which the curved term bends [rad/s].
+    """
     if term == "viscous":
         return v
     if term == "rotor_inertia":
@@ -31,17 +39,17 @@ def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: floa
         return np.ones_like(v)
     if term == "curved":
         return np.asarray(np.arcsinh(v / speed))
-    step = v / np.hypot(v, knee)
-    return np.asarray(step * np.abs(rigid) if term == "load" else step)
+    smooth_sign = v / np.hypot(v, knee)
+    return np.asarray(smooth_sign * np.abs(rigid) if term == "load" else smooth_sign)
 
 
 def columns(
     terms: Sequence[str], v: Array, a: Array, rigid: Array, knee: float, speed: float = 1.0
 ) -> Array:
-    """The columns (n, terms)."""
+    """Columns (n, terms) of several coefficients; arguments as of `column`."""
     return np.column_stack([column(term, v, a, rigid, knee, speed) for term in terms])
 
 
 def lower_bounds(terms: Sequence[str]) -> Array:
-    """Least values (terms,)."""
+    """Lower bounds (terms,) of the coefficients."""
     return np.array([-np.inf if term in UNBOUNDED else 0.0 for term in terms])

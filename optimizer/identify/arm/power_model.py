@@ -1,13 +1,13 @@
-"""Power on the arm's bus from its motion, and the derivatives of it by the figures.
+"""Power on the arm's bus from its motion, with the derivatives by the figures.
 
 P = max(P_net, 0) - regeneration · max(-P_net, 0),
-P_net = idle + Σ_j (tau_j v_j + copper_j i_j² + inverter_linear_j |i_j|),  i = tau /
-torque_constant,
-tau = tau_rigid + rotor_inertia a + friction: the law of `joulepath.optimizer.dynamics.losses`.
+P_net = idle + Σ_j (tau_j v_j + copper_j i_j² + inverter_linear_j |i_j|),
+i = tau / torque_constant,
+tau = tau_rigid + rotor_inertia a + friction, the law of `joulepath.optimizer.dynamics.losses`.
 
-What may differ from the figures that the motion was computed with: the masses of the arm's links,
-all by the factor `links`; rotors, dry and viscous friction by factors; friction by `load` more of
-the rigid torque, and by an `offset`.
+The torque parts of a motion are computed once. The figures then act on them: one factor on the
+masses of all links, factors on rotors, dry and viscous friction, an increment of load friction and
+an increment of the offset.
 """
 
 from __future__ import annotations
@@ -20,57 +20,68 @@ from joulepath.models.robot import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """What the power follows from, (n, nq): v [rad/s], `step` v / sqrt(v² + knee²), and torques
-    [N·m].
-
-    `rigid` is that of links and payload, `bodies` the part of the arm's own links in it; `dry` that
-    of Coulomb and curved friction, `viscous`, `rotor`; `other` of offsets and couplings. `load`
-    (nq,) [1] is the friction that grows with the rigid torque.
-    """
+class TorqueParts:
+    """Speeds and torque parts [N·m] of a motion, shape (n, nq) unless stated otherwise."""
 
     v: Array
-    step: Array
+    """Velocities [rad/s]."""
+    smooth_sign: Array
+    """v / sqrt(v² + knee²) [1]."""
     rigid: Array
-    bodies: Array
+    """Rigid-body torques of links and load."""
+    links: Array
+    """Part of the arm's own links in `rigid`."""
     dry: Array
+    """Coulomb and curved friction."""
     viscous: Array
+    """Viscous friction."""
     rotor: Array
+    """Inertia of the rotors."""
     other: Array
+    """Offsets and couplings."""
     load: Array
+    """Load friction (nq,) over the rigid torque [1]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Electrics:
-    """`idle` [W], and per joint (nq,): `copper` [W/A²], `inverter` [W/A], factors on `dry` and
-    `viscous` friction and on the `rotor`, and `load` and `offset` [N·m], which are added to those
-    of the motion. `links` is the factor on the masses of all links.
+class PowerParameters:
+    """Figures of the power model, per joint (nq,) unless stated otherwise.
 
-    Packed (2 + 7 nq,), they stand in this order."""
+    Packed into one array (2 + 7 nq,), they stand in the order of the fields.
+    """
 
     idle: float
+    """Idle power [W]."""
     copper: Array
+    """Copper loss over the squared current [W/A²]."""
     inverter: Array
-    dry: Array
-    viscous: Array
-    rotor: Array
-    load: Array
-    offset: Array
-    links: float
+    """Inverter loss over the current [W/A]."""
+    dry_factor: Array
+    """Factor on dry friction [1]."""
+    viscous_factor: Array
+    """Factor on viscous friction [1]."""
+    rotor_factor: Array
+    """Factor on the rotor inertia [1]."""
+    load_increment: Array
+    """Increment of load friction [1]."""
+    offset_increment: Array
+    """Increment of the torque offset [N·m]."""
+    link_scale: float
+    """Factor on the masses of all links [1]."""
 
     @staticmethod
-    def unpacked(values: Array) -> Electrics:
-        """From packed figures (2 + 7 nq,)."""
+    def unpacked(values: Array) -> PowerParameters:
+        """Figures from their packed form (2 + 7 nq,)."""
         copper, inverter, dry, viscous, rotor, load, offset = np.split(values[1:-1], 7)
-        return Electrics(
+        return PowerParameters(
             float(values[0]), copper, inverter, dry, viscous, rotor, load, offset, float(values[-1])
         )
 
     @staticmethod
-    def plain(idle: float, copper: Array, inverter: Array) -> Electrics:
-        """With friction, rotors and links as the motion has them."""
-        one, none = np.ones_like(copper), np.zeros_like(copper)
-        return Electrics(idle, copper, inverter, one, one, one, none, none, 1.0)
+    def nominal(idle: float, copper: Array, inverter: Array) -> PowerParameters:
+        """Figures that leave the torque parts of the motion unchanged."""
+        one, zero = np.ones_like(copper), np.zeros_like(copper)
+        return PowerParameters(idle, copper, inverter, one, one, one, zero, zero, 1.0)
 
 
 def packed_size(nq: int) -> int:
@@ -78,39 +89,47 @@ def packed_size(nq: int) -> int:
     return 2 + 7 * nq
 
 
-def friction(motion: Motion) -> Array:
+def friction_torque(parts: TorqueParts) -> Array:
     """Friction torque (n, nq) [N·m], without offsets and couplings."""
-    return motion.dry + motion.viscous + motion.load * np.abs(motion.rigid) * motion.step
+    return parts.dry + parts.viscous + parts.load * np.abs(parts.rigid) * parts.smooth_sign
 
 
-def power(
-    electrics: Electrics, motion: Motion, constant: Array, regeneration: float
+def bus_power(
+    figures: PowerParameters, parts: TorqueParts, torque_constant: Array, regeneration: float
 ) -> tuple[Array, Array]:
-    """Power (n,) [W], and its derivatives (n, 2 + 7 nq) by the packed figures; `constant` (nq,)
-    [N·m/A].
+    """Power on the bus, with its derivatives.
+
+    Args:
+        figures: figures of the power model.
+        parts: torque parts of the motion.
+        torque_constant: torque constants (nq,) [N·m/A].
+        regeneration: regained share of negative power [1].
+
+    Returns:
+        Power (n,) [W], and its derivatives (n, 2 + 7 nq) by the packed figures.
     """
-    rigid, load = motion.rigid + (electrics.links - 1) * motion.bodies, motion.load + electrics.load
-    loaded = np.abs(rigid) * motion.step
-    dry, viscous = electrics.dry * motion.dry, electrics.viscous * motion.viscous
+    rigid = parts.rigid + (figures.link_scale - 1) * parts.links
+    load = parts.load + figures.load_increment
+    loaded = np.abs(rigid) * parts.smooth_sign
     tau = (
-        motion.other
-        + electrics.offset
+        parts.other
+        + figures.offset_increment
         + rigid
-        + electrics.rotor * motion.rotor
-        + dry
-        + viscous
+        + figures.rotor_factor * parts.rotor
+        + figures.dry_factor * parts.dry
+        + figures.viscous_factor * parts.viscous
         + load * loaded
     )
-    i = tau / constant
-    net = electrics.idle + (
-        tau * motion.v + electrics.copper * i**2 + electrics.inverter * np.abs(i)
-    ).sum(axis=1)
-    by_tau = motion.v + (2 * electrics.copper * i + electrics.inverter * np.sign(i)) / constant
-    by_links = by_tau * motion.bodies * (1 + load * np.sign(rigid) * motion.step)
-    torques = [by_tau * part for part in (motion.dry, motion.viscous, motion.rotor, loaded)]
+    i = tau / torque_constant
+    net = figures.idle + (tau * parts.v + figures.copper * i**2 + figures.inverter * np.abs(i)).sum(
+        axis=1
+    )
+    by_tau = parts.v + (2 * figures.copper * i + figures.inverter * np.sign(i)) / torque_constant
+    by_links = by_tau * parts.links * (1 + load * np.sign(rigid) * parts.smooth_sign)
+    by_factors = [by_tau * part for part in (parts.dry, parts.viscous, parts.rotor, loaded)]
     ones = np.ones((len(net), 1))
     derivatives = np.hstack(
-        [ones, i**2, np.abs(i), *torques, by_tau, by_links.sum(axis=1, keepdims=True)]
+        [ones, i**2, np.abs(i), *by_factors, by_tau, by_links.sum(axis=1, keepdims=True)]
     )
     slope = np.where(net >= 0, 1.0, regeneration)
     return slope * net, slope[:, None] * derivatives

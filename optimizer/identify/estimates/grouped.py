@@ -1,9 +1,10 @@
-"""Linear least squares over rows in groups: whole moves, each of which can be left out.
+"""Linear least squares over groups of rows, with leave-one-group-out estimates.
 
-Residuals of neighbouring rows are alike, so the plain formula takes far too many rows for
-independent ones. What varies independently is the move. The covariance here is the jackknife's over
-moves (Quenouille, Tukey; for clustered rows it is the estimate "CV3" of MacKinnon, Nielsen and Webb
-2023): each move is left out once, and the spread of the estimates says how well they are known.
+Residuals of neighbouring rows are correlated, so the textbook covariance counts far too many rows
+as independent. Moves are independent of one another. The covariance here is the jackknife over
+moves (Quenouille, Tukey; for clustered rows it is the estimator CV3 of MacKinnon, Nielsen and Webb
+2023): the fit is repeated without one move at a time, and the spread of these estimates is the
+standard error.
 """
 
 from __future__ import annotations
@@ -20,30 +21,43 @@ from joulepath.models.robot import Array, Mask
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.deadline import checkpoint
 
-Numbers = npt.NDArray[np.int64]
+IntArray = npt.NDArray[np.int64]
 
-# columns shorter than this, after scaling by the longest of all, do not move
-LEAST_COLUMN = 1e-9
-# of the eigenvalues of the column-scaled normal matrix: below it, a combination of columns does not
-# move
-LEAST_EIGENVALUE = 1e-9
+
+@dataclass(frozen=True)
+class RankSettings:
+    """Tolerances that decide whether a column of the regression counts as zero or dependent."""
+
+    column_tolerance: float = 1e-9
+    """Length of a column over the longest one, up to which the column counts as zero [1]."""
+    eigenvalue_tolerance: float = 1e-9
+    """Eigenvalue of the normal matrix of columns of unit length, up to which a combination of
+    columns counts as zero [1]."""
+
+
+RANK = RankSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Grouped:
-    """Normal equations of each group: `gram` (G, p, p), `moment` (G, p)."""
+class GroupedEquations:
+    """Normal equations of every group of rows: `gram` (G, p, p), `moment` (G, p)."""
 
     gram: Array
     moment: Array
 
     @staticmethod
     def of(
-        columns: Array | Sequence[Array], values: Array, weight: Array, group: Numbers, count: int
-    ) -> Grouped:
-        """From columns (n, p), values, weight and group (n,) of each row, of `count`.
+        columns: Array | Sequence[Array], values: Array, weight: Array, group: IntArray, count: int
+    ) -> GroupedEquations:
+        """Normal equations of a weighted regression.
 
-        Columns in several parts (n, …) are put side by side, and weighted, one group at a time: all
-        of them are large.
+        Args:
+            columns: columns (n, p). Several parts (n, …) are stacked side by side and weighted one
+                group at a time, because all of them together are large.
+            values: right-hand side (n,).
+            weight: weight of a row (n,).
+            group: group of a row (n,), from 0.
+            count: number of groups.
         """
         blocks = [columns] if isinstance(columns, np.ndarray) else [*columns]
         p = sum(block.shape[1] for block in blocks)
@@ -56,19 +70,29 @@ class Grouped:
             root = np.sqrt(weight[rows])
             part = root[:, None] * np.hstack([block[rows] for block in blocks])
             gram[k], moment[k] = part.T @ part, part.T @ (root * values[rows])
-        return Grouped(gram, moment)
+        return GroupedEquations(gram, moment)
 
 
-def solve(gram: Array, moment: Array, lower: Array) -> Array:
-    """The x (p,) ≥ lower that minimises xᵀ gram x / 2 - momentᵀ x.
+def solve_bounded(gram: Array, moment: Array, lower: Array, rank: RankSettings = RANK) -> Array:
+    """Minimise xᵀ gram x / 2 - momentᵀ x subject to x ≥ lower.
 
-    Columns that do not move give 0 where they may, and a combination that does not move its
-    shortest solution.
+    A zero column gets the value 0 if its bound allows it; among dependent columns the shortest
+    solution is taken.
+
+    Args:
+        gram: normal matrix (p, p).
+        moment: right-hand side (p,).
+        lower: lower bounds (p,), -inf for none.
+        rank: tolerances of zero and dependent columns.
+
+    Returns:
+        The minimiser x (p,).
     """
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    scale = np.where(scale > LEAST_COLUMN * max(scale.max(initial=0.0), 1e-300), scale, np.inf)
+    shortest = rank.column_tolerance * max(scale.max(initial=0.0), 1e-300)
+    scale = np.where(scale > shortest, scale, np.inf)
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    roots = np.sqrt(np.where(values > LEAST_EIGENVALUE, values, np.inf))
+    roots = np.sqrt(np.where(values > rank.eigenvalue_tolerance, values, np.inf))
     target = (vectors / roots).T @ (moment / scale)
     found = (vectors / roots) @ target / scale
     if (found >= lower).all():
@@ -81,11 +105,19 @@ def solve(gram: Array, moment: Array, lower: Array) -> Array:
     return np.asarray(np.maximum(bounded.x / scale, np.where(np.isfinite(scale), lower, -np.inf)))
 
 
-def left_out(grouped: Grouped, found: Array, free: Mask, prior: Array | None = None) -> Array:
-    """Estimates (G, p) with each group left out; parameters that are not `free` stay where `found`
-    has them.
+def leave_one_out(
+    grouped: GroupedEquations, found: Array, free: Mask, prior: Array | None = None
+) -> Array:
+    """Estimates without one group at a time.
 
-    `prior` (p, p) is a precision to which all of them are held besides the rows.
+    Args:
+        grouped: normal equations of the G groups.
+        found: estimate (p,) from all groups.
+        free: estimated parameters (p,); all others keep the value of `found`.
+        prior: precision (p, p) of a Gaussian prior around the estimate's prior mean.
+
+    Returns:
+        Estimates (G, p).
     """
     total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
     estimates = np.tile(found, (len(grouped.gram), 1))
@@ -95,43 +127,52 @@ def left_out(grouped: Grouped, found: Array, free: Mask, prior: Array | None = N
         rest = (total - gram)[np.ix_(at, at)] / np.outer(scale, scale)
         pull = (gram @ found - moment)[at] / scale
         if prior is None:
-            step = np.linalg.pinv(rest, rcond=LEAST_EIGENVALUE, hermitian=True) @ pull
+            step = np.linalg.pinv(rest, rcond=RANK.eigenvalue_tolerance, hermitian=True) @ pull
         else:
             step = np.linalg.solve(rest, pull)
         estimates[k, at] += step / scale
     return estimates
 
 
-def adjusted(grouped: Grouped, found: Array, free: Mask, prior: Array) -> Array:
-    """Estimates (G, p) whose jackknife is the covariance by the errors of the rows, held to a
-    precision `prior` (p, p).
+def residual_replicates(grouped: GroupedEquations, found: Array, free: Mask, prior: Array) -> Array:
+    """Estimates (G, p) whose jackknife is the covariance due to the errors of the rows.
 
-    An estimate without a group falls back to the prior where that group tells most. The spread of
-    such estimates has the prior's error in it, which is counted elsewhere. Here each group moves
-    the estimate by its own residuals, made as large as its errors are. Residuals r of a group with
-    errors e of covariance V have the covariance V - X P Xᵀ, for columns X and the estimate's
-    covariance P. So V^½ (1 - V^-½ X P Xᵀ V^-½)^-½ V^-½ r has that of e (Bell and McCaffrey 2002,
-    "CR2", with the prior as one more observation).
+    With a prior, an estimate without the most informative group falls back to the prior mean.
+    The spread of such estimates contains the error of the prior, and that error is counted
+    elsewhere. Here, every group moves the estimate by its own residuals, inflated to the size of
+    its errors. Let X be the columns of a group, V the covariance of its errors e, and P the
+    covariance of the estimate. The residuals r then have the covariance V - X P Xᵀ, and
+    V^½ (1 - V^-½ X P Xᵀ V^-½)^-½ V^-½ r has the covariance of e (Bell and McCaffrey 2002, "CR2",
+    with the prior as one more observation).
+
+    Args:
+        grouped: normal equations of the G groups.
+        found: estimate (p,) from all groups and the prior.
+        free: estimated parameters (p,).
+        prior: precision (p, p) of the prior.
     """
     at, groups = np.flatnonzero(free), len(grouped.gram)
     root = np.linalg.inv(np.linalg.cholesky((grouped.gram.sum(axis=0) + prior)[np.ix_(at, at)]))
     estimates = np.tile(found, (groups, 1))
-    # `jackknife` takes the same share of every estimate's square
+    # `jackknife` multiplies every square by (G - 1) / G
     wider = np.sqrt(groups / max(groups - 1, 1))
     for k, (gram, moment) in enumerate(zip(grouped.gram, grouped.moment, strict=True)):
-        told, vectors = np.linalg.eigh(root @ gram[np.ix_(at, at)] @ root.T)
+        share, vectors = np.linalg.eigh(root @ gram[np.ix_(at, at)] @ root.T)
         pull = vectors.T @ root @ (gram @ found - moment)[at]
         estimates[k, at] += (
-            wider * root.T @ vectors @ (pull / np.sqrt(np.maximum(1 - told, LEAST_EIGENVALUE)))
+            wider
+            * root.T
+            @ vectors
+            @ (pull / np.sqrt(np.maximum(1 - share, RANK.eigenvalue_tolerance)))
         )
     return estimates
 
 
 def jackknife(estimates: Array) -> Array:
-    """The covariance (p, p) of an estimate from those (G, p) without each of the groups.
+    """Covariance (p, p) of an estimate from its leave-one-group-out estimates (G, p).
 
     Few groups are a small sample: the covariance is widened so that ± 1.645 standard deviations
-    cover 90 %, as with Student's distribution. Of one group it is infinite.
+    cover 90 % of Student's distribution. With a single group it is infinite.
     """
     groups = len(estimates)
     if groups < 2:
@@ -141,10 +182,10 @@ def jackknife(estimates: Array) -> Array:
     return np.asarray(wider**2 * (groups - 1) / groups * centred.T @ centred)
 
 
-def lag_one(residuals: Array, group: Numbers) -> float:
-    """Correlation of each residual (n,) with the one before, within groups of neighbouring rows; 0
-    if all are 0.
-    """
-    near = group[1:] == group[:-1]
+def lag_one_correlation(residuals: Array, group: IntArray) -> float:
+    """Correlation of neighbouring residuals (n,) of the same group; 0 if all residuals are 0."""
+    neighbours = group[1:] == group[:-1]
     square = float(residuals @ residuals)
-    return float(residuals[1:][near] @ residuals[:-1][near] / square) if square > 0 else 0.0
+    if square <= 0:
+        return 0.0
+    return float(residuals[1:][neighbours] @ residuals[:-1][neighbours] / square)

@@ -1,1 +1,1 @@
-"""Fits, one kind per file: torques, links, power, payload, temperature."""
+"""Fits of figures to rows, one kind per file: torques, links, power, payload, temperature."""

@@ -1,8 +1,7 @@
-"""Base parameters, friction and rotors of all joints by linear least squares, without any knowledge
-of the links.
+"""Base parameters, friction and rotors of all joints by linear least squares.
 
-The torques depend on combinations of the parameters of bodies and rotors (Gautier 1991). Here these
-combinations are the unknowns, beside the terms of friction.
+No knowledge of the links is needed: the unknowns are the combinations of the parameters of bodies
+and rotors that determine the torques (Gautier 1991), beside the terms of friction.
 """
 
 from __future__ import annotations
@@ -12,56 +11,80 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, base_parameters
 from joulepath.optimizer.identify.arm.friction_columns import lower_bounds
+from joulepath.optimizer.identify.choices import Estimator
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out, solve
-from joulepath.optimizer.identify.estimates.robust import weights_of
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    jackknife,
+    leave_one_out,
+    solve_bounded,
+)
+from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
 from joulepath.optimizer.identify.fits.block import own_value
-from joulepath.optimizer.identify.fits.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
-from joulepath.optimizer.identify.fits.whole_arm import WholeArm, whole_arm
+from joulepath.optimizer.identify.fits.torque_fit import AT_BOUND, TORQUE_FIT, UNCERTAIN
+from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-PASSES = {"ols": 1, "wls": 3, "irls": 8}
 ROTOR = "rotor_inertia"
+
+
+@dataclass(frozen=True)
+class BaseFitSettings:
+    """Solutions of each estimator; all but the first reweight the rows."""
+
+    ols_passes: int = 1
+    wls_passes: int = 3
+    irls_passes: int = 8
+
+    def passes(self, estimator: Estimator) -> int:
+        """Solutions of an estimator."""
+        return {
+            "ols": self.ols_passes,
+            "wls": self.wls_passes,
+            "irls": self.irls_passes,
+        }[estimator]
+
+
+BASE_FIT = BaseFitSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class BaseTerms:
-    """The unknowns `names` (p,) of a base fit: base parameters by their expressions, lone rotors,
-    terms of friction.
-
-    `own` (p,) are the robot's own values. `base` are all base parameters, and `expressed` numbers
-    those that have an expression as their name, in the order of `names`.
-    """
+    """Unknowns of a base fit: base parameters, single rotors, then terms of friction."""
 
     names: tuple[Name, ...]
+    """Names (p,); a base parameter is named by its expression."""
     own: Array
+    """The robot's own values (p,)."""
     base: BaseParameters
+    """All base parameters."""
     expressed: tuple[int, ...]
+    """Numbers of the base parameters that are named by an expression, in the order of `names`."""
 
     @staticmethod
     def of(robot: Robot, friction: list[Name], options: IdentificationOptions) -> BaseTerms:
-        """The unknowns of an arm, with those of its `friction`."""
+        """Unknowns of an arm, with given terms of friction."""
         rotors = "rotor" in options.targets
         base, own = base_parameters(robot.model, rotors), body_parameters(robot.model)
         values = base.combination @ (np.append(own, robot.drives.rotor_inertia) if rotors else own)
-        alone = base.lone(len(own))
-        expressed = tuple(k for k in range(base.count) if k not in alone)
+        single = base.single_rotors(len(own))
+        expressed = tuple(k for k in range(base.count) if k not in single)
         names: list[Name] = [(base.expressions[k], None) for k in expressed]
-        names += [(ROTOR, base.independent[k] - len(own)) for k in alone]
+        names += [(ROTOR, base.independent[k] - len(own)) for k in single]
         own_values = [
             *values[list(expressed)],
-            *values[list(alone)],
+            *values[list(single)],
             *(own_value(robot, name) for name in friction),
         ]
         return BaseTerms((*names, *friction), np.array(own_values), base, expressed)
 
-    def columns(self, arm: WholeArm) -> Array:
-        """The columns (n, p) of the unknowns, from those of the whole arm."""
+    def columns(self, arm: WholeArmRegression) -> Array:
+        """Columns (n, p) of the unknowns, chosen from the columns of the whole arm."""
         bodies = arm.bodies.shape[1]
 
         def at(main: int) -> int:
@@ -75,77 +98,92 @@ class BaseTerms:
 
     @property
     def lower(self) -> Array:
-        """Least values (p,)."""
+        """Lower bounds (p,) of the unknowns."""
         count = len(self.expressed)
         return np.append(
             np.full(count, -np.inf), lower_bounds([term for term, _ in self.names[count:]])
         )
 
-    def bodies(self, bodies: int) -> Array:
-        """The matrix (10 nq, b) that turns changes of the base parameters into the least change of
-        bodies that has the same torques."""
-        return np.asarray(np.linalg.pinv(self.base.combination[list(self.expressed), :bodies]))
+    def body_changes(self, body_count: int) -> Array:
+        """Matrix (10 nq, b) from changes of the base parameters to the smallest change of bodies
+        with the same torques."""
+        return np.asarray(np.linalg.pinv(self.base.combination[list(self.expressed), :body_count]))
 
 
 def fit_base(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
 ) -> Estimate:
-    """Base parameters and friction from motor torques (n, nq) [N·m], by ordinary, weighted or
-    reweighted least squares.
+    """Fit base parameters and friction by ordinary, weighted or reweighted least squares.
 
-    `rows` have the regressor. With the method `essential_parameters`, what the rows do not tell is
-    held at the robot's own value, the least told first, until all the rest is told.
+    With the method `essential_parameters`, undetermined unknowns are held at the robot's own
+    values, the least determined first, until all others are determined.
+
+    Args:
+        robot: the robot with its own figures.
+        rows: rows with regressors.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows for the jackknife.
+        options: requested figures and estimator.
     """
-    arm = base_arm(robot, rows, torque, clusters, options)
-    terms = terms_of_arm(robot, arm, options)
+    arm = base_regression(robot, rows, torque, clusters, options)
+    terms = base_terms(robot, arm, options)
     columns, lower, own, block = terms.columns(arm), terms.lower, terms.own, arm.block
     weight = np.ones_like(arm.values)
-    for _ in range(PASSES[options.estimator]):
-        grouped = Grouped.of(columns, arm.values, weight, block.cluster, clusters.count)
-        value = solve(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), lower)
-        weight = weights_of(block.joint, arm.values - columns @ value, options.estimator == "irls")
-    free, why = np.ones(len(own), dtype=bool), [""] * len(own)
+    for _ in range(BASE_FIT.passes(options.estimator)):
+        grouped = GroupedEquations.of(columns, arm.values, weight, block.cluster, clusters.count)
+        value = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), lower)
+        weight = inverse_variance_weights(
+            block.joint, arm.values - columns @ value, options.estimator == "irls"
+        )
+    free, reasons = np.ones(len(own), dtype=bool), [""] * len(own)
     while True:
-        part, value = _part(grouped, own, free), own.copy()
-        value[free] = solve(part.gram.sum(axis=0), part.moment.sum(axis=0), lower[free])
+        part, value = _free_equations(grouped, own, free), own.copy()
+        value[free] = solve_bounded(part.gram.sum(axis=0), part.moment.sum(axis=0), lower[free])
         replicates = np.tile(value, (clusters.count, 1))
-        replicates[:, free] = left_out(part, value[free], (value > lower)[free])
+        replicates[:, free] = leave_one_out(part, value[free], (value > lower)[free])
         if options.method != "essential_parameters":
             break
         relative = _relative_sd(terms.names, value, replicates, free)
         worst = int(np.argmax(relative))
-        if relative[worst] <= MOST_RELATIVE_SD:
+        if relative[worst] <= TORQUE_FIT.max_relative_sd:
             break
         free[worst] = False
-        why[worst] = UNSURE.format(relative[worst]) if np.isfinite(relative[worst]) else ZERO
-    return Estimate(terms.names, value, replicates, tuple(why), np.zeros((len(own), len(own))))
+        reasons[worst] = (
+            UNCERTAIN.format(relative[worst]) if np.isfinite(relative[worst]) else AT_BOUND
+        )
+    return Estimate(terms.names, value, replicates, tuple(reasons), np.zeros((len(own), len(own))))
 
 
-def base_arm(
+def base_regression(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
-) -> WholeArm:
-    """Rows and columns of motor torques (n, nq) [N·m], from rows with the regressor."""
+) -> WholeArmRegression:
+    """Regression of motor torques (n, nq) [N·m] on all bodies, friction and rotors."""
     assert rows.regressor is not None
-    return whole_arm(
-        robot, rows, torque, clusters, options, rows.regressor, np.zeros(BODY * robot.nq)
+    return whole_arm_regression(
+        robot,
+        rows,
+        torque,
+        clusters,
+        options,
+        rows.regressor,
+        np.zeros(PARAMETERS_PER_BODY * robot.nq),
     )
 
 
-def terms_of_arm(robot: Robot, arm: WholeArm, options: IdentificationOptions) -> BaseTerms:
-    """The unknowns of the whole arm."""
+def base_terms(robot: Robot, arm: WholeArmRegression, options: IdentificationOptions) -> BaseTerms:
+    """Unknowns of a base fit to the whole arm."""
     return BaseTerms.of(robot, [name for name in arm.block.names if name[0] != ROTOR], options)
 
 
-def _part(grouped: Grouped, own: Array, free: Mask) -> Grouped:
-    """The normal equations of the unknowns that are `free` (p,), the others at the robot's `own`
-    values (p,)."""
+def _free_equations(grouped: GroupedEquations, own: Array, free: Mask) -> GroupedEquations:
+    """Normal equations of the `free` unknowns (p,), with all others at the robot's `own` values."""
     held = grouped.gram[:, :, ~free] @ own[~free]
-    return Grouped(grouped.gram[:, free][:, :, free], (grouped.moment - held)[:, free])
+    return GroupedEquations(grouped.gram[:, free][:, :, free], (grouped.moment - held)[:, free])
 
 
 def _relative_sd(names: tuple[Name, ...], value: Array, replicates: Array, free: Mask) -> Array:
-    """Standard deviations (p,) over values; 0 of what is held, and of offsets, which are kept as
-    they are."""
+    """Standard deviations (p,) over values; 0 for held unknowns and for offsets, which are kept
+    with any standard deviation."""
     sd = np.sqrt(np.diag(jackknife(replicates)))
     counts = free & np.array([term != "offset" for term, _ in names])
     with np.errstate(divide="ignore", invalid="ignore"):

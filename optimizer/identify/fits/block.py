@@ -1,4 +1,4 @@
-"""Rows and columns of joints that are fitted together."""
+"""Regression of joints that are fitted together."""
 
 from __future__ import annotations
 
@@ -6,51 +6,50 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, column, lower_bounds
 from joulepath.optimizer.identify.estimates.estimate import Name
+from joulepath.optimizer.identify.estimates.grouped import IntArray
 from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-Numbers = npt.NDArray[np.int64]
 SCALE = "scale"
-"""The term by which the rigid torque is multiplied: the robot's own torque constant over the real
-one.
-"""
+"""Factor on the rigid torque: the robot's own torque constant over the real one."""
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
-    """Columns (n, p) of the terms `names`, the torques (n,) that they add up to, joint and cluster
-    (n,) of each row.
-
-    `own` are the robot's own values of the terms, `lower` (p,) their least ones. `spread` [N·m] is
-    the standard deviation of each joint's rigid torque. `speed` [rad/s] is the curved term's where
-    it was sought.
-    """
+class JointBlock:
+    """Linear regression of the torques of some joints, with n rows and p terms."""
 
     names: tuple[Name, ...]
     columns: Array
+    """Columns (n, p) of the terms."""
     values: Array
-    joint: Numbers
-    cluster: Numbers
+    """Torques (n,) without the known parts [N·m]."""
+    joint: IntArray
+    """Joint of a row (n,)."""
+    cluster: IntArray
+    """Cluster of a row (n,)."""
     lower: Array
+    """Lower bounds (p,) of the terms."""
     own: Mapping[Name, float]
+    """The robot's own values of the terms."""
     spread: Mapping[int | None, float]
+    """Standard deviation of the rigid torque of each joint [N·m]."""
     speed: float | None
+    """Candidate for the speed of the curved term [rad/s]; None for the robot's own."""
 
 
 def terms_of(options: IdentificationOptions) -> list[str]:
-    """The terms of each joint that are fitted."""
+    """Names of the fitted terms of each joint."""
     friction = options.terms if "friction" in options.targets else ()
     scale = (SCALE,) if "torque_constant" in options.targets else ()
     return [*friction, *(("rotor_inertia",) if "rotor" in options.targets else ()), *scale]
 
 
-def block_of(
+def joint_block(
     robot: Robot,
     rows: Rows,
     torque: Array,
@@ -58,10 +57,17 @@ def block_of(
     options: IdentificationOptions,
     joints: Sequence[int],
     speed: float | None = None,
-) -> Block:
-    """The block of some joints, from motor torques (n, nq) [N·m], NaN where there are none.
+) -> JointBlock:
+    """Regression of some joints.
 
-    `speed` [rad/s] is that of the curved term; None: the robot's own, joint by joint.
+    Args:
+        robot: the robot with its own figures.
+        rows: rows of the logs.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows.
+        options: requested figures.
+        joints: numbers of the joints.
+        speed: speed of the curved term [rad/s]; None for the robot's own, joint by joint.
     """
     terms, knee = terms_of(options), robot.friction.knee if options.knee is None else options.knee
     couplings = [
@@ -71,10 +77,10 @@ def block_of(
     names = [(term, joint) for joint in joints for term in terms]
     names += [(COUPLED + term, k) for k, _ in couplings for term in coupled]
     own_speed = robot.friction.speed if speed is None else np.full(robot.nq, speed)
-    parts = list[tuple[Array, Array, int, Numbers]]()
-    known, spread = _known(robot, rows, options), dict[int | None, float]()
+    parts = list[tuple[Array, Array, int, IntArray]]()
+    known, spread = _known_torque(robot, rows, options), dict[int | None, float]()
     for at, joint in enumerate(joints):
-        use = moving(rows, torque, joint, options.velocity_threshold, options.couplings)
+        use = moving_rows(rows, torque, joint, options.velocity_threshold, options.couplings)
         v, a, rigid = rows.v[use], rows.a[use], rows.rigid[use]
         spread[joint] = float(rigid[:, joint].std()) if use.any() else 0.0
         columns = np.zeros((int(use.sum()), len(names)))
@@ -90,7 +96,7 @@ def block_of(
                     term, v @ ratios, a @ ratios, rigid[:, joint], knee
                 )
         parts.append((columns, torque[use, joint] - known[use, joint], joint, clusters.of_row[use]))
-    return Block(
+    return JointBlock(
         names=tuple(names),
         columns=np.concatenate([part[0] for part in parts]),
         values=np.concatenate([part[1] for part in parts]),
@@ -103,11 +109,17 @@ def block_of(
     )
 
 
-def moving(
+def moving_rows(
     rows: Rows, torque: Array, joint: int, threshold: float, couplings: Sequence[Coupling]
 ) -> Mask:
-    """The rows (n,) in which a joint moves faster than the threshold, as the motors coupled to it
-    do.
+    """Rows (n,) with a torque in which a joint and the motors coupled to it move.
+
+    Args:
+        rows: rows of the logs.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        joint: number of the joint.
+        threshold: smallest speed of a moving joint or motor [rad/s].
+        couplings: motors shared by several joints.
     """
     use = np.isfinite(torque[:, joint]) & (np.abs(rows.v[:, joint]) > threshold)
     for coupling in couplings:
@@ -117,7 +129,7 @@ def moving(
 
 
 def own_value(robot: Robot, name: Name) -> float:
-    """The robot's own value of a figure; 0 for one that it has not."""
+    """The robot's own value of a term; 0 for a term without one."""
     term, joint = name
     if joint is None or term.startswith(COUPLED):
         return 0.0
@@ -129,10 +141,9 @@ def own_value(robot: Robot, name: Name) -> float:
     return 0.0 if own is None else float(own[joint])
 
 
-def _known(robot: Robot, rows: Rows, options: IdentificationOptions) -> Array:
-    """Torque (n, nq) [N·m] of what is not fitted: rigid bodies, and the robot's own friction or
-    rotors.
-    """
+def _known_torque(robot: Robot, rows: Rows, options: IdentificationOptions) -> Array:
+    """Torque (n, nq) [N·m] of all parts that are not fitted: rigid bodies, and the robot's own
+    friction or rotors."""
     known = np.zeros_like(rows.rigid) if "torque_constant" in options.targets else rows.rigid.copy()
     if "friction" not in options.targets:
         known += robot.friction.torque(rows.v, rows.rigid)

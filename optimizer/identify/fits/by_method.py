@@ -1,4 +1,4 @@
-"""The methods that can be asked for by name: what each needs of the logs, and how it fits them."""
+"""Methods of identification by name: their requirements on the logs, and their fits."""
 
 from __future__ import annotations
 
@@ -10,21 +10,29 @@ import numpy as np
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.errors import MethodNotApplicable
-from joulepath.optimizer.identify.fits.fitting import Fitted, fit_rows, motor_torque
-from joulepath.optimizer.identify.fits.periodic import periods_of
-from joulepath.optimizer.identify.fits.temperature import SETTINGS, at_reference, temperatures_of
-from joulepath.optimizer.identify.fits.threshold import faster, thresholds_of
+from joulepath.optimizer.identify.fits.fitting import FitResult, fit_rows, motor_torque
+from joulepath.optimizer.identify.fits.periodic import cut_into_periods
+from joulepath.optimizer.identify.fits.temperature import (
+    TEMPERATURE,
+    at_reference,
+    temperatures_of,
+)
+from joulepath.optimizer.identify.fits.threshold import thresholds_of, without_slow_efforts
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
-def prepared(
+def prepare(
     logs: Sequence[Log], options: IdentificationOptions
 ) -> tuple[list[Log], IdentificationOptions]:
-    """The logs and options as the method takes them. Raises MethodNotApplicable and
-    InvalidProblem."""
-    missing = _missing(logs, options)
+    """Logs and options in the form that the method of the options needs.
+
+    Raises:
+        MethodNotApplicable: the logs lack a channel or a property that the method needs.
+        InvalidProblem: the options lack the period of the method `periodic`.
+    """
+    missing = _missing_requirement(logs, options)
     if missing:
         raise MethodNotApplicable(options.method, missing)
     if options.method == "motor_current":
@@ -38,19 +46,20 @@ def prepared(
             raise InvalidProblem(
                 "period", "The method periodic needs the period of the motion: give `period` in s."
             )
-        return [periods_of(log, options.period) for log in logs], options
+        return [cut_into_periods(log, options.period) for log in logs], options
     return [*logs], options
 
 
-def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> Fitted:
-    """Fits rows of prepared logs with the method of the options."""
+def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitResult:
+    """Fit rows of prepared logs by the method of the options."""
     fitted = fit_rows(robot, rows, options)
     if options.method == "threshold_velocity":
         found = thresholds_of(fitted.arm, rows, motor_torque(fitted.arm, rows))
         thresholds = np.maximum(found, options.velocity_threshold)
-        return replace(fit_rows(robot, faster(rows, thresholds), options), thresholds=thresholds)
+        fast_rows = without_slow_efforts(rows, thresholds)
+        return replace(fit_rows(robot, fast_rows, options), thresholds=thresholds)
     if options.method == "temperature":
-        for _ in range(SETTINGS.passes):
+        for _ in range(TEMPERATURE.passes):
             torque = motor_torque(fitted.arm, rows)
             warm = temperatures_of(
                 rows, torque, fitted.arm, fitted.clusters, options.velocity_threshold
@@ -59,8 +68,8 @@ def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> F
     return fitted
 
 
-def _missing(logs: Sequence[Log], options: IdentificationOptions) -> str:
-    """What the method needs and the logs do not have, as a sentence; empty if nothing."""
+def _missing_requirement(logs: Sequence[Log], options: IdentificationOptions) -> str:
+    """Requirement of the method that the logs do not meet, as a sentence; empty if none."""
     match options.method:
         case "automatic":
             return ""
@@ -93,9 +102,9 @@ def _missing_temperature(logs: Sequence[Log]) -> str:
     if len(known) < len(logs):
         return "it needs the temperatures of the joints in every log."
     span = float(np.ptp(np.concatenate(known), axis=0).max())
-    if span < SETTINGS.least_span:
+    if span < TEMPERATURE.min_span:
         return (
             f"the temperatures of its joints span {span:.2g} K, and at least "
-            f"{SETTINGS.least_span:g} K are needed."
+            f"{TEMPERATURE.min_span:g} K are needed."
         )
     return ""

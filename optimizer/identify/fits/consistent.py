@@ -1,55 +1,77 @@
-"""The least-squares figures whose links are real bodies: a semidefinite program, solved by
-Clarabel.
+"""Least squares over physically consistent bodies: a semidefinite program, solved by Clarabel.
 
-The problem is convex, so that its one solution is found, whatever the start. Clarabel (Goulart,
-Chen 2024) is an interior-point solver for quadratic objectives with semidefinite cones.
+The problem is convex, so its only solution is found from any start. Clarabel (Goulart, Chen 2024)
+is an interior-point solver for quadratic objectives with semidefinite cones.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import clarabel
 import numpy as np
 from scipy import sparse
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.link_regressor import BODY
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY
 from joulepath.optimizer.identify.arm.pseudo_inertia import BASIS
 
-# of the mass: a body's least eigenvalue, in m² for its extent, so that no body has none
-LEAST = 1e-9
 # entries of a symmetric matrix in Clarabel's order, and their factors
-_ROWS, _COLUMNS = np.triu_indices(4)
-_ORDER = np.lexsort((_ROWS, _COLUMNS))
-_ENTRIES = (_ROWS[_ORDER], _COLUMNS[_ORDER])
+_UPPER = np.triu_indices(4)
+_ORDER = np.lexsort(_UPPER)
+_ENTRIES = (_UPPER[0][_ORDER], _UPPER[1][_ORDER])
 _FACTORS = np.where(_ENTRIES[0] == _ENTRIES[1], 1.0, np.sqrt(2.0))
 
 
-def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> Array:
-    """The x (p,) ≥ lower that minimises xᵀ gram x / 2 - momentᵀ x, its first 10 · bodies entries
-    those of real bodies.
+@dataclass(frozen=True)
+class ConsistentSettings:
+    """Settings of the semidefinite program."""
 
-    Raises ArithmeticError if the solver fails, as it does for a gram that is not positive definite.
+    min_eigenvalue: float = 1e-9
+    """Smallest eigenvalue of a pseudo-inertia, so that no body is without mass or extent
+    [kg, kg·m²]."""
+
+
+CONSISTENT = ConsistentSettings()
+
+
+def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> Array:
+    """Minimise xᵀ gram x / 2 - momentᵀ x over x ≥ lower with consistent bodies.
+
+    Args:
+        gram: positive definite normal matrix (p, p).
+        moment: right-hand side (p,).
+        bodies: number of bodies; their parameters are the first 10 · bodies entries of x.
+        lower: lower bounds (p,), -inf for none.
+
+    Returns:
+        The minimiser x (p,).
+
+    Raises:
+        ArithmeticError: the solver fails, as it does if `gram` is not positive definite.
     """
     p = len(moment)
     scale = 1 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram * np.outer(scale, scale)
     entries = (BASIS[:, _ENTRIES[0], _ENTRIES[1]] * _FACTORS).T
     bounded = np.flatnonzero(np.isfinite(lower))
-    matrix = np.zeros((len(bounded) + BODY * bodies, p))
+    matrix = np.zeros((len(bounded) + PARAMETERS_PER_BODY * bodies, p))
     matrix[np.arange(len(bounded)), bounded] = -scale[bounded]
-    matrix[len(bounded) :, : BODY * bodies] = (
-        -np.kron(np.eye(bodies), entries) * scale[: BODY * bodies]
+    matrix[len(bounded) :, : PARAMETERS_PER_BODY * bodies] = (
+        -np.kron(np.eye(bodies), entries) * scale[: PARAMETERS_PER_BODY * bodies]
     )
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    smallest = CONSISTENT.min_eigenvalue * np.eye(4)[_ENTRIES]
     solution = clarabel.DefaultSolver(
         sparse.csc_matrix(np.triu(scaled)),
         -moment * scale,
         sparse.csc_matrix(matrix),
-        np.concatenate([-lower[bounded], np.tile(-LEAST * np.eye(4)[_ENTRIES], bodies)]),
+        np.concatenate([-lower[bounded], np.tile(-smallest, bodies)]),
         [clarabel.NonnegativeConeT(len(bounded)), *[clarabel.PSDTriangleConeT(4)] * bodies],
         settings,
     ).solve()
-    if str(solution.status) not in ("Solved", "AlmostSolved"):
+    solved = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+    if solution.status not in solved:
         raise ArithmeticError(f"The semidefinite program ended with {solution.status}.")
     return np.asarray(solution.x) * scale

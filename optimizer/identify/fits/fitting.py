@@ -1,4 +1,4 @@
-"""One fit: from rows of logs to an arm with fitted figures, and how well they are known."""
+"""One fit: from rows of logs to an arm with fitted figures and their uncertainty."""
 
 from __future__ import annotations
 
@@ -10,12 +10,17 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm, with_torques
-from joulepath.optimizer.identify.arm.power_model import Electrics, packed_size
-from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, joined
+from joulepath.optimizer.identify.arm.power_model import PowerParameters, packed_size
+from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
 from joulepath.optimizer.identify.fits.periodic import fit_periodic
-from joulepath.optimizer.identify.fits.power_fit import Prior, fit_power, prior_of
+from joulepath.optimizer.identify.fits.power_fit import (
+    PowerFit,
+    PowerPrior,
+    fit_power,
+    power_prior,
+)
 from joulepath.optimizer.identify.fits.torque_fit import fit_torques
 from joulepath.optimizer.identify.fits.whole_fit import LINK, fit_whole
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -23,59 +28,74 @@ from joulepath.optimizer.identify.results import MeasuredNoise
 from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# share of the greatest variance, of parameters that are scaled to one size: below it, a common
-# error is rounding
-LEAST_ERROR = 1e-3
 LINK_MASS_SCALE = "link_mass_scale"
-"""The figure of the factor on the masses of all links."""
-# share of a figure's standard deviation before the log: beyond it, the log did not tell the figure
-WORTH = 0.7
-HARDLY = "The logs hardly tell it from the robot's own."
+"""Name of the factor on the masses of all links."""
+HARDLY_KNOWN = "The logs hardly tell it from the robot's own."
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Settings of the uncertainty of a fit."""
+
+    min_error_share: float = 1e-3
+    """Variance of a common error of parameters of unit size over the largest one, up to which the
+    error is a rounding error [1]."""
+    max_sd_ratio: float = 0.7
+    """Standard deviation of a power figure over that before the logs, above which the figure is
+    not identified [1]."""
+    min_factor: float = 1e-3
+    """Smallest factor on friction or rotors by which covariances are scaled [1]."""
+
+
+FIT = FitSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
-    """The arm with the fitted figures, the estimate behind it, and the arms (G,) `without` each
-    cluster.
+class FitResult:
+    """Fitted arm and its uncertainty, with G clusters and p packed power parameters.
 
-    The jackknife of the `varied` arms (G,) is the error of the fit by the errors of the rows. What
-    the fit takes from the robot's own figures has errors: the `tilted` arms have one of them each,
-    in the torques and in what the electrics make of it. `drift` is the covariance of the packed
-    electrics by their own ranges, and `lost` (G, p, p) what leaving each cluster out adds to all of
-    their covariance. `mean_power` [W] is that of the rows, NaN without power. `noise` is that of a
-    periodic motion, `thresholds` (nq,) [rad/s] are speeds below which no sample of a joint was
-    used; None where the method finds none.
+    The jackknife of the `row_error_arms` is the uncertainty due to the errors of the rows. The fit
+    also depends on figures of the robot that it does not change: each of the `prior_error_arms` has
+    one independent error of these, in its torques and in its power parameters.
     """
 
     arm: FittedArm
     estimate: Estimate
     clusters: Clusters
-    without: tuple[FittedArm, ...]
-    varied: tuple[FittedArm, ...]
-    tilted: tuple[FittedArm, ...]
-    drift: Array
-    lost: Array
+    arms_without_cluster: tuple[FittedArm, ...]
+    """Arms (G,) fitted without one cluster each."""
+    row_error_arms: tuple[FittedArm, ...]
+    """Arms (G,) whose jackknife is the error of the fit by the errors of the rows."""
+    prior_error_arms: tuple[FittedArm, ...]
+    """Arms with one independent error of the assumed figures each."""
+    prior_covariance: Array
+    """Covariance (p, p) of the power parameters due to their own prior."""
+    covariance_increase: Array
+    """Increase (G, p, p) of the covariance of the power parameters without one cluster each."""
     mean_power: float
+    """Mean power of the rows [W]; NaN without power."""
     noise: MeasuredNoise | None = None
+    """Noise of a periodic motion; None for other methods."""
     thresholds: Array | None = None
+    """Speeds (nq,) below which no sample of a joint was used [rad/s]; None for other methods."""
 
 
-def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> Fitted:
-    """Fits what the rows have: torques, power or both; or the wrench beneath the base."""
+def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitResult:
+    """Fit the logged channels: torques, power or both; or the wrench beneath the base."""
     clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
     torque, with_power = motor_torque(arm, rows), bool(np.isfinite(rows.power).any())
-    fitted = Fitted(
+    size = packed_size(robot.nq)
+    moving_power = rows.power[np.isfinite(rows.power) & ~rows.rest]
+    fitted = FitResult(
         arm=arm,
-        estimate=joined([]),
+        estimate=join_estimates([]),
         clusters=clusters,
-        without=(arm,) * clusters.count,
-        varied=(arm,) * clusters.count,
-        tilted=(),
-        drift=np.zeros((packed_size(robot.nq),) * 2),
-        lost=np.zeros((clusters.count, *(packed_size(robot.nq),) * 2)),
-        mean_power=float(np.mean(rows.power[np.isfinite(rows.power) & ~rows.rest]))
-        if with_power
-        else np.nan,
+        arms_without_cluster=(arm,) * clusters.count,
+        row_error_arms=(arm,) * clusters.count,
+        prior_error_arms=(),
+        prior_covariance=np.zeros((size, size)),
+        covariance_increase=np.zeros((clusters.count, size, size)),
+        mean_power=float(np.mean(moving_power)) if with_power else np.nan,
     )
     if options.method == "base_wrench":
         return _with_wrench(robot, rows, fitted, options)
@@ -86,9 +106,9 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> Fitted
 
 
 def _with_torque(
-    robot: Robot, rows: Rows, torque: Array, fitted: Fitted, options: IdentificationOptions
-) -> tuple[Fitted, Array]:
-    """With the torques fitted, and the errors (k, p) of the tilted arms' parameters."""
+    robot: Robot, rows: Rows, torque: Array, fitted: FitResult, options: IdentificationOptions
+) -> tuple[FitResult, Array]:
+    """The fit with torques, and the errors (k, p) of the parameters of its `prior_error_arms`."""
     own = fitted.arm
     noise = None
     if options.method == "periodic":
@@ -100,82 +120,92 @@ def _with_torque(
     terms = tuple(
         name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link
     )
-    turn, before = _link_changes(robot, options)
+    matrix, before = _link_changes(robot, options)
 
     def arm(values: Array) -> FittedArm:
-        made = with_torques(own, terms, values[~of_links], tuple(options.couplings))
-        return replace(made, bodies=turn @ (values[of_links] - before)) if of_links.any() else made
+        changed = with_torques(own, terms, values[~of_links], tuple(options.couplings))
+        if not of_links.any():
+            return changed
+        return replace(changed, link_change=matrix @ (values[of_links] - before))
 
-    errors = _errors(found.drift)
+    errors = _independent_errors(found.prior_covariance)
     without = tuple(arm(values) for values in found.replicates)
-    made = replace(
+    result = replace(
         fitted,
         arm=arm(found.value),
         estimate=found,
-        without=without,
-        varied=without,
-        tilted=tuple(arm(found.value + error) for error in errors),
+        arms_without_cluster=without,
+        row_error_arms=without,
+        prior_error_arms=tuple(arm(found.value + error) for error in errors),
         noise=noise,
     )
-    return made, errors
+    return result, errors
 
 
 def _link_changes(robot: Robot, options: IdentificationOptions) -> tuple[Array, Array]:
-    """The matrix (10 nq, k) that turns changes of the links' unknowns into those of bodies, and the
-    robot's own values (k,) of these unknowns."""
+    """Matrix (10 nq, k) from changes of the links' unknowns to changes of bodies, and the robot's
+    own values (k,) of the unknowns."""
     links = body_parameters(robot.model)
     if not options.reduced:
         return np.eye(len(links)), links
     terms = BaseTerms.of(robot, [], options)
-    return terms.bodies(len(links)), terms.own[: len(terms.expressed)]
+    return terms.body_changes(len(links)), terms.own[: len(terms.expressed)]
 
 
 def _with_wrench(
-    robot: Robot, rows: Rows, fitted: Fitted, options: IdentificationOptions
-) -> Fitted:
-    """With the links fitted to the wrench beneath the base; all else is the robot's own."""
+    robot: Robot, rows: Rows, fitted: FitResult, options: IdentificationOptions
+) -> FitResult:
+    """The fit with links from the wrench beneath the base, and the robot's own other figures."""
     found, own = fit_wrench(robot, rows, fitted.clusters, options), body_parameters(robot.model)
 
     def arm(values: Array) -> FittedArm:
-        return replace(fitted.arm, bodies=values - own)
+        return replace(fitted.arm, link_change=values - own)
 
     without = tuple(arm(values) for values in found.replicates)
+    errors = _independent_errors(found.prior_covariance)
     return replace(
         fitted,
         arm=arm(found.value),
         estimate=found,
-        without=without,
-        varied=without,
-        tilted=tuple(arm(found.value + error) for error in _errors(found.drift)),
+        arms_without_cluster=without,
+        row_error_arms=without,
+        prior_error_arms=tuple(arm(found.value + error) for error in errors),
     )
 
 
-def _errors(covariance: Array) -> Array:
-    """Independent errors (k, p) of parameters (p,), whose squares add up to their covariance but
-    for rounding.
-    """
+def _independent_errors(covariance: Array) -> Array:
+    """Independent errors (k, p) of parameters (p,), whose squares add up to their covariance up to
+    rounding errors."""
     sd = np.sqrt(np.diag(covariance))
     scale = np.where(sd > 0, sd, 1.0)
     sizes, directions = np.linalg.eigh(covariance / np.outer(scale, scale))
-    kept = sizes > LEAST_ERROR * sizes[-1]
+    kept = sizes > FIT.min_error_share * sizes[-1]
     return np.asarray(np.sqrt(sizes[kept])[:, None] * directions[:, kept].T * sd)
 
 
 def motor_torque(arm: FittedArm, rows: Rows) -> Array:
-    """The logged motor torques (n, nq) [N·m], NaN where there are none."""
+    """Logged motor torques (n, nq) [N·m], NaN if not logged."""
     return rows.effort * arm.torque_constant if rows.current else rows.effort
 
 
 def _with_power(
-    robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options: IdentificationOptions
-) -> Fitted:
-    """With the power fitted, whose figures follow the `errors` (k, p) of the tilted arms."""
+    robot: Robot, rows: Rows, fitted: FitResult, errors: Array, options: IdentificationOptions
+) -> FitResult:
+    """The fit with power.
+
+    Args:
+        robot: the robot with its own figures.
+        rows: rows with power.
+        fitted: the fit of torques.
+        errors: errors (k, p) of the parameters of the `prior_error_arms`.
+        options: requested figures.
+    """
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
     torque_known = len(fitted.estimate.names) > 0
-    prior = prior_of(robot, torque_known)
+    prior = power_prior(robot, torque_known)
     fit = fit_power(
-        arm.motion(part),
+        arm.torque_parts(part),
         part.power,
         arm.torque_constant,
         arm.regeneration,
@@ -183,98 +213,116 @@ def _with_power(
         of_row,
         options.estimator == "irls",
     )
-    # an error of the torques moves the electrics, too: one step of the fit with each of them
-    others = fitted.without if torque_known else ()
-    here = replace(arm, electrics=Electrics.unpacked(fit.value)).power(part)[0]
-    moved = np.array(
-        [
-            fit.gain
-            @ (here - replace(each, electrics=Electrics.unpacked(fit.value)).power(part)[0])
-            for each in (*others, *fitted.tilted)
-        ]
-    ).reshape(-1, len(fit.value))
+    others = fitted.arms_without_cluster if torque_known else ()
+    moved = _parameter_changes(fit, arm, part, (*others, *fitted.prior_error_arms))
     shifts = moved[len(others) :]
     by_torques = moved[: len(others)] if torque_known else 0.0
-    without, varied = fit.without + by_torques, fit.adjusted + by_torques
-    turn, constant, names = _figures_of_power(robot, prior, torque_known)
+    without, by_rows = fit.without_cluster + by_torques, fit.row_replicates + by_torques
+    matrix, constant, names = _figures_of_power(robot, prior, torque_known)
     estimate = Estimate(
         names,
-        turn @ fit.value + constant,
-        varied @ turn.T + constant,
+        matrix @ fit.value + constant,
+        by_rows @ matrix.T + constant,
         (),
-        turn @ (fit.drift + shifts.T @ shifts) @ turn.T,
+        matrix @ (fit.prior_covariance + shifts.T @ shifts) @ matrix.T,
     )
-    before = turn @ np.linalg.inv(prior.precision) @ turn.T
-    untold = np.diag(estimate.covariance) > WORTH**2 * np.diag(before)
-    estimate = replace(estimate, why=tuple(HARDLY if each else "" for each in untold.tolist()))
-    # of factors, as they are scaled in the arm
-    relative, factors = (
-        np.ones(packed_size(robot.nq)),
-        [*range(1 + 2 * robot.nq, 1 + 5 * robot.nq), -1],
+    before = matrix @ np.linalg.inv(prior.precision) @ matrix.T
+    unknown = np.diag(estimate.covariance) > FIT.max_sd_ratio**2 * np.diag(before)
+    estimate = replace(
+        estimate, reasons=tuple(HARDLY_KNOWN if each else "" for each in unknown.tolist())
     )
-    relative[factors] /= np.maximum(fit.value[factors], 1e-3)
+    relative = _covariance_scale(robot.nq, fit.value)
     return replace(
         fitted,
-        arm=_with_electrics(arm, fit.value, torque_known),
-        estimate=joined(
-            [fitted.estimate, estimate], errors.T @ shifts @ turn.T if torque_known else None
+        arm=_with_parameters(arm, fit.value, torque_known),
+        estimate=join_estimates(
+            [fitted.estimate, estimate], errors.T @ shifts @ matrix.T if torque_known else None
         ),
-        without=_each_with_electrics(fitted.without, without, torque_known),
-        varied=_each_with_electrics(fitted.varied, varied, torque_known),
-        tilted=_each_with_electrics(fitted.tilted, fit.value + shifts, torque_known),
-        drift=np.outer(relative, relative) * fit.drift,
-        lost=np.outer(relative, relative) * fit.lost,
+        arms_without_cluster=_each_with_parameters(
+            fitted.arms_without_cluster, without, torque_known
+        ),
+        row_error_arms=_each_with_parameters(fitted.row_error_arms, by_rows, torque_known),
+        prior_error_arms=_each_with_parameters(
+            fitted.prior_error_arms, fit.value + shifts, torque_known
+        ),
+        prior_covariance=np.outer(relative, relative) * fit.prior_covariance,
+        covariance_increase=np.outer(relative, relative) * fit.covariance_increase,
     )
 
 
-def _each_with_electrics(
+def _parameter_changes(
+    fit: PowerFit, arm: FittedArm, rows: Rows, others: Sequence[FittedArm]
+) -> Array:
+    """Changes (k, p) of the power parameters due to the torques of other arms.
+
+    An error of the torques changes the power parameters by one step of the fit.
+    """
+    parameters = PowerParameters.unpacked(fit.value)
+    power = replace(arm, power_parameters=parameters).power(rows)[0]
+    return np.array(
+        [
+            fit.gain @ (power - replace(other, power_parameters=parameters).power(rows)[0])
+            for other in others
+        ]
+    ).reshape(-1, len(fit.value))
+
+
+def _covariance_scale(nq: int, value: Array) -> Array:
+    """Factors (p,) from errors of packed figures to errors relative to the arm that contains the
+    fitted factors."""
+    scale = np.ones(packed_size(nq))
+    factors = [*range(1 + 2 * nq, 1 + 5 * nq), -1]
+    scale[factors] /= np.maximum(value[factors], FIT.min_factor)
+    return scale
+
+
+def _each_with_parameters(
     arms: Sequence[FittedArm], values: Array, torque_known: bool
 ) -> tuple[FittedArm, ...]:
     return tuple(
-        _with_electrics(arm, each, torque_known) for arm, each in zip(arms, values, strict=True)
+        _with_parameters(arm, each, torque_known) for arm, each in zip(arms, values, strict=True)
     )
 
 
-def _with_electrics(arm: FittedArm, values: Array, torque_known: bool) -> FittedArm:
-    electrics = Electrics.unpacked(values)
-    plain = Electrics.plain(electrics.idle, electrics.copper, electrics.inverter)
+def _with_parameters(arm: FittedArm, values: Array, torque_known: bool) -> FittedArm:
+    """The arm with packed figures, whose factors and increments change its own figures."""
+    found = PowerParameters.unpacked(values)
+    nominal = PowerParameters.nominal(found.idle, found.copper, found.inverter)
     if torque_known:
-        return replace(arm, electrics=plain)
+        return replace(arm, power_parameters=nominal)
     return replace(
         arm,
-        coulomb=electrics.dry * arm.coulomb,
-        curved=electrics.dry * arm.curved,
-        viscous=electrics.viscous * arm.viscous,
-        rotor_inertia=electrics.rotor * arm.rotor_inertia,
-        load=arm.load + electrics.load,
-        offset=arm.offset + electrics.offset,
-        links=arm.links * electrics.links,
-        electrics=plain,
+        coulomb=found.dry_factor * arm.coulomb,
+        curved=found.dry_factor * arm.curved,
+        viscous=found.viscous_factor * arm.viscous,
+        rotor_inertia=found.rotor_factor * arm.rotor_inertia,
+        load=arm.load + found.load_increment,
+        offset=arm.offset + found.offset_increment,
+        link_scale=arm.link_scale * found.link_scale,
+        power_parameters=nominal,
     )
 
 
 def _figures_of_power(
-    robot: Robot, prior: Prior, torque_known: bool
+    robot: Robot, prior: PowerPrior, torque_known: bool
 ) -> tuple[Array, Array, tuple[Name, ...]]:
-    """The matrix (f, p) and the constants (f,) that make figures of packed ones (p,), and the
-    figures' names.
-    """
+    """Matrix (f, p) and constants (f,) from packed figures (p,) to named figures, and the names."""
     nq, own, every = robot.nq, own_arm(robot), np.eye(packed_size(robot.nq))
     names: list[Name] = [("idle_power", None)]
     names += [(figure, joint) for figure in ("copper", "inverter_linear") for joint in range(nq)]
-    turn = [*every[: len(names)]]
+    matrix = [*every[: len(names)]]
     constant = [0.0] * len(names)
     if not torque_known:
         for figure, part in (("coulomb", 2), ("curved", 2), ("viscous", 3), ("rotor_inertia", 4)):
             for joint in np.flatnonzero(getattr(own, figure)).tolist():
                 names.append((figure, joint))
-                turn.append(getattr(own, figure)[joint] * every[1 + part * nq + joint])
+                matrix.append(getattr(own, figure)[joint] * every[1 + part * nq + joint])
                 constant.append(0.0)
         for joint in np.flatnonzero(own.load + prior.mean[1 + 5 * nq : 1 + 6 * nq]).tolist():
             names.append(("load", joint))
-            turn.append(every[1 + 5 * nq + joint])
+            matrix.append(every[1 + 5 * nq + joint])
             constant.append(float(own.load[joint]))
         names.append((LINK_MASS_SCALE, None))
-        turn.append(every[-1])
+        matrix.append(every[-1])
         constant.append(0.0)
-    return np.array(turn), np.array(constant), tuple(names)
+    return np.array(matrix), np.array(constant), tuple(names)

@@ -1,8 +1,8 @@
-"""Mass and centre of mass of a payload, from a log with it and at least one without it.
+"""Mass and centre of mass of a payload, from a log with it and at least one log without it.
 
-The torques of the log with the payload have a term more than those of the others: that of a body at
-the flange. Friction, rotors, sensors' offsets and the errors of the links are the same in all logs,
-and are found with it. What is left for the payload is the difference between the logs.
+The torques of the log with the payload have one more term: that of a body at the flange. Friction,
+rotors, offsets of the sensors and errors of the links are the same in all logs and are fitted
+together with it, so the payload explains the difference between the logs.
 """
 
 from __future__ import annotations
@@ -11,83 +11,103 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.dynamics.link_regressor import BODY, rigid_torques
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, rigid_torques
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.friction_columns import columns
 from joulepath.optimizer.identify.arm.link_errors import link_deviations
 from joulepath.optimizer.identify.estimates.estimate import Name
-from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out, solve
-from joulepath.optimizer.identify.fits.block import moving
-from joulepath.optimizer.identify.fits.torque_fit import LEAST_LOAD_SPREAD, MOST_RELATIVE_SD
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    IntArray,
+    jackknife,
+    leave_one_out,
+    solve_bounded,
+)
+from joulepath.optimizer.identify.fits.block import moving_rows
+from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.results import Parameter
-from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of, shared_variance
+from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of, effective_variance
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 from joulepath.optimizer.problem.arm import Payload
 
 TERMS = ("coulomb", "viscous", "load", "curved", "offset", "rotor_inertia")
-NAMES: tuple[Name, ...] = tuple(
+FIGURE_NAMES: tuple[Name, ...] = tuple(
     (f"payload_{part}", None) for part in ("mass", "com_x", "com_y", "com_z")
 )
-# the weights of joints and the payload's share of load friction follow from the fit before
-PASSES = 4
-# standard deviations of a payload before any log: mass [kg], first moments [kg·m], inertia about
-# the last joint [kg·m²]
-MASS, MOMENT, INERTIA = 100.0, 30.0, 0.1
-# a term of friction is anything up to so many times the joint's torque limit, per unit of its
-# column
-FRICTION = 10.0
-# kg; a mass that a torque sensor or a current does not show
-LEAST_MASS = 1e-3
-# poses of the logs at which gravity is compared
-MOST_POSES = 500
-SAME = "The log with the payload does not differ from the others by a load."
+NO_DIFFERENCE = "The log with the payload does not differ from the others by a load."
+
+
+@dataclass(frozen=True)
+class PayloadFitSettings:
+    """Settings of the fit of a payload."""
+
+    passes: int = 4
+    """Solutions; the weights of the joints and the load friction of the payload follow the
+    previous solution."""
+    mass_sd: float = 100.0
+    """Prior standard deviation of the mass [kg]."""
+    moment_sd: float = 30.0
+    """Prior standard deviation of the first moments [kg·m]."""
+    inertia_sd: float = 0.1
+    """Prior standard deviation of the inertia about the last joint [kg·m²]."""
+    friction_sd: float = 10.0
+    """Prior standard deviation of a term of friction over the torque limit [SI unit per N·m]."""
+    min_curve_speed: float = 0.05
+    """Smallest speed of the curved friction term [rad/s]."""
+    min_mass: float = 1e-3
+    """Mass below which a torque sensor or a current does not show a payload [kg]."""
+    max_poses: int = 500
+    """Largest number of poses at which gravity is compared."""
+
+
+PAYLOAD_FIT = PayloadFitSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
-    """A payload: `mass` [kg], `com` (3,) [m] in the flange frame, their covariance (4, 4), and its
-    `body` (10,) in the frame of the last joint. `log` is the number of the log that carries it.
-    `why` it is not told, or empty: `body` is then 0."""
+class IdentifiedPayload:
+    """A payload found from logs."""
 
     log: int
+    """Number of the log with the payload."""
     mass: float
+    """Mass [kg]."""
     com: Array
+    """Centre of mass (3,) in the flange frame [m]."""
     covariance: Array
+    """Covariance (4, 4) of mass and centre of mass."""
     body: Array
+    """Parameters (10,) in the frame of the last joint; 0 if not identified."""
     why: str
+    """Reason for not identifying it, or empty."""
 
     def parameters(self, stated: Payload) -> tuple[Parameter, ...]:
-        """Its figures, beside those that the log states."""
+        """Figures of the payload, beside the values stated with the log."""
         own = [stated.mass, *stated.com.tolist()]
-        values, deviations = (
-            [self.mass, *self.com.tolist()],
-            np.sqrt(np.diag(self.covariance)).tolist(),
-        )
-        parts = zip(NAMES, values, deviations, own, strict=True)
+        values = [self.mass, *self.com.tolist()]
+        deviations = np.sqrt(np.diag(self.covariance)).tolist()
         return tuple(
-            Parameter(*name, value, sd, said, not self.why, self.why)
-            for name, value, sd, said in parts
+            Parameter(*name, value, sd, previous, not self.why, self.why)
+            for name, value, sd, previous in zip(FIGURE_NAMES, values, deviations, own, strict=True)
         )
 
 
-def loaded(rows: Rows, carried: Carried) -> Rows:
-    """The rows with the payload in the rigid torques of the log that carries it."""
+def with_payload(rows: Rows, payload: IdentifiedPayload) -> Rows:
+    """Rows with the payload in the rigid-body torques of its log, and without regressors."""
     assert rows.regressor is not None
     rigid = rows.rigid + np.where(
-        (rows.log == carried.log)[:, None], rows.regressor[:, :, -BODY:] @ carried.body, 0.0
+        (rows.log == payload.log)[:, None],
+        rows.regressor[:, :, -PARAMETERS_PER_BODY:] @ payload.body,
+        0.0,
     )
     return replace(rows, rigid=rigid, regressor=None)
 
 
 def joints_without_gravity(robot: Robot, rows: Rows, logs: Sequence[Log]) -> list[int]:
-    """Joints at which the weight of the links hardly varies over the logs: no torque constant
-    follows from it.
-    """
-    every = max(1, len(rows.q) // MOST_POSES)
+    """Joints with a nearly constant gravity torque, which determines no torque constant."""
+    every = max(1, len(rows.q) // PAYLOAD_FIT.max_poses)
     parts = list[Array]()
     for number, log in enumerate(logs):
         model = robot.model.copy()
@@ -95,37 +115,46 @@ def joints_without_gravity(robot: Robot, rows: Rows, logs: Sequence[Log]) -> lis
         q = rows.q[rows.log == number][::every]
         parts.append(rigid_torques(model, q, np.zeros_like(q), np.zeros_like(q)))
     spread = np.concatenate(parts).std(axis=0)
-    return np.flatnonzero(spread < LEAST_LOAD_SPREAD * robot.limits.tau_max).tolist()
+    limit = TORQUE_FIT.min_load_spread * robot.limits.tau_max
+    return np.flatnonzero(spread < limit).tolist()
 
 
-def payload_of(robot: Robot, rows: Rows, torque: Array, log: int, threshold: float) -> Carried:
-    """The payload in rows with regressors, whose rigid torques are without it in the `log` that
-    carries it.
+def fit_payload(
+    robot: Robot, rows: Rows, torque: Array, log: int, threshold: float
+) -> IdentifiedPayload:
+    """Fit the payload of one log.
 
-    `torque` (n, nq) [N·m] are motor torques, `threshold` [rad/s] the speed above which a joint's
-    rows count. Raises InvalidProblem if that log carries less than nothing.
+    Args:
+        robot: the robot with its own figures.
+        rows: rows with regressors, whose rigid-body torques are without the payload.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        log: number of the log with the payload.
+        threshold: smallest speed of a moving joint [rad/s].
+
+    Raises:
+        InvalidProblem: the log carries less than the others.
     """
-    clusters, prior = clusters_of(rows), np.diag(_precision(robot))
-    body, variance = np.zeros(BODY), np.ones(robot.nq)
-    links = BODY * robot.nq
-    for _ in range(PASSES):
+    clusters, prior = clusters_of(rows), np.diag(_prior_precision(robot))
+    body, variance = np.zeros(PARAMETERS_PER_BODY), np.ones(robot.nq)
+    links = PARAMETERS_PER_BODY * robot.nq
+    for _ in range(PAYLOAD_FIT.passes):
         grouped, parts = _equations(robot, rows, torque, clusters, log, threshold, body, variance)
         gram, moment = grouped.gram.sum(axis=0) + prior, grouped.moment.sum(axis=0)
-        value = solve(gram, moment, np.full(len(prior), -np.inf))
+        value = solve_bounded(gram, moment, np.full(len(prior), -np.inf))
         for joint, (at, left, right, of_row) in enumerate(parts):
             if len(right):
                 error = right - left @ value[at]
-                variance[joint] = shared_variance(
+                variance[joint] = effective_variance(
                     error, np.ones_like(error), Clusters(of_row, clusters.count)
                 )
-        body = value[links : links + BODY]
-    replicates = left_out(grouped, value, np.ones(len(value), dtype=bool), prior)
+        body = value[links : links + PARAMETERS_PER_BODY]
+    replicates = leave_one_out(grouped, value, np.ones(len(value), dtype=bool), prior)
     inverse = np.linalg.inv(gram)
-    return _told(
+    return _payload_of_body(
         robot,
         log,
         body,
-        replicates[:, links : links + BODY],
+        replicates[:, links : links + PARAMETERS_PER_BODY],
         (inverse @ prior @ inverse)[links:, links:],
     )
 
@@ -139,19 +168,36 @@ def _equations(
     threshold: float,
     body: Array,
     variance: Array,
-) -> tuple[Grouped, list[tuple[list[int], Array, Array, npt.NDArray[np.int64]]]]:
-    """Normal equations over all joints, weighted by their `variance` (nq,), and of each joint the
-    places of its terms, its columns, its torques and the clusters of its rows. Load friction is
-    that of the payload `body` (10,)."""
+) -> tuple[GroupedEquations, list[tuple[list[int], Array, Array, IntArray]]]:
+    """Normal equations over all joints.
+
+    Args:
+        robot: the robot with its own figures.
+        rows: rows with regressors.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows.
+        log: number of the log with the payload.
+        threshold: smallest speed of a moving joint [rad/s].
+        body: parameters (10,) of the payload whose load friction is assumed.
+        variance: variance (nq,) of the rows of each joint.
+
+    Returns:
+        The equations; and of each joint the positions of its terms, its columns, its torques and
+        the clusters of its rows.
+    """
     assert rows.regressor is not None
-    nq, speed = robot.nq, np.maximum(robot.friction.speed, 0.05)
-    count, shared = (BODY + len(TERMS)) * nq + BODY, [*range(BODY * nq + BODY)]
+    nq = robot.nq
+    speed = np.maximum(robot.friction.speed, PAYLOAD_FIT.min_curve_speed)
+    count, shared = (
+        (PARAMETERS_PER_BODY + len(TERMS)) * nq + PARAMETERS_PER_BODY,
+        [*range(PARAMETERS_PER_BODY * nq + PARAMETERS_PER_BODY)],
+    )
     gram, moment = np.zeros((clusters.count, count, count)), np.zeros((clusters.count, count))
-    parts = list[tuple[list[int], Array, Array, npt.NDArray[np.int64]]]()
+    parts = list[tuple[list[int], Array, Array, IntArray]]()
     for joint in range(nq):
-        use = moving(rows, torque, joint, threshold, ())
+        use = moving_rows(rows, torque, joint, threshold, ())
         links = rows.regressor[use, joint]
-        carried = np.where((rows.log[use] == log)[:, None], links[:, -BODY:], 0.0)
+        carried = np.where((rows.log[use] == log)[:, None], links[:, -PARAMETERS_PER_BODY:], 0.0)
         rigid = rows.rigid[use, joint]
         friction = columns(
             TERMS,
@@ -167,42 +213,57 @@ def _equations(
             *range(len(shared) + joint * len(TERMS), len(shared) + (joint + 1) * len(TERMS)),
         ]
         of_row = clusters.of_row[use]
-        part = Grouped.of(
+        part = GroupedEquations.of(
             left, right, np.full(len(right), 1 / variance[joint]), of_row, clusters.count
         )
         gram[np.ix_(range(clusters.count), at, at)] += part.gram
         moment[:, at] += part.moment
         parts.append((at, left, right, of_row))
-    return Grouped(gram, moment), parts
+    return GroupedEquations(gram, moment), parts
 
 
-def _precision(robot: Robot) -> Array:
-    """Of links' errors, payload and friction before any log."""
-    deviations = [link_deviations(robot), np.array([MASS, *[MOMENT] * 3, *[INERTIA] * 6])]
-    deviations += [np.full(len(TERMS), FRICTION * limit) for limit in robot.limits.tau_max.tolist()]
+def _prior_precision(robot: Robot) -> Array:
+    """Prior precisions of link errors, payload and friction."""
+    settings = PAYLOAD_FIT
+    payload = [settings.mass_sd, *[settings.moment_sd] * 3, *[settings.inertia_sd] * 6]
+    deviations = [link_deviations(robot), np.array(payload)]
+    deviations += [
+        np.full(len(TERMS), settings.friction_sd * limit) for limit in robot.limits.tau_max.tolist()
+    ]
     return np.asarray(np.concatenate(deviations) ** -2.0)
 
 
-def _told(robot: Robot, log: int, body: Array, replicates: Array, drift: Array) -> Carried:
-    """The payload from its body (10,), that without each cluster (G, 10), and the covariance that
-    the prior adds.
+def _payload_of_body(
+    robot: Robot, log: int, body: Array, replicates: Array, prior_covariance: Array
+) -> IdentifiedPayload:
+    """The payload from its parameters.
+
+    Args:
+        robot: the robot.
+        log: number of the log with the payload.
+        body: parameters (10,) in the frame of the last joint.
+        replicates: parameters (G, 10) without one cluster each.
+        prior_covariance: covariance (10, 10) due to the prior.
     """
+    min_mass = PAYLOAD_FIT.min_mass
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     mass = float(body[0])
-    spread = jackknife(replicates[:, :4]) + drift[:4, :4]
+    spread = jackknife(replicates[:, :4]) + prior_covariance[:4, :4]
     sd = float(np.sqrt(spread[0, 0]))
-    if mass < -max(3 * sd, LEAST_MASS):
+    if mass < -max(3 * sd, min_mass):
         raise InvalidProblem(
             "logs",
             f"The last of the logs carries {-mass:.3g} kg less than the others say of theirs: name "
-            "the log with the "
-            "payload last, and give the `payload` of the others.",
+            "the log with the payload last, and give the `payload` of the others.",
         )
-    if not max(sd, LEAST_MASS) <= MOST_RELATIVE_SD * mass:
-        return Carried(log, 0.0, np.zeros(3), np.diag([sd**2, 0.0, 0.0, 0.0]), np.zeros(BODY), SAME)
+    if not max(sd, min_mass) <= TORQUE_FIT.max_relative_sd * mass:
+        unknown = np.diag([sd**2, 0.0, 0.0, 0.0])
+        return IdentifiedPayload(
+            log, 0.0, np.zeros(3), unknown, np.zeros(PARAMETERS_PER_BODY), NO_DIFFERENCE
+        )
     com = flange.rotation.T @ (body[1:4] / mass - flange.translation)
     slope = np.zeros((4, 4))
     slope[0, 0] = 1.0
     slope[1:, 0] = -flange.rotation.T @ body[1:4] / mass**2
     slope[1:, 1:] = flange.rotation.T / mass
-    return Carried(log, mass, com, slope @ spread @ slope.T, body, "")
+    return IdentifiedPayload(log, mass, com, slope @ spread @ slope.T, body, "")

@@ -1,10 +1,9 @@
-"""Maximum likelihood from a periodic excitation (Swevers et al. 1997): the noise is measured, not
-assumed.
+"""Maximum likelihood from a periodic excitation, with measured noise (Swevers et al. 1997).
 
-The arm repeats a Fourier series, so that everything but noise repeats, too. The mean over periods
-has less noise, and the spread over periods is the noise of each joint. With it as weights, least
-squares is the maximum-likelihood estimate of Gaussian noise, and the covariance of the figures
-follows without any residual.
+The arm repeats a Fourier series, so everything but noise repeats. The mean over the periods has
+less noise, and the spread over the periods is the noise of each joint. With the inverse noise as
+weights, least squares is the maximum-likelihood estimate for Gaussian noise, and the covariance of
+the figures follows without residuals.
 """
 
 from __future__ import annotations
@@ -16,55 +15,65 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.errors import MethodNotApplicable
 from joulepath.optimizer.identify.estimates.estimate import Estimate
-from joulepath.optimizer.identify.estimates.grouped import solve
-from joulepath.optimizer.identify.fits.base_fit import base_arm, terms_of_arm
+from joulepath.optimizer.identify.estimates.grouped import solve_bounded
+from joulepath.optimizer.identify.fits.base_fit import base_regression, base_terms
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import MeasuredNoise
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-_AVERAGED = ("q", "v", "a", "rigid", "links", "effort", "power", "temperature", "regressor")
+_AVERAGED = ("q", "v", "a", "rigid", "link_torques", "effort", "power", "temperature", "regressor")
 
 
 @dataclass(frozen=True)
 class PeriodicSettings:
-    """What counts as a periodic log."""
+    """Settings of the method `periodic`."""
 
-    least_periods: int = 2
-    """Periods of a log: the spread of fewer is not defined."""
-    most_apart: float = 0.02
-    """Largest distance of a joint from its mean position of all periods [rad]; far above the
+    min_periods: int = 2
+    """Smallest number of periods of a log; one period has no spread."""
+    max_deviation: float = 0.02
+    """Largest distance of a joint from its mean position over all periods [rad]; far above the
     repeatability of arms."""
+    min_noise: float = 1e-9
+    """Smallest standard deviation of the torque of a row [N·m]."""
 
 
-def periods_of(log: Log, period: float, settings: PeriodicSettings | None = None) -> Log:
-    """The log cut into whole periods [s] from its first motion on, each of which counts as a move.
+PERIODIC = PeriodicSettings()
 
-    Periods begin at the nearest sample. Raises MethodNotApplicable if there are too few, or if the
-    motion differs.
+
+def cut_into_periods(log: Log, period: float, settings: PeriodicSettings = PERIODIC) -> Log:
+    """Cut a log into whole periods from its first motion on; each period counts as a move.
+
+    Periods begin at the nearest sample.
+
+    Args:
+        log: log of a repeated motion.
+        period: period of the motion [s].
+        settings: requirements on the periods.
+
+    Raises:
+        MethodNotApplicable: there are too few periods, or the motion differs between periods.
     """
-    settings = settings or PeriodicSettings()
     moving = [move for move in log.moves if not move.at_rest]
     start, end = (moving[0].start, moving[-1].end) if moving else (0, 0)
     length, rate = int(period * log.rate), log.rate
     count = round((end - start) / (period * rate))
     starts = [start + round(k * period * rate) for k in range(count)]
     starts = [each for each in starts if each + length <= len(log.time)]
-    if len(starts) < settings.least_periods:
+    if len(starts) < settings.min_periods:
         raise MethodNotApplicable(
             "periodic",
             f"the log has {len(starts)} whole periods of {period:g} s, and at least "
-            f"{settings.least_periods} are needed.",
+            f"{settings.min_periods} are needed.",
         )
     q = np.array([log.q[each : each + length] for each in starts])
-    apart = float(np.abs(q - q.mean(axis=0)).max())
-    if apart > settings.most_apart:
+    deviation = float(np.abs(q - q.mean(axis=0)).max())
+    if deviation > settings.max_deviation:
         raise MethodNotApplicable(
             "periodic",
-            f"its periods of {period:g} s are up to {apart:.2g} rad apart. Give the `period` of "
-            "the "
-            "motion, and log the same motion again and again.",
+            f"its periods of {period:g} s are up to {deviation:.2g} rad apart. Give the `period` "
+            "of the motion, and log the same motion again and again.",
         )
     return replace(log, moves=tuple(LogMove(each, each + length, False) for each in starts))
 
@@ -72,25 +81,35 @@ def periods_of(log: Log, period: float, settings: PeriodicSettings | None = None
 def fit_periodic(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
 ) -> tuple[Estimate, MeasuredNoise]:
-    """The most likely base parameters and friction from motor torques (n, nq) [N·m] of whole
-    periods."""
+    """Maximum-likelihood estimate of base parameters and friction.
+
+    Args:
+        robot: the robot with its own figures.
+        rows: rows of whole periods, with regressors.
+        torque: motor torques (n, nq) [N·m].
+        clusters: partition of the rows.
+        options: requested figures and period.
+
+    Returns:
+        The estimate, and the measured noise.
+    """
     assert options.period is not None
     count = round((rows.time[-1] - rows.time[0]) / options.period)
     periods = torque.reshape(count, -1, robot.nq)
     noise = np.sqrt(periods.var(axis=0, ddof=1).mean(axis=0))
     mean = mean_period(rows, count)
-    arm = base_arm(
+    arm = base_regression(
         robot,
         mean,
         periods.mean(axis=0),
         Clusters(np.zeros(len(mean.q), dtype=np.int64), 1),
         options,
     )
-    terms = terms_of_arm(robot, arm, options)
-    deviation = np.maximum(noise[arm.block.joint], 1e-9) / np.sqrt(count)
+    terms = base_terms(robot, arm, options)
+    deviation = np.maximum(noise[arm.block.joint], PERIODIC.min_noise) / np.sqrt(count)
     columns, values = terms.columns(arm) / deviation[:, None], arm.values / deviation
     gram = columns.T @ columns
-    value = solve(gram, columns.T @ values, terms.lower)
+    value = solve_bounded(gram, columns.T @ values, terms.lower)
     free = value > terms.lower
     covariance = np.zeros_like(gram)
     covariance[np.ix_(free, free)] = np.linalg.pinv(gram[np.ix_(free, free)], hermitian=True)
@@ -102,7 +121,12 @@ def fit_periodic(
 
 
 def mean_period(rows: Rows, count: int) -> Rows:
-    """The mean (n / count rows) of so many periods, which follow one another in the rows."""
+    """Mean (n / count rows) over consecutive periods.
+
+    Args:
+        rows: rows of whole periods.
+        count: number of periods.
+    """
     length = len(rows.q) // count
     first = rows.take(np.arange(len(rows.q)) < length)
     means = {name: getattr(rows, name) for name in _AVERAGED}

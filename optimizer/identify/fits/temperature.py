@@ -1,8 +1,8 @@
 """Friction over temperature (Hao et al.: friction of a joint over velocity and temperature).
 
-friction(T) = friction(T0) · exp(-k (T - T0)), T0 the mean temperature of the fit. The factor is the
-same at all speeds, as the viscosity of the grease acts on all of them. It is found only where the
-logs span enough: else it would take up whatever else drifts.
+friction(T) = friction(T0) · exp(-k (T - T0)), with T0 the mean temperature of the fit. The factor
+is the same at all speeds, because the viscosity of the grease acts on all of them. The rate k is
+fitted only for a wide span of temperatures; otherwise it would absorb any other drift.
 """
 
 from __future__ import annotations
@@ -13,40 +13,51 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
-from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out, solve
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    jackknife,
+    leave_one_out,
+    solve_bounded,
+)
 from joulepath.optimizer.identify.results import Temperatures
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-STEPS, CONVERGED = 20, 1e-9
-
 
 @dataclass(frozen=True)
 class TemperatureSettings:
-    """When friction is taken to depend on the temperature."""
+    """Settings of the fit of friction over temperature."""
 
-    least_span: float = 8.0
-    """Span of a joint's temperature over the logs from which on it does [K]."""
+    min_span: float = 8.0
+    """Smallest span of a joint's temperature for which a rate is fitted [K]."""
     passes: int = 4
-    """Fits at the reference temperature: the rate of a joint that cools and slows at once is found
-    in four."""
+    """Fits of the figures at the reference temperature: the rate of a joint that cools and slows
+    down at once converges in four."""
+    max_iterations: int = 20
+    """Largest number of Gauss-Newton steps for a rate."""
+    step_tolerance: float = 1e-9
+    """Step at which the iteration ends [1, 1/K]."""
 
 
-SETTINGS = TemperatureSettings()
+TEMPERATURE = TemperatureSettings()
 
 
 def temperatures_of(
     rows: Rows, torque: Array, arm: FittedArm, clusters: Clusters, threshold: float
 ) -> Temperatures:
-    """Friction over the temperature of each joint, from motor torques (n, nq) [N·m]; `threshold`
-    [rad/s].
+    """Fit the friction of each joint over its temperature.
+
+    Args:
+        rows: rows of the logs.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        arm: arm with friction fitted at mixed temperatures.
+        clusters: partition of the rows for the jackknife.
+        threshold: smallest speed of a moving joint [rad/s].
     """
     nq = rows.v.shape[1]
     reference, span, k, sd = (np.full(nq, np.nan) for _ in range(4))
-    friction, rest = (
-        arm.friction_torque(rows) - arm.offset,
-        torque - arm.link_torque(rows) - arm.offset,
-    )
+    friction = arm.friction_torque(rows) - arm.offset
+    rest = torque - arm.link_torque(rows) - arm.offset
     for joint in range(nq):
         temperature = rows.temperature[:, joint]
         use = (
@@ -56,22 +67,19 @@ def temperatures_of(
         )
         if not use.any():
             continue
-        reference[joint], span[joint] = (
-            float(temperature[use].mean()),
-            float(np.ptp(temperature[use])),
-        )
-        if span[joint] >= SETTINGS.least_span:
+        reference[joint] = float(temperature[use].mean())
+        span[joint] = float(np.ptp(temperature[use]))
+        if span[joint] >= TEMPERATURE.min_span:
             part = Clusters(clusters.of_row[use], clusters.count)
             above = temperature[use] - reference[joint]
-            k[joint], sd[joint] = _rate(friction[use, joint], rest[use, joint], above, part)
+            k[joint], sd[joint] = _fit_rate(friction[use, joint], rest[use, joint], above, part)
     return Temperatures(reference, span, k, sd)
 
 
 def at_reference(rows: Rows, arm: FittedArm, found: Temperatures) -> Rows:
-    """The rows with the efforts that they would have with all joints at their reference
-    temperatures.
+    """Rows with their efforts corrected to the reference temperature of each joint.
 
-    Joints whose rate is not known stay as they are.
+    The efforts of joints without a rate are not changed.
     """
     above = np.where(
         np.isfinite(found.k) & np.isfinite(rows.temperature),
@@ -86,20 +94,32 @@ def at_reference(rows: Rows, arm: FittedArm, found: Temperatures) -> Rows:
     )
 
 
-def _rate(friction: Array, rest: Array, above: Array, clusters: Clusters) -> tuple[float, float]:
-    """k [1/K] and its standard deviation, for temperatures `above` (n,) [K] the reference:
-    Gauss-Newton with a common factor on the friction, which the fit before has found at mixed
-    temperatures."""
+def _fit_rate(
+    friction: Array, rest: Array, above: Array, clusters: Clusters
+) -> tuple[float, float]:
+    """Fit the rate of one joint and a common factor on its friction by Gauss-Newton.
+
+    Args:
+        friction: friction torques (n,) [N·m], fitted at mixed temperatures.
+        rest: measured friction torques (n,) [N·m].
+        above: temperatures (n,) above the reference [K].
+        clusters: partition of the rows.
+
+    Returns:
+        The rate k and its standard deviation [1/K].
+    """
     found = np.array([1.0, 0.0])
-    for _ in range(STEPS):
+    for _ in range(TEMPERATURE.max_iterations):
         curve = friction * np.exp(-found[1] * above)
         columns = np.column_stack([curve, -found[0] * above * curve])
-        grouped = Grouped.of(
+        grouped = GroupedEquations.of(
             columns, rest - found[0] * curve, np.ones_like(rest), clusters.of_row, clusters.count
         )
-        step = solve(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), np.full(2, -np.inf))
+        step = solve_bounded(
+            grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), np.full(2, -np.inf)
+        )
         found = found + step
-        if np.abs(step).max() < CONVERGED:
+        if np.abs(step).max() < TEMPERATURE.step_tolerance:
             break
-    spread = jackknife(left_out(grouped, step, np.ones(2, dtype=bool)))
+    spread = jackknife(leave_one_out(grouped, step, np.ones(2, dtype=bool)))
     return float(found[1]), float(np.sqrt(spread[1, 1]))

@@ -1,119 +1,159 @@
-"""Friction and rotor inertia of each joint from its torques, with the inertials of the links known.
+"""Friction and rotor inertia of each joint from its torques, for links with known inertials.
 
-tau = tau_rigid + rotor_inertia·a + friction + offset, for each joint by itself, over rows in which
-it moves. Joints that a coupling ties together are fitted as one block. What the rows do not tell is
-held at the robot's own figure, and the rest is fitted again.
+tau = tau_rigid + rotor_inertia·a + friction + offset, joint by joint, over the rows in which the
+joint moves. Coupled joints are fitted as one block. Undetermined terms are held at the robot's own
+figures, and the remaining terms are fitted again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
-from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, joined
-from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out, solve
-from joulepath.optimizer.identify.estimates.robust import weights_of
-from joulepath.optimizer.identify.fits.block import SCALE, Block, block_of
+from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    jackknife,
+    leave_one_out,
+    solve_bounded,
+)
+from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
+from joulepath.optimizer.identify.fits.block import SCALE, JointBlock, joint_block
 from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# a value whose standard deviation is a larger share of it is not found; nor a load term below so
-# many of them
-MOST_RELATIVE_SD, LOAD_SDS = 0.3, 3.0
-MOST_SCALE_SD = 0.03
-# share of the torque limit that the rigid torque's standard deviation must have for a load term
-LEAST_LOAD_SPREAD = 0.05
-# standard deviations of terms that are held at the robot's own figure, over their values; and of
-# load friction
-OWN_SD = {"coulomb": 0.17, "viscous": 0.17, "rotor_inertia": 0.1}
-LOAD_SD = 0.06
-# speeds [rad/s] among which the curved term's is sought
-SPEEDS = np.geomspace(0.05, 3.0, 12)
-PASSES = 8
-# fewer rows of a joint than this are no motion
-LEAST_ROWS = 20
-STILL = "The joint hardly moves in these logs."
-UNSURE = "Its standard deviation is {:.0%} of its value."
-KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
-ZERO = "The fit puts it at its bound, 0."
+
+@dataclass(frozen=True)
+class TorqueFitSettings:
+    """Settings of the fit of friction and rotors to torques."""
+
+    max_relative_sd: float = 0.3
+    """Standard deviation of a figure over its value, above which the figure is not identified."""
+    max_scale_sd: float = 0.03
+    """The same for the factor on the torque constant: the robot's own constant is better than a
+    poor estimate."""
+    min_load_sds: float = 3.0
+    """Standard deviations that a load term must exceed to be identified."""
+    min_load_spread: float = 0.05
+    """Standard deviation of the rigid torque over the torque limit, below which a load term is not
+    identified [1]."""
+    own_friction_sd: float = 0.17
+    """Relative standard deviation of the robot's own Coulomb and viscous friction [1]."""
+    own_rotor_sd: float = 0.1
+    """Relative standard deviation of the robot's own rotor inertia [1]."""
+    own_load_sd: float = 0.06
+    """Standard deviation of the robot's own load friction [1]."""
+    min_curve_speed: float = 0.05
+    """Smallest candidate for the speed of the curved term [rad/s]."""
+    max_curve_speed: float = 3.0
+    """Largest candidate for the speed of the curved term [rad/s]."""
+    curve_speeds: int = 12
+    """Number of candidates for the speed of the curved term."""
+    irls_passes: int = 8
+    """Solutions of the iteratively reweighted least squares."""
+    min_rows: int = 20
+    """Rows of a term, below which its joint does not count as moving."""
+
+
+TORQUE_FIT = TorqueFitSettings()
+NOT_MOVING = "The joint hardly moves in these logs."
+UNCERTAIN = "Its standard deviation is {:.0%} of its value."
+LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
+AT_BOUND = "The fit puts it at its bound, 0."
 
 
 def fit_torques(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
 ) -> Estimate:
-    """Friction and rotor inertia from motor torques (n, nq) [N·m], NaN where there are none."""
-    found, speeds = list[Estimate](), dict[int, float]()
-    for joints in _joint_sets(robot.nq, options.couplings):
-        block = block_of(robot, rows, torque, clusters, options, joints)
+    """Fit friction and rotor inertia of all joints.
+
+    Args:
+        robot: the robot with its own figures.
+        rows: rows of the logs.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows for the jackknife.
+        options: requested figures.
+    """
+    settings = TORQUE_FIT
+    estimates, speeds = list[Estimate](), dict[int, float]()
+    candidates = np.geomspace(
+        settings.min_curve_speed, settings.max_curve_speed, settings.curve_speeds
+    )
+    for joints in _coupled_joints(robot.nq, options.couplings):
+        block = joint_block(robot, rows, torque, clusters, options, joints)
         if "curved" in options.terms:
-            # the speed at which the concave rise bends is the one at which it fits best
+            # the torque is not linear in the speed of the curved term: the best candidate is taken
             block = min(
                 (
-                    block_of(robot, rows, torque, clusters, options, joints, speed)
-                    for speed in SPEEDS
+                    joint_block(robot, rows, torque, clusters, options, joints, speed)
+                    for speed in candidates
                 ),
-                key=lambda each: _misfit(each, clusters, options),
+                key=lambda each: _squared_error(each, clusters, options),
             )
-        found.append(_fit(robot, block, clusters, options))
+        estimate = _fit_block(robot, block, clusters, options)
+        estimates.append(estimate)
         if block.speed is not None:
-            kept = {name for name, why in zip(found[-1].names, found[-1].why, strict=True) if why}
+            kept = {name for name, why in zip(estimate.names, estimate.reasons, strict=True) if why}
             speeds |= {joint: block.speed for joint in joints if ("curved", joint) not in kept}
-    estimate = joined(found)
+    estimate = join_estimates(estimates)
     if "torque_constant" in options.fit:
-        estimate = _unscaled(robot, estimate)
-    return joined([estimate, _exactly(speeds, clusters.count)])
+        estimate = _with_torque_constants(robot, estimate)
+    return join_estimates([estimate, _speed_estimate(speeds, clusters.count)])
 
 
-def _exactly(speeds: Mapping[int, float], clusters: int) -> Estimate:
-    """The speeds [rad/s] of the curved terms, by joint; their errors are in those of the terms."""
+def _speed_estimate(speeds: Mapping[int, float], clusters: int) -> Estimate:
+    """Speeds [rad/s] of the curved terms by joint, whose errors are part of those of the terms."""
     names: tuple[Name, ...] = tuple(("speed", joint) for joint in speeds)
     value = np.array([*speeds.values()])
-    drift = np.zeros((len(value), len(value)))
-    return Estimate(names, value, np.tile(value, (clusters, 1)), ("",) * len(value), drift)
+    covariance = np.zeros((len(value), len(value)))
+    return Estimate(names, value, np.tile(value, (clusters, 1)), ("",) * len(value), covariance)
 
 
-def _unscaled(robot: Robot, found: Estimate) -> Estimate:
-    """The estimate with torque constants in the place of scales: torques were those of the robot's
-    own constants.
+def _with_torque_constants(robot: Robot, found: Estimate) -> Estimate:
+    """Replace factors on the rigid torque by torque constants, and rescale the other terms.
+
+    The torques of the fit were computed with the robot's own constants.
     """
     joints = [
         joint if joint is not None and not name.startswith(COUPLED) else 0
         for name, joint in found.names
     ]
-    at = [found.names.index((SCALE, joint)) for joint in joints]
-    own = [
-        float(robot.drives.torque_constant[joint]) if name == SCALE else np.nan
-        for (name, _), joint in zip(found.names, joints, strict=True)
-    ]
-    constants = np.array(own)
+    scale_at = [found.names.index((SCALE, joint)) for joint in joints]
+    constants = np.array(
+        [
+            float(robot.drives.torque_constant[joint]) if name == SCALE else np.nan
+            for (name, _), joint in zip(found.names, joints, strict=True)
+        ]
+    )
+    not_found = np.array([bool(why) for why in found.reasons])
 
-    def turned(values: Array) -> Array:
-        scale = values[..., at]
+    def rescaled(values: Array) -> Array:
+        scale = values[..., scale_at]
         return np.asarray(np.where(np.isfinite(constants), constants / scale, values / scale))
 
-    # what the log does not tell stays the robot's own
-    value = np.where([bool(why) for why in found.why], found.value, turned(found.value))
-    replicates = np.where(
-        [bool(why) for why in found.why], found.replicates, turned(found.replicates)
-    )
-    kept = np.array([bool(why) for why in found.why]) & np.isfinite(constants)
+    # a figure that the logs do not determine stays the robot's own
+    value = np.where(not_found, found.value, rescaled(found.value))
+    replicates = np.where(not_found, found.replicates, rescaled(found.replicates))
+    kept = not_found & np.isfinite(constants)
     value, replicates = np.where(kept, constants, value), np.where(kept, constants, replicates)
     names = tuple(
         ("torque_constant", joint) if name == SCALE else (name, joint)
         for name, joint in found.names
     )
     slope = np.abs(value / np.where(found.value != 0, found.value, 1.0))
-    return Estimate(names, value, replicates, found.why, found.drift * np.outer(slope, slope))
+    return Estimate(
+        names, value, replicates, found.reasons, found.prior_covariance * np.outer(slope, slope)
+    )
 
 
-def _joint_sets(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
-    """Joints that no coupling ties together are fitted apart."""
+def _coupled_joints(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
+    """Sets of joints that couplings tie together; single joints otherwise."""
     graph = np.eye(nq)
     for coupling in couplings:
         graph[np.ix_(coupling.joints, coupling.joints)] = 1
@@ -121,19 +161,17 @@ def _joint_sets(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
     return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
 
 
-def _misfit(block: Block, clusters: Clusters, options: IdentificationOptions) -> float:
-    found, _ = _weighted(block, clusters, options)
+def _squared_error(block: JointBlock, clusters: Clusters, options: IdentificationOptions) -> float:
+    found, _ = _weighted_solution(block, clusters, options)
     residuals = block.values - block.columns @ found
     return float(residuals @ residuals)
 
 
-def _fit(
-    robot: Robot, block: Block, clusters: Clusters, options: IdentificationOptions
+def _fit_block(
+    robot: Robot, block: JointBlock, clusters: Clusters, options: IdentificationOptions
 ) -> Estimate:
-    """The block's estimate. What is not told is held, the least told first, until all the rest is
-    told.
-    """
-    held = _untold(robot, block)
+    """Fit a block, holding the least determined term at its own value until all are determined."""
+    held = _undetermined(robot, block)
     while True:
         free = [k for k, name in enumerate(block.names) if name not in held]
         own = np.array([block.own[name] if name in held else 0.0 for name in block.names])
@@ -144,60 +182,71 @@ def _fit(
             values=block.values - block.columns @ own - _own_curve(robot, block, held),
             lower=block.lower[free],
         )
-        value, weight = _weighted(part, clusters, options)
-        grouped = Grouped.of(part.columns, part.values, weight, block.cluster, clusters.count)
-        loose = value > part.lower
-        replicates = left_out(grouped, value, loose)
-        worst = _least_told(part, value, np.sqrt(np.diag(jackknife(replicates))), loose)
+        value, weight = _weighted_solution(part, clusters, options)
+        grouped = GroupedEquations.of(
+            part.columns, part.values, weight, block.cluster, clusters.count
+        )
+        inside = value > part.lower
+        replicates = leave_one_out(grouped, value, inside)
+        worst = _least_determined(part, value, np.sqrt(np.diag(jackknife(replicates))), inside)
         if not worst:
             break
         held |= worst
         for coulomb in [name for name in worst if name[0] == "coulomb"]:
-            # a law is kept as a whole: its other terms mean nothing beside another's Coulomb
-            # friction
+            # a law is kept as a whole: its other terms have no meaning beside the Coulomb friction
+            # of another law
             others = [(term, coulomb[1]) for term in ("viscous", "curved", "load")]
-            held |= dict.fromkeys((name for name in others if name in block.names), KEPT)
-    # of all terms, with the same weights
-    grouped = Grouped.of(block.columns, block.values, weight, block.cluster, clusters.count)
+            held |= dict.fromkeys((name for name in others if name in block.names), LAW_KEPT)
+    # equations of all terms, with the same weights
+    grouped = GroupedEquations.of(
+        block.columns, block.values, weight, block.cluster, clusters.count
+    )
     full = own.copy()
     full[free] = value
-    spread = np.tile(full, (clusters.count, 1))
-    spread[:, free] = replicates
+    all_replicates = np.tile(full, (clusters.count, 1))
+    all_replicates[:, free] = replicates
     return Estimate(
         names=block.names,
         value=full,
-        replicates=spread,
-        why=tuple(held.get(name, "") for name in block.names),
-        drift=_drift(block, grouped, free, loose),
+        replicates=all_replicates,
+        reasons=tuple(held.get(name, "") for name in block.names),
+        prior_covariance=_prior_covariance(block, grouped, free, inside),
     )
 
 
-def _drift(block: Block, grouped: Grouped, free: list[int], loose: Mask) -> Array:
-    """Covariance (p, p) that the errors of the held terms add to the fitted ones."""
-    drift = np.zeros((len(block.names), len(block.names)))
-    at = [k for k, fitted in zip(free, loose.tolist(), strict=True) if fitted]
+def _prior_covariance(
+    block: JointBlock, grouped: GroupedEquations, free: list[int], inside: Mask
+) -> Array:
+    """Covariance (p, p) of the fitted terms due to the errors of the held terms."""
+    covariance = np.zeros((len(block.names), len(block.names)))
+    at = [k for k, fitted in zip(free, inside.tolist(), strict=True) if fitted]
     held = [k for k in range(len(block.names)) if k not in free]
     gram = grouped.gram.sum(axis=0)
     if at and held:
-        sd = np.array(
-            [OWN_SD.get(block.names[k][0], 0.0) * (block.own[block.names[k]] or 0.0) for k in held]
-        )
-        sd = np.where([block.names[k][0] == "load" for k in held], LOAD_SD, sd)
+        settings = TORQUE_FIT
+        relative_sd = {
+            "coulomb": settings.own_friction_sd,
+            "viscous": settings.own_friction_sd,
+            "rotor_inertia": settings.own_rotor_sd,
+        }
+        names = [block.names[k] for k in held]
+        sd = np.array([relative_sd.get(name[0], 0.0) * (block.own[name] or 0.0) for name in names])
+        sd = np.where([name[0] == "load" for name in names], settings.own_load_sd, sd)
         moved = np.linalg.lstsq(gram[np.ix_(at, at)], gram[np.ix_(at, held)] * sd, rcond=None)[0]
-        drift[np.ix_(at, at)] = moved @ moved.T
-    return drift
+        covariance[np.ix_(at, at)] = moved @ moved.T
+    return covariance
 
 
-def _untold(robot: Robot, block: Block) -> dict[Name, str]:
-    """Terms that the rows cannot tell, whatever the torques are."""
+def _undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:
+    """Terms that the rows cannot determine, for any torques, with the reason."""
     held = dict[Name, str]()
     for k, name in enumerate(block.names):
         moved = np.count_nonzero(block.columns[:, k])
-        if moved < LEAST_ROWS:
-            held[name] = STILL
+        if moved < TORQUE_FIT.min_rows:
+            held[name] = NOT_MOVING
         elif name[0] == "load" and name[1] is not None:
             spread, limit = block.spread[name[1]], float(robot.limits.tau_max[name[1]])
-            if spread < LEAST_LOAD_SPREAD * limit:
+            if spread < TORQUE_FIT.min_load_spread * limit:
                 held[name] = (
                     f"The rigid torque varies by {spread:.2g} N·m only, of a limit of {limit:.3g} "
                     "N·m."
@@ -205,10 +254,9 @@ def _untold(robot: Robot, block: Block) -> dict[Name, str]:
     return held
 
 
-def _own_curve(robot: Robot, block: Block, held: dict[Name, str]) -> Array:
-    """The curved part (n,) of the robot's own law, where its viscous part is held and none is
-    fitted in its place.
-    """
+def _own_curve(robot: Robot, block: JointBlock, held: dict[Name, str]) -> Array:
+    """Curved part (n,) [N·m] of the robot's own law, for joints whose viscous part is held and
+    whose curved part is not fitted."""
     total = np.zeros_like(block.values)
     for k, (term, joint) in enumerate(block.names):
         if (
@@ -223,45 +271,50 @@ def _own_curve(robot: Robot, block: Block, held: dict[Name, str]) -> Array:
     return total
 
 
-def _weighted(
-    block: Block, clusters: Clusters, options: IdentificationOptions
+def _weighted_solution(
+    block: JointBlock, clusters: Clusters, options: IdentificationOptions
 ) -> tuple[Array, Array]:
-    """The solution (p,), and the weights (n,) of its rows."""
+    """Solution (p,) and weights (n,) of the rows."""
     weight = np.ones_like(block.values)
-    passes = {"ols": 1, "wls": 2 if len(np.unique(block.joint)) > 1 else 1, "irls": PASSES}[
-        options.estimator
-    ]
+    passes = {
+        "ols": 1,
+        "wls": 2 if len(np.unique(block.joint)) > 1 else 1,
+        "irls": TORQUE_FIT.irls_passes,
+    }[options.estimator]
     for step in range(passes):
-        grouped = Grouped.of(block.columns, block.values, weight, block.cluster, clusters.count)
-        found = solve(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), block.lower)
+        grouped = GroupedEquations.of(
+            block.columns, block.values, weight, block.cluster, clusters.count
+        )
+        found = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), block.lower)
         if step < passes - 1:
-            weight = weights_of(
-                block.joint, block.values - block.columns @ found, options.estimator == "irls"
-            )
+            residuals = block.values - block.columns @ found
+            weight = inverse_variance_weights(block.joint, residuals, options.estimator == "irls")
     return found, weight
 
 
-def _least_told(block: Block, value: Array, sd: Array, loose: Mask) -> dict[Name, str]:
-    """The term that the rows tell least, with the reason; none if all are told. An offset is kept
-    as it is.
+def _least_determined(block: JointBlock, value: Array, sd: Array, inside: Mask) -> dict[Name, str]:
+    """The least determined term, with the reason; empty if all are determined.
+
+    Offsets are kept with any standard deviation.
     """
+    settings = TORQUE_FIT
     load = [
         k
         for k, name in enumerate(block.names)
-        if name[0] == "load" and not value[k] >= LOAD_SDS * sd[k] > 0
+        if name[0] == "load" and not value[k] >= settings.min_load_sds * sd[k] > 0
     ]
     if load:
-        return {block.names[k]: f"It is below {LOAD_SDS:g} standard deviations." for k in load}
-    worst, most = None, MOST_RELATIVE_SD
+        reason = f"It is below {settings.min_load_sds:g} standard deviations."
+        return {block.names[k]: reason for k in load}
+    worst, largest = None, settings.max_relative_sd
     for k, name in enumerate(block.names):
         if name[0] == "offset":
             continue
-        relative = float(sd[k] / abs(value[k])) if loose[k] and value[k] != 0 else np.inf
+        relative = float(sd[k] / abs(value[k])) if inside[k] and value[k] != 0 else np.inf
         if name[0] == SCALE:
-            # the robot's own constant is better than a poor estimate
-            relative *= MOST_RELATIVE_SD / MOST_SCALE_SD
-        if relative > most:
-            worst, most = name, relative
+            relative *= settings.max_relative_sd / settings.max_scale_sd
+        if relative > largest:
+            worst, largest = name, relative
     if worst is None:
         return {}
-    return {worst: UNSURE.format(most) if np.isfinite(most) else ZERO}
+    return {worst: UNCERTAIN.format(largest) if np.isfinite(largest) else AT_BOUND}

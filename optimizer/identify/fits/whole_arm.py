@@ -1,4 +1,4 @@
-"""Rows and columns of all joints together: bodies first, then friction, rotors and couplings."""
+"""Regression of all joints together: bodies first, then friction, rotors and couplings."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
-from joulepath.optimizer.identify.fits.block import Block, block_of, moving
+from joulepath.optimizer.identify.fits.block import JointBlock, joint_block, moving_rows
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
-class WholeArm:
-    """Columns (n, 10 bodies) of the links, and the block (n, p) of the other terms. `values` (n,)
-    are the torques that both add up to: those of motors, without what the arm carries."""
+class WholeArmRegression:
+    """Linear regression of the torques of all joints, with n rows."""
 
     bodies: Array
-    block: Block
+    """Columns (n, 10 bodies) of the links' parameters."""
+    block: JointBlock
+    """Columns of the p other terms."""
     values: Array
+    """Motor torques (n,) without the part of the load [N·m]."""
 
     @property
     def columns(self) -> Array:
@@ -29,12 +31,12 @@ class WholeArm:
         return np.hstack([self.bodies, self.block.columns])
 
     def torque(self, value: Array) -> Array:
-        """Torques (n,) [N·m] of parameters (10 bodies + p,) of links and other terms."""
+        """Torques (n,) [N·m] for parameters (10 bodies + p,) of links and other terms."""
         links = self.bodies.shape[1]
         return np.asarray(self.bodies @ value[:links] + self.block.columns @ value[links:])
 
 
-def whole_arm(
+def whole_arm_regression(
     robot: Robot,
     rows: Rows,
     torque: Array,
@@ -42,20 +44,28 @@ def whole_arm(
     options: IdentificationOptions,
     bodies: Array,
     change: Array,
-) -> WholeArm:
-    """All joints, from motor torques (n, nq) [N·m]. `bodies` (n, nq, 10 bodies) is the regressor of
-    the links, and of others that are to be found; `change` (10 nq,) of the links is in the rigid
-    torques of `rows` already."""
+) -> WholeArmRegression:
+    """Regression of all joints.
+
+    Args:
+        robot: the robot with its own figures.
+        rows: rows of the logs.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows.
+        options: requested figures.
+        bodies: regressor (n, nq, 10 bodies) of the links, and of further bodies to be found.
+        change: change (10 nq,) of the links' parameters already contained in `rows.rigid`.
+    """
     joints = range(robot.nq)
-    block = block_of(robot, rows, torque, clusters, options, joints)
+    block = joint_block(robot, rows, torque, clusters, options, joints)
     uses = [
-        moving(rows, torque, joint, options.velocity_threshold, options.couplings)
+        moving_rows(rows, torque, joint, options.velocity_threshold, options.couplings)
         for joint in joints
     ]
     ends = np.cumsum([int(use.sum()) for use in uses])
     columns = np.empty((int(ends[-1]), bodies.shape[2]))
-    # filled in place: they are the largest array of a fit
+    # filled in place: this is the largest array of a fit
     for joint, (use, part) in enumerate(zip(uses, np.split(columns, ends[:-1]), strict=True)):
         part[:] = bodies[use, joint]
     known = body_parameters(robot.model) + change
-    return WholeArm(columns, block, block.values + columns[:, : len(known)] @ known)
+    return WholeArmRegression(columns, block, block.values + columns[:, : len(known)] @ known)

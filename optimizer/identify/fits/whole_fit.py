@@ -1,64 +1,89 @@
-"""Inertials of the links, friction and rotors of all joints together, with links that are real
-bodies.
+"""Inertials of the links, friction and rotors of all joints together, for consistent bodies.
 
-The links' parameters are held to the robot's own by a prior (`nearness`), since the torques tell
-only combinations of them. The rows are weighted by the inverse variance of their joint, and by how
-many independent ones they are worth.
+The torques determine only combinations of the links' parameters, so a prior holds these to the
+robot's own (`distance_metric`). Rows are weighted by the inverse of the effective variance of their
+joint.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
-from joulepath.optimizer.identify.arm.pseudo_inertia import nearness
+from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.estimates.grouped import Grouped, jackknife, left_out
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    jackknife,
+    leave_one_out,
+)
 from joulepath.optimizer.identify.estimates.robust import bisquare_weights
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
-from joulepath.optimizer.identify.fits.torque_fit import LEAST_LOAD_SPREAD, LOAD_SDS
-from joulepath.optimizer.identify.fits.whole_arm import WholeArm, whole_arm
+from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
+from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.rows.clusters import Clusters, shared_variance
+from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# of the load friction's torque, and of the weights: each begins where the one before ends
-PASSES, WEIGHINGS = 2, 2
 LINK = "inertials."
 LINK_NAMES = frozenset(LINK + part for part in LINKS)
-# standard deviations of the prior of terms that the robot has no figure of: load friction [1],
-# offset over the torque limit, and any other term [SI]; of one that it has, over its value
-LOAD_SD, OFFSET_SD, OTHER_SD, RELATIVE_SD = 0.1, 0.05, 10.0, 1.0
 NOT_LOADED = "It is below {:g} standard deviations, or the rigid torque hardly varies."
+
+
+@dataclass(frozen=True)
+class WholeFitSettings:
+    """Settings of the fit of links and friction together."""
+
+    load_passes: int = 2
+    """Fits; load friction follows the rigid torque of the previous fit."""
+    weight_passes: int = 2
+    """Solutions per fit; the weights follow the residuals of the previous solution."""
+    load_sd: float = 0.1
+    """Prior standard deviation of load friction [1]."""
+    offset_sd: float = 0.05
+    """Prior standard deviation of an offset over the torque limit [1]."""
+    relative_sd: float = 1.0
+    """Prior standard deviation of a term over the robot's own value [1]."""
+    default_sd: float = 10.0
+    """Prior standard deviation of a term that the robot has no value of [SI unit]."""
+    held_sd: float = 1e-9
+    """Prior standard deviation of a term that is held [SI unit]."""
+
+
+WHOLE_FIT = WholeFitSettings()
 
 
 def fit_whole(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
 ) -> Estimate:
-    """Friction, rotors and couplings, then the links' 10 nq parameters, from motor torques (n, nq)
-    [N·m].
+    """Fit friction, rotors and couplings, and the 10 nq parameters of the links.
 
-    `rows` have the regressor."""
+    Args:
+        robot: the robot with its own figures.
+        rows: rows with regressors.
+        torque: motor torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows for the jackknife.
+        options: requested figures and weight of the prior.
+    """
     own, bodies = body_parameters(robot.model), rows.regressor
     assert bodies is not None
     change, held = np.zeros_like(own), frozenset[int]()
-    for _ in range(PASSES):
-        # load friction is that of the rigid torque as it is known so far
+    for _ in range(WHOLE_FIT.load_passes):
         now = replace(rows, rigid=rows.rigid + bodies @ change)
-        arm = whole_arm(robot, now, torque, clusters, options, bodies, change)
+        arm = whole_arm_regression(robot, now, torque, clusters, options, bodies, change)
         mean, precision = _prior(robot, arm, options, held)
         value, grouped = _solve(arm, clusters, options, mean, precision, robot.nq)
         free = np.concatenate([np.ones(len(own), bool), value[len(own) :] > arm.block.lower])
-        replicates = left_out(grouped, value, free, precision)
+        replicates = leave_one_out(grouped, value, free, precision)
         change = value[: len(own)] - own
         held |= _unloaded(robot, arm, value, np.sqrt(np.diag(jackknife(replicates))), len(own))
         terms = arm.block.names
-        del arm, now  # its columns are large, and those of the next pass take their place
+        del arm, now  # the columns are large, and those of the next pass need the memory
     hessian = grouped.gram.sum(axis=0) + precision
     spread = np.linalg.solve(hessian, precision)
     order = np.r_[len(own) : len(value), : len(own)]
@@ -68,21 +93,24 @@ def fit_whole(
         names=names,
         value=value[order],
         replicates=replicates[:, order],
-        why=tuple(NOT_LOADED.format(LOAD_SDS) if k - len(own) in held else "" for k in order),
-        drift=(spread @ np.linalg.inv(hessian))[np.ix_(order, order)],
+        reasons=tuple(
+            NOT_LOADED.format(TORQUE_FIT.min_load_sds) if k - len(own) in held else ""
+            for k in order
+        ),
+        prior_covariance=(spread @ np.linalg.inv(hessian))[np.ix_(order, order)],
     )
 
 
 def _prior(
-    robot: Robot, arm: WholeArm, options: IdentificationOptions, held: frozenset[int]
+    robot: Robot, arm: WholeArmRegression, options: IdentificationOptions, held: frozenset[int]
 ) -> tuple[Array, Array]:
-    """Mean (p,) and precision (p, p) of bodies and other terms; those `held` are all but fixed."""
+    """Prior mean (p,) and precision (p, p) of bodies and other terms, of which some are `held`."""
     own, names = body_parameters(robot.model), arm.block.names
     mean = np.concatenate([own, [arm.block.own[name] for name in names]])
     sd = np.array([_prior_sd(robot, name, arm.block.own[name]) for name in names])
-    sd[list(held)] = 1e-9
+    sd[list(held)] = WHOLE_FIT.held_sd
     precision = np.zeros((len(mean), len(mean)))
-    precision[: len(own), : len(own)] = options.prior_weight * nearness(own)
+    precision[: len(own), : len(own)] = options.prior_weight * distance_metric(own)
     precision[len(own) :, len(own) :] = np.diag(sd**-2.0)
     return mean, precision
 
@@ -90,32 +118,31 @@ def _prior(
 def _prior_sd(robot: Robot, name: Name, own: float) -> float:
     term, joint = name
     if term == "load":
-        return LOAD_SD
+        return WHOLE_FIT.load_sd
     if term == "offset" and joint is not None:
-        return OFFSET_SD * float(robot.limits.tau_max[joint])
-    return RELATIVE_SD * own if own > 0 and not term.startswith(COUPLED) else OTHER_SD
+        return WHOLE_FIT.offset_sd * float(robot.limits.tau_max[joint])
+    known = own > 0 and not term.startswith(COUPLED)
+    return WHOLE_FIT.relative_sd * own if known else WHOLE_FIT.default_sd
 
 
 def _solve(
-    arm: WholeArm,
+    arm: WholeArmRegression,
     clusters: Clusters,
     options: IdentificationOptions,
     mean: Array,
     precision: Array,
     links: int,
-) -> tuple[Array, Grouped]:
-    """The solution (p,), and the weighted normal equations."""
+) -> tuple[Array, GroupedEquations]:
+    """Solution (p,) under the prior, and the weighted normal equations."""
     block = arm.block
-    lower = np.concatenate([np.full(BODY * links, -np.inf), block.lower])
+    lower = np.concatenate([np.full(PARAMETERS_PER_BODY * links, -np.inf), block.lower])
     value, weight = mean, _weights(arm, arm.values - arm.torque(mean), clusters, False)
-    for _ in range(WEIGHINGS):
-        grouped = Grouped.of(
+    for _ in range(WHOLE_FIT.weight_passes):
+        grouped = GroupedEquations.of(
             (arm.bodies, block.columns), arm.values, weight, block.cluster, clusters.count
         )
-        gram, moment = (
-            grouped.gram.sum(axis=0) + precision,
-            grouped.moment.sum(axis=0) + precision @ mean,
-        )
+        gram = grouped.gram.sum(axis=0) + precision
+        moment = grouped.moment.sum(axis=0) + precision @ mean
         value = solve_consistent(gram, moment, links, lower)
         weight = _weights(
             arm, arm.values - arm.torque(value), clusters, options.estimator == "irls"
@@ -123,27 +150,26 @@ def _solve(
     return value, grouped
 
 
-def _weights(arm: WholeArm, residuals: Array, clusters: Clusters, robust: bool) -> Array:
-    """Of each row (n,): the inverse of its joint's variance, as large as if all rows were
-    independent.
-    """
+def _weights(arm: WholeArmRegression, residuals: Array, clusters: Clusters, robust: bool) -> Array:
+    """Weights (n,) of rows by the inverse of the effective variance of their joint."""
     weight = np.ones_like(residuals)
     for joint in np.unique(arm.block.joint):
         rows = arm.block.joint == joint
         rest, cluster = residuals[rows], arm.block.cluster[rows]
         share = bisquare_weights(rest) if robust else np.ones_like(rest)
-        weight[rows] = share / shared_variance(rest, share, Clusters(cluster, clusters.count))
+        weight[rows] = share / effective_variance(rest, share, Clusters(cluster, clusters.count))
     return weight
 
 
-def _unloaded(robot: Robot, arm: WholeArm, value: Array, sd: Array, bodies: int) -> frozenset[int]:
-    """Numbers of the load terms that the rows do not tell."""
-    found = list[int]()
+def _unloaded(
+    robot: Robot, arm: WholeArmRegression, value: Array, sd: Array, bodies: int
+) -> frozenset[int]:
+    """Numbers of the load terms that the rows do not determine."""
+    settings, found = TORQUE_FIT, list[int]()
     for k, (term, joint) in enumerate(arm.block.names):
         if term == "load" and joint is not None:
-            little = arm.block.spread[joint] < LEAST_LOAD_SPREAD * float(
-                robot.limits.tau_max[joint]
-            )
-            if little or not value[bodies + k] >= LOAD_SDS * sd[bodies + k] > 0:
+            limit = float(robot.limits.tau_max[joint])
+            little = arm.block.spread[joint] < settings.min_load_spread * limit
+            if little or not value[bodies + k] >= settings.min_load_sds * sd[bodies + k] > 0:
                 found.append(k)
     return frozenset(found)

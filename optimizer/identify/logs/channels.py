@@ -1,27 +1,34 @@
-"""The channels of a log, one by one, as its report lists them."""
+"""Channels of a log for its report."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.logs.columns import Columns, Group
+from joulepath.optimizer.identify.logs.columns import Columns
 from joulepath.optimizer.identify.logs.filters import noise
 from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_report import Channel
 
 _UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "power": "W", "temperature": "°C"}
 _EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}
 
 
-def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Channel, ...]:
-    """All channels of a log from these columns, whose efforts come from the group `effort`."""
+def channels_of(log: Log, columns: Columns, effort: ChannelName | None) -> tuple[Channel, ...]:
+    """All channels of a log.
+
+    Args:
+        log: the log.
+        columns: columns of the file.
+        effort: group of columns of the efforts.
+    """
     return tuple(_channels(log, columns, effort))
 
 
-def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Channel]:
+def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterator[Channel]:
     units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
-    sources: dict[str, Group | None] = {
+    sources: dict[str, ChannelName | None] = {
         "q": "q",
         "v": "v",
         "a": "a",
@@ -53,6 +60,6 @@ def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Chan
 
 
 def _range(values: Array) -> tuple[float, float]:
-    """The least and the greatest of values (n,), with the digits that single precision has."""
+    """Least and greatest value, with the digits of single precision."""
     low, high = (float(f"{each:.7g}") for each in (values.min(), values.max()))
     return low, high

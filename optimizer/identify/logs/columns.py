@@ -1,127 +1,43 @@
-"""Which columns of a log hold what, by the names in its header."""
+"""Columns of a log and their channels, by the names in the header."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identify.logs.log_formats import FORMATS, ChannelName, LogFormat
 
-Group = Literal[
-    "q",
-    "v",
-    "a",
-    "current",
-    "torque",
-    "effort",
-    "temperature",
-    "commanded",
-    "power",
-    "payload",
-    "wrench",
-]
-"""What columns hold: joint positions, speeds, accelerations, currents, torques, efforts of unknown
-meaning, temperatures, commanded speeds; power of the arm, or voltage and current that multiply to
-it; mass and centre of the payload; force and torque on a sensor beneath the base."""
-WRENCH = 6
+WRENCH_COLUMNS = 6
 """Columns of a wrench: three of the force, then three of the torque."""
 
 
-@dataclass(frozen=True)
-class Form:
-    """Names of the columns of one kind of log: expressions whose first group, if any, is the number
-    of a joint.
-    """
-
-    name: str
-    time: str
-    joints: Mapping[Group, str]
-    power: tuple[str, ...] = ()
-    payload: tuple[str, ...] = ()
-    wrench: tuple[str, ...] = ()
-
-
-AT = r"[._\[ ]?([0-9]{1,3})\]?"
-"""Brackets, underscores, points or spaces before the number of a joint."""
-_BEFORE = r"(?:.*[./])?(?:joint_?|measured_?|msr_?|actual_?|motor_?)*"
-"""Of names of a topic or a structure, as `/joint_states/position[0]` or `state.q[0]`, and words for
-a measurement.
-"""
-FORMS = (
-    Form(
-        "rtde",
-        "timestamp",
-        {
-            "q": f"actual_q{AT}",
-            "v": f"actual_qd{AT}",
-            "a": f"target_qdd{AT}",
-            "current": f"actual_current{AT}",
-            "temperature": f"joint_temperatures{AT}",
-            "commanded": f"target_qd{AT}",
-        },
-        ("actual_robot_voltage", "actual_robot_current"),
-        ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2"),
-    ),
-    Form(
-        "own",
-        "t",
-        {
-            "q": "q([0-9]{1,3})",
-            "v": "v([0-9]{1,3})",
-            "a": "a([0-9]{1,3})",
-            "current": "i([0-9]{1,3})",
-            "torque": "tau([0-9]{1,3})",
-        },
-        ("p",),
-        wrench=("fx", "fy", "fz", "mx", "my", "mz"),
-    ),
-    Form(
-        "ros",
-        "%?time",
-        {
-            "q": rf"(?:.*[./])?position{AT}",
-            "v": rf"(?:.*[./])?velocity{AT}",
-            "effort": rf"(?:.*[./])?effort{AT}",
-        },
-    ),
-    Form(
-        "numbered",
-        "time",
-        {
-            "q": rf"{_BEFORE}(?:q|pos|positions?|angles?|mp|axisqmsr_\w*?){AT}",
-            "v": rf"{_BEFORE}(?:dq|qd|v|vel|velocity|velocities|speeds?){AT}",
-            "current": rf"{_BEFORE}(?:i|currents?){AT}",
-            "torque": rf"{_BEFORE}(?:tau|tau_j|torques?|mt|axistaumsr_\w*?){AT}",
-            "effort": rf"{_BEFORE}(?:efforts?){AT}",
-            "temperature": rf"{_BEFORE}(?:temperatures?|temp){AT}",
-        },
-        ("power",),
-    ),
-)
 _TIME = (
     r"(?:.*[./])?(?:__|%)?(?:time|timestamp|t|stamp|rosbagtimestamp|duration)(?:[_ "
     r"]?(?:n|u|µ|m)?s(?:ec)?)?"
 )
 _STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("secs", "nanosecs"))
 """Ends of the names of the two columns of a stamp of time."""
-_KNOWN = (
+_KNOWN_HEADERS = (
     "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS "
-    "JointState as CSV). "
-    "Otherwise say in `columns` which columns hold what"
+    "JointState as CSV). Otherwise say in `columns` which columns hold what"
 )
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Indices of the columns of a log: its `form`, `time`, or seconds and nanoseconds of it, and
-    `groups`, those of joints with one index per joint."""
+    """Indices of the columns of a log."""
 
-    form: str
+    format: str
+    """Name of the format."""
     names: Sequence[str]
+    """Names of all columns."""
     time: tuple[int, ...]
-    groups: Mapping[Group, tuple[int, ...]]
+    """Column of the time, or columns of its seconds and nanoseconds."""
+    groups: Mapping[ChannelName, tuple[int, ...]]
+    """Columns of each channel; one per joint for channels of joints."""
 
     MAPPED: ClassVar[tuple[str, ...]] = (
         "time",
@@ -136,65 +52,77 @@ class Columns:
         "power",
         "wrench",
     )
-    """What a map of columns may name."""
+    """Keys of a map of columns."""
 
-    def without(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
-        """The columns without the groups of which the `first` row has no number, and these;
-        positions stay.
+    def without_empty(self, first: Sequence[str]) -> tuple[Columns, list[ChannelName]]:
+        """Remove channels without a number in the first row, except positions.
+
+        Args:
+            first: cells of the first row.
+
+        Returns:
+            The remaining columns, and the removed channels.
         """
-        gone: list[Group] = [
+        removed: list[ChannelName] = [
             group
             for group, indices in self.groups.items()
-            if group != "q" and all(_empty(first[k]) for k in indices)
+            if group != "q" and all(_is_empty(first[k]) for k in indices)
         ]
-        groups = {group: indices for group, indices in self.groups.items() if group not in gone}
-        return replace(self, groups=groups), gone
+        groups = {group: indices for group, indices in self.groups.items() if group not in removed}
+        return replace(self, groups=groups), removed
 
     @property
     def used(self) -> list[int]:
-        """All indices, each once, in the order of the file."""
+        """Sorted indices of all columns."""
         return sorted({*self.time, *(k for group in self.groups.values() for k in group)})
 
 
-def _empty(cell: str) -> bool:
+def _is_empty(cell: str) -> bool:
     return cell.strip().strip('"').lower() in ("", "nan", "none", "null")
 
 
 def recognised(names: Sequence[str], nq: int) -> Columns:
-    """The columns of a header for an arm with nq joints, of one of the FORMS. Raises
-    InvalidTable."""
-    for form in FORMS:
+    """Columns of a header in one of the known formats.
+
+    Args:
+        names: names of the columns.
+        nq: number of joints.
+
+    Raises:
+        InvalidTable: the header is in none of the formats, or lacks columns.
+    """
+    for log_format in FORMATS:
         found = {
             group: indices
-            for group, pattern in form.joints.items()
+            for group, pattern in log_format.joints.items()
             if (indices := _numbered(names, pattern))
         }
         if "q" not in found:
             continue
-        time = time_of(names, form.time)
+        time = time_of(names, log_format.time)
         if not time:
             raise InvalidTable(
                 f"The header has joint positions, as {names[found['q'][0]]}, but no column "
-                f"`{form.time.strip('%?')}`: "
-                "a log needs the time [s] of every row.",
+                f"`{log_format.time.strip('%?')}`: a log needs the time [s] of every row.",
                 1,
-                form.time.strip("%?"),
+                log_format.time.strip("%?"),
             )
         _check_counts(found, names, nq)
-        return Columns(form.name, names, time, found | dict(_single(form, names)))
+        return Columns(
+            log_format.name, names, time, found | dict(_columns_without_joint(log_format, names))
+        )
     raise InvalidTable(
-        f"The header names no joint positions that are known: begin it with {_KNOWN}.", 1
+        f"The header names no joint positions that are known: begin it with {_KNOWN_HEADERS}.", 1
     )
 
 
 def other_positions(names: Sequence[str], columns: Columns) -> str | None:
-    """A column with positions that is not read, as those of another form are; None if there is
-    none.
-    """
-    for form in FORMS:
+    """Name of a column with positions in another format, which is not read; None if there is
+    none."""
+    for log_format in FORMATS:
         for name in names:
             if (
-                re.fullmatch(form.joints["q"], name)
+                re.fullmatch(log_format.joints["q"], name)
                 and names.index(name) not in columns.groups["q"]
             ):
                 return name
@@ -202,8 +130,15 @@ def other_positions(names: Sequence[str], columns: Columns) -> str | None:
 
 
 def time_of(names: Sequence[str], first: str = "time") -> tuple[int, ...]:
-    """The index of the column of time, best one whose name is like `first`; or those of seconds and
-    nanoseconds, which are together more exact; empty if there is none."""
+    """Column of the time, or columns of its seconds and nanoseconds, which are more exact.
+
+    Args:
+        names: names of the columns.
+        first: preferred name of the column.
+
+    Returns:
+        Indices of the columns; empty if there is none.
+    """
     return _first(names, first) or _stamp(names) or _first(names, _TIME)
 
 
@@ -221,8 +156,11 @@ def _stamp(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
-    """Indices of the columns whose names match, by the number in them. Raises InvalidTable unless
-    these are consecutive from 0 or 1."""
+    """Columns with names that match a pattern, in the order of their numbers.
+
+    Raises:
+        InvalidTable: the numbers are not consecutive from 0 or 1.
+    """
     found: dict[int, int] = {}
     for k, name in enumerate(names):
         match = re.fullmatch(pattern, name)
@@ -245,23 +183,32 @@ def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
     return tuple(found[number] for number in sorted(found))
 
 
-def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int, ...]]]:
-    """The columns of a form that belong to no joint."""
-    if form.power and all(name in names for name in form.power):
-        yield "power", tuple(names.index(name) for name in form.power)
-    if form.wrench and all(name in names for name in form.wrench):
-        yield "wrench", tuple(names.index(name) for name in form.wrench)
-    present = tuple(names.index(name) for name in form.payload if name in names)
-    if form.payload and form.payload[0] in names:
+def _columns_without_joint(
+    log_format: LogFormat, names: Sequence[str]
+) -> Iterator[tuple[ChannelName, tuple[int, ...]]]:
+    """Columns of channels that belong to no joint."""
+    if log_format.power and all(name in names for name in log_format.power):
+        yield "power", tuple(names.index(name) for name in log_format.power)
+    if log_format.wrench and all(name in names for name in log_format.wrench):
+        yield "wrench", tuple(names.index(name) for name in log_format.wrench)
+    present = tuple(names.index(name) for name in log_format.payload if name in names)
+    if log_format.payload and log_format.payload[0] in names:
         # the centre only if all of it is there
-        yield "payload", present if len(present) == len(form.payload) else present[:1]
+        yield "payload", present if len(present) == len(log_format.payload) else present[:1]
 
 
 def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
-    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name,
-    `wrench` by six, others by one per joint.
+    """Columns by a map of names.
 
-    Raises InvalidProblem for a wrong map, InvalidTable where the header does not have a column.
+    Args:
+        names: names of the columns.
+        columns: names of the columns of each channel: one for `time`, `nanoseconds` and `power`,
+            six for `wrench`, and one per joint for all others.
+        nq: number of joints.
+
+    Raises:
+        InvalidProblem: the map is wrong.
+        InvalidTable: the header lacks a column.
     """
     unknown = sorted(set(columns) - set(Columns.MAPPED))
     if unknown or not {"time", "q"} <= set(columns):
@@ -277,14 +224,14 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
             raise InvalidProblem(
                 f"columns.{group}", f"columns.{group} must be the name of one column."
             )
-        if group == "wrench" and len(wanted) != WRENCH:
+        if group == "wrench" and len(wanted) != WRENCH_COLUMNS:
             raise InvalidProblem(
                 "columns.wrench",
                 "columns.wrench must name six columns: of the force, then the torque.",
             )
         found[group] = tuple(_index(names, each) for each in wanted)
     time = (*found.pop("time"), *found.pop("nanoseconds", ()))
-    groups: dict[Group, tuple[int, ...]] = found  # type: ignore[assignment]
+    groups: dict[ChannelName, tuple[int, ...]] = found  # type: ignore[assignment]
     _check_counts(
         {group: indices for group, indices in groups.items() if group not in ("power", "wrench")},
         names,
@@ -302,14 +249,15 @@ def _index(names: Sequence[str], name: str) -> int:
     return names.index(name.lower())
 
 
-def _check_counts(groups: Mapping[Group, tuple[int, ...]], names: Sequence[str], nq: int) -> None:
+def _check_counts(
+    groups: Mapping[ChannelName, tuple[int, ...]], names: Sequence[str], nq: int
+) -> None:
     for indices in groups.values():
         if len(indices) != nq:
             name = names[indices[0]] if indices else None
             raise InvalidTable(
                 f"The header has {len(indices)} columns like {name}, but the robot has {nq} "
-                "joints: a log is of one "
-                "robot, with one column for each of its joints.",
+                "joints: a log is of one robot, with one column for each of its joints.",
                 1,
                 name,
             )

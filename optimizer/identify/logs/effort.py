@@ -1,4 +1,4 @@
-"""What the efforts of a log are: their slope against the torque of the rigid model tells."""
+"""Meaning of logged efforts, from their slope against the torque of the rigid-body model."""
 
 from __future__ import annotations
 
@@ -8,40 +8,48 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.identify.logs.log import EffortMeaning
-from joulepath.optimizer.identify.logs.motion import Motion, thinned
+from joulepath.optimizer.identify.logs.motion import LoggedMotion, smooth_sign, thinned
 
-_MOST_ROWS = 4000  # that the slope is taken from
-_KNEE = 0.02  # rad/s over which the sign of the speed is smoothed
-# of the torque limit: standard deviation of the rigid torque beyond which it tells a slope
-_LEAST_TORQUE = 0.01
-_EXTERNAL = 0.5  # slope · torque constant below which efforts are without gravity
-_NEAR = 1.6  # factor within which a slope is that of a meaning
+
+@dataclass(frozen=True)
+class EffortSettings:
+    """Settings of the meaning of efforts."""
+
+    max_rows: int = 4000
+    """Approximate largest number of rows of the regression."""
+    min_torque_spread: float = 0.01
+    """Standard deviation of the rigid torque over the torque limit, below which it determines no
+    slope [1]."""
+    max_external_slope: float = 0.5
+    """Slope times torque constant, below which efforts exclude gravity [1]."""
+    slope_factor: float = 1.6
+    """Factor between a slope and the slope of a meaning, from which on they differ [1]."""
+
+
+EFFORT = EffortSettings()
 
 
 @dataclass(frozen=True)
 class EffortReport:
-    """What the efforts of a log are.
-
-    `slope` is that of the effort against the torque of the rigid body and rotor model, with
-    friction beside it, at the two joints (by name) that carry most of the gravity: about 1 / torque
-    constant for currents [A], 1 for torques, 0 for efforts without gravity; None where the motion
-    does not tell. `confidence` is 1 where the slopes are those of the meaning, 0 where they could
-    as well be another's, or do not tell.
-    """
+    """Meaning of the efforts of a log."""
 
     meaning: EffortMeaning | None
     confidence: float
+    """From 0, if the slopes may belong to another meaning or are not determined, to 1 [1]."""
     slope: dict[str, float | None]
+    """Slope of the effort against the torque of rigid bodies and rotors, of the two joints (by
+    name) that carry most of the gravity: about 1 / torque constant for currents, 1 for torques, 0
+    for efforts without gravity; None if the motion does not determine it."""
 
 
-def effort_report(motion: Motion, effort: Array) -> EffortReport:
-    """What efforts (n, joints) of a motion are."""
-    rows = thinned(len(effort), _MOST_ROWS)
+def effort_report(motion: LoggedMotion, effort: Array) -> EffortReport:
+    """Meaning of efforts (n, joints) of a motion."""
+    rows = thinned(len(effort), EFFORT.max_rows)
     part, effort, robot = motion.at(rows), effort[rows].astype(float), motion.robot
-    rigid, still = part.rigid_torques(), np.zeros_like(part.q)
-    weights = replace(part, v=still, a=still).rigid_torques()
-    # of those next to the base: at a wrist, cables and friction outweigh what it carries
-    heaviest = np.sort(np.argsort(-weights[:, : (robot.nq + 1) // 2].std(axis=0))[:2])
+    rigid, zero = part.rigid_torques(), np.zeros_like(part.q)
+    gravity = replace(part, v=zero, a=zero).rigid_torques()
+    # only joints next to the base: at a wrist, cables and friction exceed the weight
+    heaviest = np.sort(np.argsort(-gravity[:, : (robot.nq + 1) // 2].std(axis=0))[:2])
     slopes = {
         int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], robot.limits.tau_max[j])
         for j in heaviest
@@ -61,34 +69,38 @@ def effort_report(motion: Motion, effort: Array) -> EffortReport:
 
 
 def _slope(rigid: Array, v: Array, effort: Array, limit: float) -> float | None:
-    """Slope of effort (n,) against the rigid torque (n,), with Coulomb and viscous friction and an
-    offset beside it.
+    """Slope of the effort of one joint against its rigid torque, in a regression with Coulomb and
+    viscous friction and an offset.
+
+    The slope of a multiple regression is that between the residuals of both quantities against all
+    other columns (Frisch, Waugh, Lovell).
     """
-    beside = np.stack([v / np.sqrt(v * v + _KNEE * _KNEE), v, np.ones_like(v)], axis=1)
-    # what the other columns do not explain of both: the slope of a multiple regression (Frisch,
-    # Waugh, Lovell)
-    rest, other = (x - beside @ np.linalg.lstsq(beside, x, rcond=None)[0] for x in (rigid, effort))
-    if rest.std() < _LEAST_TORQUE * limit:
+    others = np.stack([smooth_sign(v), v, np.ones_like(v)], axis=1)
+    rest, other = (x - others @ np.linalg.lstsq(others, x, rcond=None)[0] for x in (rigid, effort))
+    if rest.std() < EFFORT.min_torque_spread * limit:
         return None
     return float(rest @ other / (rest @ rest))
 
 
 def _judged(slope: float, torque_constant: float) -> tuple[EffortMeaning | None, float]:
-    """The meaning that a slope speaks for, and how clearly, from 0 to 1."""
-    if abs(slope) * torque_constant < _EXTERNAL and abs(slope) < 1 / _NEAR:
-        return "external", 1 - abs(slope) * torque_constant / _EXTERNAL
-    off = {
-        meaning: _away(slope, at)
-        for meaning, at in (("current", 1 / torque_constant), ("torque", 1.0))
+    """Meaning of a slope, and its confidence from 0 to 1."""
+    external = abs(slope) * torque_constant / EFFORT.max_external_slope
+    if external < 1 and abs(slope) < 1 / EFFORT.slope_factor:
+        return "external", 1 - external
+    distances = {
+        meaning: _log_distance(slope, expected)
+        for meaning, expected in (("current", 1 / torque_constant), ("torque", 1.0))
     }
-    nearest = min(off, key=off.__getitem__)
-    clear = 1 - off[nearest]
-    # where both are near, the torque constant is about 1, and only the name of the column can tell
-    if clear <= 0 or max(off.values()) < 1:
+    nearest = min(distances, key=distances.__getitem__)
+    confidence = 1 - distances[nearest]
+    # with a torque constant near 1, both are near, and only the name of the column can tell
+    if confidence <= 0 or max(distances.values()) < 1:
         return None, 0.0
-    return ("current" if nearest == "current" else "torque"), clear
+    return ("current" if nearest == "current" else "torque"), confidence
 
 
-def _away(slope: float, expected: float) -> float:
-    """How far a slope is from an expected one: 0 where it is the same, 1 at the factor _NEAR."""
-    return float(abs(np.log(slope / expected)) / np.log(_NEAR)) if slope > 0 else np.inf
+def _log_distance(slope: float, expected: float) -> float:
+    """Logarithmic distance of a slope from an expected one; 1 at the factor of the settings."""
+    if slope <= 0:
+        return np.inf
+    return float(abs(np.log(slope / expected)) / np.log(EFFORT.slope_factor))

@@ -1,50 +1,64 @@
-"""Zero-phase low-pass filter, derivatives and noise of a log's channels."""
+"""Zero-phase low-pass filter, derivatives and noise of the channels of a log."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from joulepath.models.robot import Array
 
-HIGHEST_CUTOFF = 20.0
-"""Cut-off [Hz] of the filter at most: arms move more slowly than that."""
-CUTOFFS = (80.0, 40.0)
-"""Cut-offs [Hz] of derivatives where the noise is small, the highest first."""
-_CLEAN = 0.05  # share of the second derivative that may be noise
-_LEAST_RATIO = 5.0  # rate / cut-off at least
-_ORDER = 2  # of the filter, which runs forwards and backwards
-_ROBUST = 1.4826  # standard deviation / median absolute deviation of a normal distribution
+MAD_TO_SD = 1.4826
+"""Standard deviation over median absolute deviation of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class FilterSettings:
+    """Settings of the low-pass filters."""
+
+    max_cutoff: float = 20.0
+    """Largest cut-off frequency [Hz]; arms move more slowly."""
+    derivative_cutoffs: tuple[float, ...] = (80.0, 40.0)
+    """Cut-off frequencies of derivatives of channels with little noise, the highest first [Hz]."""
+    max_noise_share: float = 0.05
+    """Share of noise in a second derivative, up to which a channel has little noise [1]."""
+    min_rate_ratio: float = 5.0
+    """Smallest ratio of rate to cut-off frequency [1]."""
+    order: int = 2
+    """Order of the Butterworth filter, applied forwards and backwards."""
+
+
+FILTERS = FilterSettings()
 
 
 def cutoff(rate: float) -> float:
-    """Cut-off frequency [Hz] for a rate [Hz]."""
-    return min(HIGHEST_CUTOFF, rate / _LEAST_RATIO)
+    """Cut-off frequency [Hz] of the low-pass filter for a rate [Hz]."""
+    return min(FILTERS.max_cutoff, rate / FILTERS.min_rate_ratio)
 
 
 def low_passed(values: Array, rate: float) -> Array:
-    """Channels (n, k) without what is above the cut-off, and without delay: a Butterworth filter,
-    both ways.
-    """
+    """Channels (n, k) without frequencies above the cut-off and without delay."""
     smooth = np.empty_like(values)
-    # one channel at a time: the filter copies what it is given
+    # one channel at a time: the filter copies its input
     for k, channel in enumerate(values.T):
         smooth[:, k] = filtered(channel, rate, cutoff(rate))
     return smooth
 
 
-def filtered(channel: Array, rate: float, highest: float) -> Array:
-    """A channel (n,) without what is above a frequency [Hz]."""
-    # every process that serves requests would hold 25 MB of it, and only logs are filtered
+def filtered(channel: Array, rate: float, max_frequency: float) -> Array:
+    """A channel (n,) without frequencies above a limit [Hz]: a Butterworth filter, both ways."""
+    # imported late: only logs are filtered, and every serving process would hold 25 MB of it
     from scipy.signal import butter, sosfiltfilt
 
-    return np.asarray(sosfiltfilt(butter(_ORDER, highest, fs=rate, output="sos"), channel))
+    sections = butter(FILTERS.order, max_frequency, fs=rate, output="sos")
+    return np.asarray(sosfiltfilt(sections, channel))
 
 
 def derivative(values: Array, rate: float) -> Array:
-    """Rates of change (n, k) of the low-passed channels (n, k), by central differences.
+    """Derivatives (n, k) of low-passed channels (n, k), by central differences.
 
-    The cut-off is the highest at which the noise leaves even the second derivative as it is: a low
-    one flattens the accelerations of fast moves.
+    The cut-off frequency is the highest at which the noise is small even in the second derivative:
+    a low cut-off flattens the accelerations of fast moves.
     """
     rates = np.empty_like(values)
     for k, channel in enumerate(values.T):
@@ -54,27 +68,27 @@ def derivative(values: Array, rate: float) -> Array:
 
 
 def _clean_cutoff(channel: Array, rate: float) -> float:
-    """The highest of the cut-offs [Hz] that the noise allows in a channel (n,)."""
+    """The highest cut-off frequency [Hz] that the noise of a channel (n,) allows."""
     lowest = cutoff(rate)
-    for highest in CUTOFFS:
-        if lowest < highest <= rate / _LEAST_RATIO:
+    for highest in FILTERS.derivative_cutoffs:
+        if lowest < highest <= rate / FILTERS.min_rate_ratio:
             smooth = filtered(channel, rate, highest)
-            above = float(_ROBUST * np.median(np.abs(channel - smooth)))
+            above = float(MAD_TO_SD * np.median(np.abs(channel - smooth)))
             second = np.gradient(np.gradient(smooth, 1 / rate), 1 / rate)
-            # of noise that is the same at all frequencies, what is below the cut-off,
-            # differentiated twice
+            # power of white noise below the cut-off in the second derivative, over its power above
             share = 2 * highest**5 / (5 * (rate - 2 * highest))
-            if (2 * np.pi) ** 2 * above * np.sqrt(share) < _CLEAN * second.std():
+            noise_of_second = (2 * np.pi) ** 2 * above * np.sqrt(share)
+            if noise_of_second < FILTERS.max_noise_share * second.std():
                 return highest
     return lowest
 
 
 def noise(values: Array, rate: float) -> Array:
-    """Robust standard deviation (k,) of what is above the cut-off in channels (n, k)."""
+    """Robust standard deviation (k,) of the part of channels (n, k) above the cut-off frequency."""
     return np.array([_noise(channel, rate) for channel in values.T])
 
 
 def _noise(channel: Array, rate: float) -> float:
     above = channel - low_passed(channel[:, None], rate)[:, 0]
     above -= np.median(above)
-    return float(_ROBUST * np.median(np.abs(above)))
+    return float(MAD_TO_SD * np.median(np.abs(above)))

@@ -1,6 +1,4 @@
-"""Where the table of a log begins: behind comments, with a header, and perhaps with a line of
-units.
-"""
+"""Head of the table of a log: comments, header and an optional line of units."""
 
 from __future__ import annotations
 
@@ -12,38 +10,58 @@ from itertools import count
 from joulepath.optimizer.csv_table import SEPARATORS, Lines, line_of, names_of
 from joulepath.optimizer.exceptions import InvalidTable
 
-LONGEST_LINE = 16384
-"""Most bytes of a line: a full RTDE record has nearly 200 columns."""
-MOST_LINES = 100
-"""Lines above the header at most."""
 _COMMENT = ("#", "//", "%")
-_HEADER = "%time"  # of ROS, which is no comment
-_SEPARATOR = re.compile(r"sep=(.)")  # of spreadsheets
+_ROS_HEADER = "%time"
+"""First column of ROS, which is no comment."""
+_SEPARATOR_LINE = re.compile(r"sep=(.)")
+"""Line of spreadsheets that names the separator."""
 _STAMP = ("sec", "nanosec", "frame_id")
 
 
 @dataclass(frozen=True)
+class HeadSettings:
+    """Limits of the head of a log."""
+
+    max_line_bytes: int = 16384
+    """Largest length of a line; a full RTDE record has nearly 200 columns."""
+    max_lines: int = 100
+    """Largest number of lines above the header."""
+
+
+HEAD = HeadSettings()
+
+
+@dataclass(frozen=True)
 class Head:
-    """Names of the columns, in lower case, and what separates them. `row` is the number of the
-    first line behind the header, which has been read already if it is `first`."""
+    """Header of a table."""
 
     names: list[str]
+    """Names of the columns, in lower case."""
     separator: str
     row: int
+    """Number of the first line below the header."""
     first: str | None = None
+    """That line, if it has been read already."""
 
 
 def head_of(file: Lines, joints: Sequence[str]) -> Head:
-    """The head of the log of an arm with these joints. Raises InvalidTable.
+    """Read the head of a log.
 
-    Lines of comments, of a spreadsheet's separator, and empty ones may stand above the header. A
-    header may be the last of the comments. A JointState without a header, as `ros2 topic echo
-    --csv` prints it, gets one.
+    Comments, a line with the separator, and empty lines may stand above the header. The header may
+    be the last of the comments. A JointState without header, as printed by `ros2 topic echo --csv`,
+    gets a header.
+
+    Args:
+        file: lines of the log.
+        joints: names of the joints.
+
+    Raises:
+        InvalidTable: there is no header.
     """
     comment, separators = "", SEPARATORS + " "
     for row in count(1):
-        line = line_of(file, row, LONGEST_LINE)
-        if not line or row > MOST_LINES:
+        line = line_of(file, row, HEAD.max_line_bytes)
+        if not line or row > HEAD.max_lines:
             where = (
                 "The file is empty" if row == 1 else f"There is no header in the first {row} lines"
             )
@@ -51,7 +69,7 @@ def head_of(file: Lines, joints: Sequence[str]) -> Head:
                 f"{where}: send a header and two or more rows.", None if row == 1 else row
             )
         text = line.removeprefix("\ufeff").strip() if row == 1 else line.strip()
-        said = _SEPARATOR.fullmatch(text.strip('"'))
+        said = _SEPARATOR_LINE.fullmatch(text.strip('"'))
         if said:
             separators = said[1]
         elif is_comment(text):
@@ -59,7 +77,7 @@ def head_of(file: Lines, joints: Sequence[str]) -> Head:
         elif text:
             break
     names, separator = names_of(text, separators)
-    if all(number(each) for each in names):
+    if all(is_number(each) for each in names):
         if comment:
             names, separator = names_of(comment.lstrip("#/% "), separators)
         return Head(names, separator, row, line)
@@ -72,13 +90,13 @@ def head_of(file: Lines, joints: Sequence[str]) -> Head:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is no row, but a remark."""
+    """Whether a line is a comment and no row."""
     text = line.lstrip()
-    return text.startswith(_COMMENT) and not text.lower().startswith(_HEADER)
+    return text.startswith(_COMMENT) and not text.lower().startswith(_ROS_HEADER)
 
 
-def number(cell: str) -> bool:
-    """Whether a cell has a number."""
+def is_number(cell: str) -> bool:
+    """Whether a cell contains a number."""
     try:
         float(cell.strip().strip('"'))
     except ValueError:
@@ -87,16 +105,17 @@ def number(cell: str) -> bool:
 
 
 def _joint_state(cells: Sequence[str], joints: Sequence[str]) -> list[str] | None:
-    """The header of rows of a JointState: seconds, nanoseconds, frame, names, and as many
-    positions, velocities and efforts; None if these cells are none."""
+    """Header for rows of a JointState: seconds, nanoseconds, frame, names, and as many positions,
+    velocities and efforts; None for cells of another kind.
+    """
     if (
         len(cells) < len(_STAMP)
-        or not (number(cells[0]) and number(cells[1]))
+        or not (is_number(cells[0]) and is_number(cells[1]))
         or not set(joints) <= set(cells)
     ):
         return None
     behind = cells[len(_STAMP) :]
-    names = behind[: next((k for k, cell in enumerate(behind) if number(cell)), len(behind))]
+    names = behind[: next((k for k, cell in enumerate(behind) if is_number(cell)), len(behind))]
     kinds, rest = divmod(len(behind) - len(names), max(len(names), 1))
     if rest or not 1 <= kinds <= 3:
         return None

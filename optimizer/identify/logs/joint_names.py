@@ -1,6 +1,4 @@
-"""Columns of a log by the names of the joints, which drivers of ROS publish in an order of their
-own.
-"""
+"""Columns by the names of the joints, which ROS drivers publish in an order of their own."""
 
 from __future__ import annotations
 
@@ -9,22 +7,34 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.columns import AT, Columns, Group, time_of
+from joulepath.optimizer.identify.logs.columns import Columns, time_of
+from joulepath.optimizer.identify.logs.log_formats import JOINT_NUMBER, ChannelName
 
-_WORDS: Mapping[Group, str] = {
+_WORDS: Mapping[ChannelName, str] = {
     "q": "position|pos|q",
     "v": "velocity|vel|speed|v|qd",
     "effort": "effort",
     "torque": "torque|tau",
     "current": "current|cur",
 }
-_BETWEEN = "[^a-z0-9]+"
+_DELIMITER = "[^a-z0-9]+"
 
 
 def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None:
-    """The columns of a header whose names hold those of the robot's `joints`, as
-    `/joint_states/elbow_joint/position` or `elbow_joint_velocity`; None if they do not. Raises
-    InvalidTable for a joint that is missing, or there twice."""
+    """Columns of a header with the names of the robot's joints.
+
+    Examples are `/joint_states/elbow_joint/position` and `elbow_joint_velocity`.
+
+    Args:
+        names: names of the columns.
+        joints: names of the joints.
+
+    Returns:
+        The columns; None if the header does not have the names.
+
+    Raises:
+        InvalidTable: a joint is missing or occurs twice.
+    """
     found = {
         group: columns
         for group, word in _WORDS.items()
@@ -45,8 +55,7 @@ def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[in
             has = "no column" if not columns else "more than one column"
             raise InvalidTable(
                 f"The header has {has} `{word.partition('|')[0]}` of {joint}: a log has every "
-                "joint once. Correct the "
-                "header, or name the columns in `columns`.",
+                "joint once. Correct the header, or name the columns in `columns`.",
                 1,
                 None if not columns else names[columns[1]],
             )
@@ -55,17 +64,16 @@ def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[in
 
 def _matching(names: Sequence[str], word: str, joint: str) -> Iterator[int]:
     named = re.escape(joint)
-    pattern = f"(?:.*[^a-z0-9])?(?:{named}{_BETWEEN}(?:{word})|(?:{word}){_BETWEEN}{named})"
+    pattern = f"(?:.*[^a-z0-9])?(?:{named}{_DELIMITER}(?:{word})|(?:{word}){_DELIMITER}{named})"
     return (k for k, name in enumerate(names) if re.fullmatch(pattern, name))
 
 
 def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[str]) -> Columns:
-    """The columns in the order of the robot's `joints`, where the `first` row has their names, as a
-    JointState does.
-    """
+    """Columns in the order of the robot's joints, if the first row has joint names as in a
+    JointState."""
     named: dict[int, str] = {}
     for k, name in enumerate(columns.names):
-        match = re.fullmatch(rf"(?:.*[./])?name{AT}", name)
+        match = re.fullmatch(rf"(?:.*[./])?name{JOINT_NUMBER}", name)
         if match is not None and k < len(first):
             named[int(match[1])] = first[k].strip().strip('"').lower()
     logged = [named[number] for number in sorted(named)]
@@ -78,4 +86,4 @@ def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[
         for group, indices in columns.groups.items()
         if len(indices) > 1
     }
-    return replace(columns, form="named", groups={**columns.groups, **groups})
+    return replace(columns, format="named", groups={**columns.groups, **groups})

@@ -1,8 +1,7 @@
-"""By how much the efforts or the power of a log come later than its motion: another clock, or a
-filter of the driver's.
+"""Lag of efforts or power behind the motion, caused by another clock or a filter of the driver.
 
-An effort that comes late falls into wrong accelerations and beside the turns of the friction. The
-figures would be wrong, and their standard deviations would not tell.
+A late effort coincides with wrong accelerations and misses the reversals of friction. The figures
+would be wrong, and their standard deviations would not show it.
 """
 
 from __future__ import annotations
@@ -14,56 +13,80 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.identify.logs.motion import Motion, thinned
+from joulepath.optimizer.identify.logs.motion import LoggedMotion, thinned
 
-LEAST_LAG = 0.02
-"""Shorter lags [s] are left as they are: controllers' own filters have some milliseconds."""
-_MOST_LAG = 0.2  # s that is sought
-_MOST_ROWS, _STEPS = 4000, 20
-_LEAST_SPEED = 0.02  # rad/s of the rows that are compared
-_LEAST_ROWS = 50  # of a joint
-_BLOCKS, _SDS = (
-    10,
-    4.0,
-)  # parts of the log that are left out in turn, and standard deviations of a lag that is told
-_MOST_LEFT = (
-    0.997  # share of the square of the misfit that the lag leaves of it: what leaves more is no lag
-)
-_LEAST_SHARE = 1e-6  # below it, all is explained
-_AVERAGE = 0.01  # s before and behind, of efforts that are compared
-_NEIGHBOURS, _FAR = (
-    5,
-    0.3,
-)  # of the range of an effort that it is off its neighbours' median: a spike
+
+@dataclass(frozen=True)
+class LagSettings:
+    """Settings of the search for lags."""
+
+    min_lag: float = 0.02
+    """Smallest lag that is corrected [s]; filters of controllers have some milliseconds."""
+    max_lag: float = 0.2
+    """Largest lag [s]."""
+    max_rows: int = 4000
+    """Approximate largest number of compared rows."""
+    min_rows: int = 50
+    """Smallest number of compared rows of a joint."""
+    steps: int = 20
+    """Steps of the coarse and of the fine search on either side."""
+    min_speed: float = 0.02
+    """Speed below which rows are not compared [rad/s]: they show the onset of friction rather than
+    the time."""
+    blocks: int = 10
+    """Parts of the log that are left out in turn for the standard deviation of the lag."""
+    min_deviations: float = 4.0
+    """Standard deviations that a lag must exceed."""
+    max_error_ratio: float = 0.997
+    """Squared error with the lag over that without it, above which there is no lag [1]."""
+    min_error_share: float = 1e-6
+    """Unexplained share of the squared channel, below which all is explained [1]."""
+    half_window: float = 0.01
+    """Time on either side of a sample over which channels are averaged [s]."""
+    spike_neighbours: int = 5
+    """Samples of the median that detects spikes."""
+    spike_share: float = 0.3
+    """Distance of a spike from the median of its neighbours over the range of the channel [1]."""
+
+
+LAG = LagSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class _Channel:
-    """A channel (n,) of a log, of which the motion explains what the `columns` (k, p) span, at the
-    rows (k,).
-    """
+    """A channel to be explained by a motion."""
 
     values: Array
+    """Values of all rows of the log (n,)."""
     rows: Indices
+    """Compared rows (k,)."""
     columns: Array
+    """Regressors of the motion at the compared rows (k, p)."""
     blocks: Indices
+    """Part of the log of each compared row (k,)."""
 
 
-def lag_of(motion: Motion, effort: Array) -> float:
-    """The time [s] by which efforts (n, joints) come after the motion, negative if before.
+def effort_lag(motion: LoggedMotion, effort: Array) -> float:
+    """Lag of efforts behind the motion.
 
-    0 where it is short, or where the parts of the log do not agree on it."""
-    rows = _compared(len(effort), motion.rate)
-    if len(rows) < _LEAST_ROWS:
+    Args:
+        motion: the motion.
+        effort: efforts (n, joints).
+
+    Returns:
+        The lag [s], negative if the efforts come first; 0 if it is short, or not the same in all
+        parts of the log.
+    """
+    rows = _compared_rows(len(effort), motion.rate)
+    if len(rows) < LAG.min_rows:
         return 0.0
-    blocks = np.arange(len(rows)) * _BLOCKS // len(rows)
+    blocks = np.arange(len(rows)) * LAG.blocks // len(rows)
     part = motion.at(rows)
     rigid, channels = part.rigid_torques(), list[_Channel]()
     for joint in range(effort.shape[1]):
-        # slower ones say more of how friction begins than of when
-        use = np.abs(part.v[:, joint]) > _LEAST_SPEED
+        use = np.abs(part.v[:, joint]) > LAG.min_speed
         values = smooth(without_spikes(effort[:, joint]), motion.rate)
-        if use.sum() >= _LEAST_ROWS and np.ptp(values) > 0:
+        if use.sum() >= LAG.min_rows and np.ptp(values) > 0:
             load, speed, sign = rigid[use, joint], part.v[use, joint], np.sign(part.v[use, joint])
             columns = [
                 load,
@@ -74,20 +97,18 @@ def lag_of(motion: Motion, effort: Array) -> float:
                 np.ones_like(speed),
             ]
             channels.append(_Channel(values, rows[use], np.stack(columns, axis=1), blocks[use]))
-    return _lag(channels, motion.rate)
+    return _common_lag(channels, motion.rate)
 
 
-def power_lag_of(motion: Motion, power: Array) -> float:
-    """The time [s] by which the power (n,) comes after the motion, as `lag_of` says."""
-    rows = _compared(len(power), motion.rate)
-    if len(rows) < _LEAST_ROWS or not np.ptp(power):
+def power_lag(motion: LoggedMotion, power: Array) -> float:
+    """Lag of power (n,) behind the motion [s], as `effort_lag`."""
+    rows = _compared_rows(len(power), motion.rate)
+    if len(rows) < LAG.min_rows or not np.ptp(power):
         return 0.0
     part, drives = motion.at(rows), motion.robot.drives
     rigid = part.rigid_torques()
-    torque, drag = (
-        rigid + drives.rotor_inertia * part.a,
-        motion.robot.friction.torque(part.v, rigid),
-    )
+    torque = rigid + drives.rotor_inertia * part.a
+    drag = motion.robot.friction.torque(part.v, rigid)
     heat = drives.copper / drives.torque_constant**2
     parts = [
         torque * part.v,
@@ -97,82 +118,91 @@ def power_lag_of(motion: Motion, power: Array) -> float:
         heat * part.v**2,
     ]
     columns = np.column_stack([*(each.sum(axis=1) for each in parts), np.ones(len(rows))])
-    blocks = np.arange(len(rows)) * _BLOCKS // len(rows)
-    return _lag(
-        [_Channel(smooth(without_spikes(power), motion.rate), rows, columns, blocks)], motion.rate
-    )
+    blocks = np.arange(len(rows)) * LAG.blocks // len(rows)
+    values = smooth(without_spikes(power), motion.rate)
+    return _common_lag([_Channel(values, rows, columns, blocks)], motion.rate)
 
 
-def _compared(count: int, rate: float) -> Indices:
-    """The rows of a log of so many that are compared: others can be as far from them as the longest
-    lag.
-    """
-    edge = max(2, round(_MOST_LAG * rate))
-    return thinned(count, _MOST_ROWS, edge)
+def _max_shift(rate: float) -> int:
+    """Rows of the largest lag."""
+    return max(2, round(LAG.max_lag * rate))
 
 
-def _lag(channels: Sequence[_Channel], rate: float) -> float:
-    """The lag [s] of all channels together."""
-    edge = max(2, round(_MOST_LAG * rate))
-    step = max(1, edge // _STEPS)
+def _compared_rows(count: int, rate: float) -> Indices:
+    """Compared rows of a log, at least the largest lag away from its ends."""
+    return thinned(count, LAG.max_rows, _max_shift(rate))
+
+
+def _common_lag(channels: Sequence[_Channel], rate: float) -> float:
+    """The lag of all channels together [s]."""
+    edge, steps = _max_shift(rate), LAG.steps
+    step = max(1, edge // steps)
     coarse = np.arange(-(edge // step), edge // step + 1) * step
-    left = _left(channels, coarse)[0]
-    best, none = int(np.argmin(left)), len(coarse) // 2
-    if best in (0, len(left) - 1) or left[best] - left[none] > np.log(_MOST_LEFT):
+    error = _log_errors(channels, coarse)[0]
+    best, unshifted = int(np.argmin(error)), len(coarse) // 2
+    if best in (0, len(error) - 1) or error[best] - error[unshifted] > np.log(LAG.max_error_ratio):
         return 0.0
-    fine = int(coarse[best]) + np.arange(-_STEPS, _STEPS + 1) * max(1, step // _STEPS)
+    fine = int(coarse[best]) + np.arange(-steps, steps + 1) * max(1, step // steps)
     fine = fine[np.abs(fine) <= edge]
-    least = np.array([_least(fine, each) for each in _left(channels, fine)]) / rate
-    lag, parts = float(least[0]), least[1:]
-    sd = np.sqrt((_BLOCKS - 1) / _BLOCKS * float(((parts - parts.mean()) ** 2).sum()))
-    return lag if abs(lag) >= max(LEAST_LAG, _SDS * sd) else 0.0
+    lags = np.array([_minimum(fine, each) for each in _log_errors(channels, fine)]) / rate
+    lag, parts = float(lags[0]), lags[1:]
+    sd = np.sqrt((LAG.blocks - 1) / LAG.blocks * float(((parts - parts.mean()) ** 2).sum()))
+    return lag if abs(lag) >= max(LAG.min_lag, LAG.min_deviations * sd) else 0.0
 
 
-def _least(shifts: Indices, left: Array) -> float:
-    """Where the parabola through the least value and its neighbours is least, in rows."""
-    best = int(np.clip(np.argmin(left), 1, len(left) - 2))
-    before, here, after = left[best - 1 : best + 2]
+def _minimum(shifts: Indices, error: Array) -> float:
+    """Minimum of the parabola through the least error and its neighbours [rows]."""
+    best = int(np.clip(np.argmin(error), 1, len(error) - 2))
+    before, here, after = error[best - 1 : best + 2]
     between = float(
         np.clip(0.5 * (before - after) / max(before - 2 * here + after, 1e-300), -0.5, 0.5)
     )
     return float(shifts[best] + between * (shifts[1] - shifts[0]))
 
 
-def _left(channels: Sequence[_Channel], shifts: Indices) -> Array:
-    """The logarithm of the share of the square of the channels that the motion leaves, if they come
-    `shifts` rows later, as a mean over them: of all rows, and of those without each of the blocks,
-    (blocks + 1, shifts)."""
-    found = [np.zeros((_BLOCKS + 1, len(shifts)))]
+def _log_errors(channels: Sequence[_Channel], shifts: Indices) -> Array:
+    """Logarithm of the unexplained share of the squared channels, averaged over the channels.
+
+    Args:
+        channels: the channels.
+        shifts: numbers of rows by which the channels come later.
+
+    Returns:
+        The logarithm (blocks + 1, shifts): for all rows, and without one block each.
+    """
+    found = [np.zeros((LAG.blocks + 1, len(shifts)))]
     for channel in channels:
         shifted = channel.values[channel.rows[:, None] + shifts].astype(float)
         basis = np.linalg.svd(channel.columns, full_matrices=False)[0]
         centred = shifted - shifted.mean(axis=0)
         error = centred - basis @ (basis.T @ centred)
         squares, errors = (_without_blocks(each**2, channel.blocks) for each in (centred, error))
-        found.append(np.log(np.maximum(errors / np.maximum(squares, 1e-300), _LEAST_SHARE)))
+        share = np.maximum(errors / np.maximum(squares, 1e-300), LAG.min_error_share)
+        found.append(np.log(share))
     return np.asarray(np.mean(found[1:] or found, axis=0))
 
 
 def _without_blocks(squares: Array, blocks: Indices) -> Array:
-    """Sums of squares (n, k) of all rows, and without each block, (blocks + 1, k)."""
-    parts = np.zeros((_BLOCKS, squares.shape[1]))
+    """Sums (blocks + 1, k) of squares (n, k): of all rows, and without one block each."""
+    parts = np.zeros((LAG.blocks, squares.shape[1]))
     np.add.at(parts, blocks, squares)
     total = parts.sum(axis=0)
     return np.vstack([total, total - parts])
 
 
 def without_spikes(channel: Array) -> Array:
-    """The channel (n,) with the median of the neighbours in the place of what is far off it."""
-    # every process that serves requests would hold it, and only logs are filtered
+    """A channel (n,) with spikes replaced by the median of their neighbours."""
+    # imported late: only logs are filtered, and every serving process would hold it
     from scipy.ndimage import median_filter
 
-    middle = median_filter(channel, _NEIGHBOURS)
+    middle = median_filter(channel, LAG.spike_neighbours)
     low, high = np.percentile(middle, [2, 98])
-    return np.asarray(np.where(np.abs(channel - middle) > _FAR * (high - low), middle, channel))
+    spike = np.abs(channel - middle) > LAG.spike_share * (high - low)
+    return np.asarray(np.where(spike, middle, channel))
 
 
 def smooth(channel: Array, rate: float) -> Array:
-    """The channel (n,) as means over 0.01 s before and behind."""
+    """Moving average of a channel (n,)."""
     from scipy.ndimage import uniform_filter1d
 
-    return np.asarray(uniform_filter1d(channel, 2 * round(_AVERAGE * rate) + 1))
+    return np.asarray(uniform_filter1d(channel, 2 * round(LAG.half_window * rate) + 1))

@@ -1,4 +1,4 @@
-"""A log of one arm: its channels on one uniform grid of time, and the moves that it consists of."""
+"""Log of one arm: channels on a uniform grid of time, divided into moves and rests."""
 
 from __future__ import annotations
 
@@ -14,52 +14,62 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
 
 EffortMeaning = Literal["current", "torque", "external"]
-"""What the channel of efforts has: motor currents [A], motor torques at the joints [N·m], or
-torques from outside [N·m], which are those without gravity, rigid body and friction."""
+"""Meaning of logged efforts: motor currents [A], motor torques at the joints [N·m], or external
+torques [N·m], without gravity, rigid body and friction."""
 
 
 @dataclass(frozen=True)
 class LogMove:
-    """Rows `start` to `end` of a log, the latter not among them; `at_rest`: no joint moves in
-    them."""
+    """A move or a rest."""
 
     start: int
+    """First row."""
     end: int
+    """Row behind the last one."""
     at_rest: bool
+    """Whether no joint moves."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Log:
-    """One log of the arm `robot`, in SI units. Compared by identity. All arrays are read-only and
-    share their rows, in single or double precision.
+    """Log of one arm in SI units, with n rows; compared by identity.
 
-    `time` (n,) [s] is the uniform grid, from 0 in steps of 1 / `rate` [Hz]. `q` [rad], `v` [rad/s]
-    and `a` [rad/s²] are (n, joints). `effort` (n, joints) is what `effort_meaning` says: both are
-    None where no effort was logged. `power` (n,) [W] is drawn from the arm's bus, `temperature` (n,
-    joints) [°C] that of the joints; None where not logged. `wrench` (n, 6) is the force [N] and the
-    torque [N·m], about the origin of the base frame and in its axes, that the arm exerts on a
-    sensor beneath its base; None where not logged. `payload` is what the arm carried, and
-    `payload_known` whether anybody said so. `gravity` (3,) [m/s²] is in the base frame. `moves`
-    cover all rows in their order, apart from pauses between blocks of a log that never rests.
+    All arrays are read-only and share their rows, in single or double precision. A channel is None
+    if it was not logged.
 
-    Raises InvalidProblem if an array has another shape than the grid asks for.
+    Raises:
+        InvalidProblem: an array does not have the shape of the grid.
     """
 
     robot: str
     time: Array
+    """Uniform grid (n,) from 0 in steps of 1 / `rate` [s]."""
     q: Array
+    """Positions (n, joints) [rad]."""
     v: Array
+    """Velocities (n, joints) [rad/s]."""
     a: Array
+    """Accelerations (n, joints) [rad/s²]."""
     effort: Array | None = None
+    """Efforts (n, joints), in the unit of their meaning."""
     effort_meaning: EffortMeaning | None = None
     power: Array | None = None
+    """Power drawn from the arm's bus (n,) [W]."""
     temperature: Array | None = None
+    """Temperatures of the joints (n, joints) [°C]."""
     wrench: Array | None = None
+    """Force [N] and torque [N·m] of the arm on a sensor beneath its base (n, 6), about the origin
+    of the base frame and in its axes."""
     payload: Payload = field(default_factory=Payload)
     payload_known: bool = True
+    """Whether the payload was stated or logged."""
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    """Gravity (3,) in the base frame [m/s²]."""
     rate: float
+    """Rate of the grid [Hz]."""
     moves: tuple[LogMove, ...]
+    """Moves and rests, which cover all rows in order, apart from the gaps between blocks of a log
+    that never rests."""
     name: str | None = None
     tags: tuple[str, ...] = ()
 
@@ -88,8 +98,8 @@ class Log:
 
     @property
     def segment_rows(self) -> list[int]:
-        """Rows that bound the segments: the first, each in which motion or rest begins, the
-        last."""
+        """Rows that bound the segments: the first and last row, and each row at which motion or
+        rest begins."""
         begins = [
             move.start for before, move in pairwise(self.moves) if move.at_rest != before.at_rest
         ]
@@ -97,19 +107,24 @@ class Log:
         return [0, *(row for row in begins if 0 < row < last), last]
 
     def recording(self) -> Recording:
-        """The logged motion, as `evaluate` takes it, with a segment for each move and each rest."""
+        """The logged motion in the form of `evaluate`, with a segment for each move and each
+        rest."""
         edges = (self.time[self.segment_rows[1:-1]] - self.time[0]).tolist()
         q, v, a = (channel.astype(float) for channel in (self.q, self.v, self.a))
         return Recording.of(self.time, q, v, a, edges)
 
     @property
     def duration(self) -> float:
-        """Time [s] from the first row to the last one."""
+        """Time from the first to the last row [s]."""
         return float(self.time[-1] - self.time[0])
 
 
 def _view(values: Array, shape: tuple[int, ...], name: str) -> Array:
-    """A read-only view: a log can be too large to be copied. Raises InvalidProblem."""
+    """A read-only view, because a log can be too large to be copied.
+
+    Raises:
+        InvalidProblem: the array has another shape.
+    """
     view = np.asarray(
         values, dtype=None if np.asarray(values).dtype == np.float32 else float
     ).view()

@@ -1,4 +1,4 @@
-"""The errors of reading logs."""
+"""Errors of reading logs."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ class LogTooLarge(JoulepathError):
     def __str__(self) -> str:
         return (
             f"The log has more than {self.limit} {self.unit}: send it in parts, at a lower rate, "
-            "or only the columns "
-            "that count."
+            "or only the columns that count."
         )
 
 
@@ -38,8 +37,8 @@ class EffortNotUsable(JoulepathError):
     title = "Logged efforts not usable"
     remedy = (
         "Log motor currents: the ROS 2 driver of Universal Robots has the option "
-        "`actual_current_as_torque`, which "
-        "must be off. If you know what they are, say so with `effort`."
+        "`actual_current_as_torque`, which must be off. If you know what they are, say so with "
+        "`effort`."
     )
 
     message: Annotated[str, Internal]

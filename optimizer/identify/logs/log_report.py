@@ -1,4 +1,4 @@
-"""What was seen while a log was read."""
+"""Report on the reading of a log."""
 
 from __future__ import annotations
 
@@ -9,25 +9,29 @@ from joulepath.optimizer.identify.logs.effort import EffortReport
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel of a log: its `column` in the file (None if made from another one), `unit`, least
-    and greatest value, and robust standard deviation of its `noise` above the filter's band."""
+    """A channel of a log."""
 
     name: str
     column: str | None
+    """Column of the file; None for a channel computed from another one."""
     unit: str
     min: float
     max: float
     noise: float
+    """Robust standard deviation of the part above the band of the filter."""
 
 
 @dataclass(frozen=True)
 class LogReport:
-    """`rows` that were read and lines that were `dropped` for their length; `jitter` [s]: P5 and
-    P95 of the time steps' deviation; `effort` is None where none was logged."""
+    """Findings of the reading of a log."""
 
     rows: int
+    """Number of rows."""
     dropped: int
+    """Number of lines dropped for their number of cells."""
     jitter: tuple[float, float]
+    """5th and 95th percentile of the deviation of a time step [s]."""
     channels: tuple[Channel, ...]
     effort: EffortReport | None
+    """Meaning of the efforts; None if no efforts were logged."""
     warnings: tuple[str, ...]

@@ -1,8 +1,9 @@
-"""What is odd in a log, in one sentence each."""
+"""Warnings of doubtful properties of a log, in one sentence each."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,31 +12,45 @@ from joulepath.optimizer.identify.logs.columns import Columns
 from joulepath.optimizer.identify.logs.grid import Grid
 from joulepath.optimizer.identify.logs.log import Log
 
-_SATURATED, _LEAST_SATURATED = 0.005, 10
-"""Fraction and number of moving rows at exactly the greatest effort beyond which it is cut off
-there.
-"""
-_NEIGHBOURS = 5
-"""Rows among which one or two are a spike."""
-_LEAPS, _OF_NOISE = {"effort": 0.8, "power": 0.3}, 10.0
-"""Of the range of a channel, and of its noise, that a spike is away from its neighbours; friction
-makes steps of the efforts of small joints."""
-_MOVING, _HELD = 0.05, 0.7  # rad/s
-"""Fraction of moving rows with the values of the row before beyond which a channel is written again
-and again.
-"""
+
+@dataclass(frozen=True)
+class WarningSettings:
+    """Settings of the warnings."""
+
+    max_saturated_share: float = 0.005
+    """Share of the rows in motion at exactly the largest effort, above which the effort is
+    saturated [1]."""
+    max_saturated_rows: int = 10
+    """Number of these rows, above which the effort is saturated."""
+    spike_neighbours: int = 5
+    """Samples of the median that detects spikes."""
+    effort_spike_share: float = 0.8
+    """Distance of a spike of an effort from its neighbours over the range of the effort [1];
+    friction makes steps in the efforts of small joints."""
+    power_spike_share: float = 0.3
+    """The same for the power [1]."""
+    spike_noise_ratio: float = 10.0
+    """Distance of a spike from its neighbours over the noise of the channel [1]."""
+    moving_speed: float = 0.05
+    """Speed above which a joint moves [rad/s]."""
+    max_held_share: float = 0.7
+    """Share of moving rows with the values of the previous row, above which a channel is written
+    repeatedly [1]."""
+
+
+WARNINGS = WarningSettings()
 
 
 def log_warnings(log: Log, grid: Grid, columns: Columns) -> list[str]:
-    """Gaps, repeated times, constant or saturated channels, spikes, what the log does not say."""
+    """Warnings of gaps, repeated times, constant or saturated channels, spikes and missing
+    information."""
     found = [*_times(grid), *_constant(log), *_saturated(log), *_spikes(log)]
     if not log.payload_known:
         found.append("No payload is given or logged: the arm is taken to have carried nothing.")
-    if columns.form == "ros" and any(name.rstrip("]")[-1:].isdigit() for name in columns.names):
+    if columns.format == "ros" and any(name.rstrip("]")[-1:].isdigit() for name in columns.names):
         found.append(
             "The joints are taken in the order of their numbers, from base to flange: drivers of "
-            "ROS may publish them "
-            "in another one. Then name the columns in `columns`."
+            "ROS may publish them in another one. Then name the columns in `columns`."
         )
     return found
 
@@ -80,8 +95,8 @@ def _saturated(log: Log) -> Iterator[str]:
     moving = np.zeros(len(log.effort), dtype=bool)
     for move in log.moves:
         moving[move.start : move.end] = not move.at_rest
-    # joint by joint: a log can fill half of the memory
-    wrong = [joint for joint, effort in enumerate(log.effort.T) if _cut_off(effort, moving)]
+    # joint by joint, because a log can fill half of the memory
+    wrong = [joint for joint, effort in enumerate(log.effort.T) if _is_saturated(effort, moving)]
     if wrong:
         yield (
             f"The effort of joints {numbers_of_joints(wrong)} stays at its greatest value: it "
@@ -89,65 +104,66 @@ def _saturated(log: Log) -> Iterator[str]:
         )
 
 
-def _cut_off(effort: Array, moving: Mask) -> bool:
+def _is_saturated(effort: Array, moving: Mask) -> bool:
     size = np.abs(effort[moving])
     if not size.size or np.ptp(effort) == 0:
         return False
-    return int((size == size.max()).sum()) > max(_LEAST_SATURATED, _SATURATED * len(size))
+    limit = max(WARNINGS.max_saturated_rows, WARNINGS.max_saturated_share * len(size))
+    return int((size == size.max()).sum()) > limit
 
 
 def _spikes(log: Log) -> Iterator[str]:
-    for words, values in _measured(log):
+    channels = list[tuple[str, Array, float]]()
+    if log.effort is not None:
+        channels.append(("effort", log.effort, WARNINGS.effort_spike_share))
+    if log.power is not None:
+        channels.append(("power", log.power[:, None], WARNINGS.power_spike_share))
+    for name, values, share in channels:
         rows = np.zeros(len(values), dtype=bool)
         for channel in values.T:
-            rows |= _leaps(channel, _LEAPS[words])
+            rows |= _is_spike(channel, share)
         if rows.any():
             yield (
-                f"The {words} has spikes in {rows.sum()} rows, the first at "
-                f"{log.time[int(np.argmax(rows))]:.4g} s: "
-                "delete these rows, or identify with estimator=irls, which gives outliers less "
-                "weight."
+                f"The {name} has spikes in {rows.sum()} rows, the first at "
+                f"{log.time[int(np.argmax(rows))]:.4g} s: delete these rows, or identify with "
+                "estimator=irls, which gives outliers less weight."
             )
 
 
-def _measured(log: Log) -> Iterator[tuple[str, Array]]:
-    if log.effort is not None:
-        yield "effort", log.effort
-    if log.power is not None:
-        yield "power", log.power[:, None]
-
-
-def _leaps(channel: Array, share: float) -> Mask:
-    """Where a channel (n,) is farther from the median of its neighbours than a share of the range
-    of these medians.
-    """
-    # every process that serves requests would hold it, and only logs are filtered
+def _is_spike(channel: Array, share: float) -> Mask:
+    """Whether samples (n,) differ from the median of their neighbours by a share of the range."""
+    # imported late: only logs are filtered, and every serving process would hold it
     from scipy.ndimage import median_filter
 
-    middle = median_filter(channel, _NEIGHBOURS)
+    middle = median_filter(channel, WARNINGS.spike_neighbours)
     low, high = np.percentile(middle, [1, 99])
-    away = np.abs(channel - middle)
-    return np.asarray(away > max(share * (high - low), _OF_NOISE * float(np.median(away)), 1e-9))
+    distance = np.abs(channel - middle)
+    by_noise = WARNINGS.spike_noise_ratio * float(np.median(distance))
+    return np.asarray(distance > max(share * (high - low), by_noise, 1e-9))
 
 
-def held_warning(words: str, values: Array, v: Array, rate: float) -> list[str]:
-    """What is said of a channel (n, k) that hardly ever changes while joints move at v (n, joints)
-    [rad/s].
+def held_warning(name: str, values: Array, v: Array, rate: float) -> list[str]:
+    """Warning of a channel that hardly ever changes while joints move; empty if there is none.
+
+    Args:
+        name: name of the channel.
+        values: values of the channel (n, k).
+        v: velocities (n, joints) [rad/s].
+        rate: rate of the rows [Hz].
     """
-    moving = np.flatnonzero((np.abs(v[1:]) > _MOVING).any(axis=1)) + 1
+    moving = np.flatnonzero((np.abs(v[1:]) > WARNINGS.moving_speed).any(axis=1)) + 1
     changes = sum(
         int((values[part] != values[part - 1]).any(axis=1).sum())
         for part in np.array_split(moving, 16)
     )
-    if not 0 < changes < (1 - _HELD) * len(moving):
+    if not 0 < changes < (1 - WARNINGS.max_held_share) * len(moving):
         return []
     return [
-        f"The {words} changes only every {len(moving) / changes / rate:.2g} s while the arm moves: "
-        "it is measured less "
-        "often than it is written. Log at the rate at which it is measured."
+        f"The {name} changes only every {len(moving) / changes / rate:.2g} s while the arm moves: "
+        "it is measured less often than it is written. Log at the rate at which it is measured."
     ]
 
 
 def numbers_of_joints(joints: Iterable[int]) -> str:
-    """Joints, as a sentence names them: from 1."""
+    """Numbers of joints in a sentence, from 1."""
     return ", ".join(str(j + 1) for j in joints)

@@ -1,29 +1,47 @@
-"""What no arm has: too large numbers, degrees, leaps and coarse times, which are refused; whole
-turns, which are taken out."""
+"""Refusal of physically impossible numbers in a log, and removal of whole turns."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.evaluate.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.columns import Group
-from joulepath.optimizer.identify.logs.grid import LEAST_RATE, Grid
+from joulepath.optimizer.identify.logs.grid import GRID, Grid
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 
-_MOST_ANGLE = 20 * pi  # rad, ten turns
-_MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
-_MOST_OF_OTHERS = 1e6  # any unit
-_FASTER, _FAST, _SPAN = 3.0, 1.5, 0.1
-"""Times the greatest speed of a joint that no two rows are apart, and no rows that are so far apart
-[s].
-"""
-_SLACK = 0.01  # rad, of coarse sensors
-_TURN = 2 * np.pi
-_MOST_COARSE = 0.01  # fraction of rows with the time of the row before, but other positions
+TWO_PI = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class PlausibilitySettings:
+    """Limits of plausible numbers."""
+
+    max_angle: float = 20 * pi
+    """Largest position: ten turns [rad]."""
+    max_speed: float = MOTION_LIMITS.max_speed
+    """Largest speed [rad/s]."""
+    max_acceleration: float = MOTION_LIMITS.max_acceleration
+    """Largest acceleration [rad/s²]."""
+    max_number: float = 1e6
+    """Largest number of any other channel [unit of the channel]."""
+    max_step_speed: float = 3.0
+    """Largest speed between two rows over the limit of the joint [1]."""
+    max_mean_speed: float = 1.5
+    """Largest speed over a time span over the limit of the joint [1]."""
+    mean_span: float = 0.1
+    """This time span [s]."""
+    position_tolerance: float = 0.01
+    """Change of a position due to the resolution of a coarse sensor [rad]."""
+    max_coarse: float = 0.01
+    """Largest share of rows with the time of the previous row, but other positions [1]."""
+
+
+PLAUSIBLE = PlausibilitySettings()
 
 
 def check_sizes(
@@ -31,15 +49,30 @@ def check_sizes(
     lines: Array,
     names: Sequence[str],
     used: Sequence[int],
-    where: Mapping[Group, Sequence[int]],
-    scales: Mapping[Group, float],
+    where: Mapping[ChannelName, Sequence[int]],
+    scales: Mapping[ChannelName, float],
 ) -> None:
-    """Raises InvalidTable for a number that no arm has: it would spoil everything that is
-    computed."""
+    """Check a block of rows for numbers too large for a robot.
+
+    Args:
+        block: numbers (n, used columns).
+        lines: lines of the rows in the file (n,).
+        names: names of all columns.
+        used: indices of the used columns.
+        where: indices of the columns of each group in the block.
+        scales: factor to SI units of each group.
+
+    Raises:
+        InvalidTable: a number is too large.
+    """
+    limits: Mapping[ChannelName, float] = {
+        "v": PLAUSIBLE.max_speed,
+        "commanded": PLAUSIBLE.max_speed,
+        "a": PLAUSIBLE.max_acceleration,
+    }
     for group, indices in where.items():
-        wrong = np.argwhere(
-            np.abs(block[:, indices]) * scales.get(group, 1.0) > _MOST.get(group, _MOST_OF_OTHERS)
-        )
+        size = np.abs(block[:, indices]) * scales.get(group, 1.0)
+        wrong = np.argwhere(size > limits.get(group, PLAUSIBLE.max_number))
         if len(wrong):
             at, column = wrong[0].tolist()
             row, name = int(lines[at]), names[used[indices[column]]]
@@ -51,11 +84,24 @@ def check_sizes(
 
 
 def check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> None:
-    """Raises InvalidTable if q (n, joints), in lines `rows` (n,), is rather in degrees: far beyond
-    the range of two joints, or by many turns beyond that of one, as the last joint of some arms
-    turns without end."""
+    """Check that positions are not in degrees.
+
+    Positions in degrees are far beyond the range of two joints, or many turns beyond the range of
+    one; the last joint of some arms turns without end.
+
+    Args:
+        q: positions (n, joints) [rad].
+        rows: lines of the rows in the file (n,).
+        robot: the robot.
+        names: names of the columns.
+
+    Raises:
+        InvalidTable: the positions look like degrees.
+    """
     ratios = np.abs(q) / np.maximum(np.abs(robot.limits.q_min), np.abs(robot.limits.q_max))
-    wrong = ((ratios > FAR_OUT).sum(axis=1) > 1) | (np.abs(q) > _MOST_ANGLE).any(axis=1)
+    wrong = ((ratios > MOTION_LIMITS.max_position_ratio).sum(axis=1) > 1) | (
+        np.abs(q) > PLAUSIBLE.max_angle
+    ).any(axis=1)
     if wrong.any():
         at = int(np.argmax(wrong))
         row, name = int(rows[at]), names[int(ratios[at].argmax())]
@@ -67,56 +113,80 @@ def check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> 
         )
 
 
-def joined_turns(q: Array, robot: Robot) -> tuple[Array, list[int]]:
-    """Positions q (m, joints) [rad] without leaps by whole turns, as of sensors that count from 0
-    to 360 degrees, and the joints that had some."""
-    found = list[int]()
+def without_whole_turns(q: Array, robot: Robot) -> tuple[Array, list[int]]:
+    """Remove steps of whole turns, as of sensors that count from 0 to 360 degrees.
+
+    Args:
+        q: positions (m, joints) [rad].
+        robot: the robot.
+
+    Returns:
+        The positions, and the joints with such steps.
+    """
+    joints = list[int]()
     for joint in range(q.shape[1]):
-        turns = np.round(np.diff(q[:, joint]) / _TURN)
+        turns = np.round(np.diff(q[:, joint]) / TWO_PI)
         if turns.any():
-            if not found:
+            if not joints:
                 q = q.copy()
-            found.append(joint)
-            q[1:, joint] -= _TURN * np.cumsum(turns)
+            joints.append(joint)
+            q[1:, joint] -= TWO_PI * np.cumsum(turns)
             middle = 0.5 * (robot.limits.q_min[joint] + robot.limits.q_max[joint])
-            q[:, joint] -= _TURN * np.round(
-                (0.5 * (q[:, joint].min() + q[:, joint].max()) - middle) / _TURN
+            q[:, joint] -= TWO_PI * np.round(
+                (0.5 * (q[:, joint].min() + q[:, joint].max()) - middle) / TWO_PI
             )
-    return q, found
+    return q, joints
 
 
 def check_leaps(q: Array, grid: Grid, lines: Array, robot: Robot, names: Sequence[str]) -> None:
-    """Raises InvalidTable where positions q (m, joints) [rad] of the grid's rows, which are in
-    these lines (m,) of the file, change faster than the arm can."""
-    span = max(1, round(_SPAN * grid.rate))
-    for rows, factor in ((1, _FASTER), (span, _FAST)):
+    """Check that positions do not change faster than the arm can move.
+
+    Args:
+        q: positions (m, joints) of the rows of the grid [rad].
+        grid: the grid.
+        lines: lines of the rows in the file (m,).
+        robot: the robot.
+        names: names of the columns.
+
+    Raises:
+        InvalidTable: a position changes too fast.
+    """
+    span = max(1, round(PLAUSIBLE.mean_span * grid.rate))
+    for rows, factor in ((1, PLAUSIBLE.max_step_speed), (span, PLAUSIBLE.max_mean_speed)):
         steps = np.maximum(grid.at[rows:] - grid.at[:-rows], rows / grid.rate)
-        for joint, most in enumerate(robot.limits.v_max.tolist()):
+        for joint, v_max in enumerate(robot.limits.v_max.tolist()):
             change = np.abs(q[rows:, joint] - q[:-rows, joint])
-            wrong = change > factor * most * steps + _SLACK
+            wrong = change > factor * v_max * steps + PLAUSIBLE.position_tolerance
             if wrong.any():
                 at = int(np.argmax(wrong))
                 row, name = int(lines[at + rows]), names[joint]
                 raise InvalidTable(
                     f"{name} changes by {change[at]:.3g} rad from line {lines[at]} to line {row}, "
-                    "within "
-                    f"{steps[at]:.3g} s, and the joint does at most {most:.3g} rad/s. Delete a "
-                    "wrong row; divide the "
-                    "log where rows were left out; give positions in rad (or units=deg), and times "
-                    "in seconds, "
-                    f"{LEAST_RATE:g} rows per second or more.",
+                    f"within {steps[at]:.3g} s, and the joint does at most {v_max:.3g} rad/s. "
+                    "Delete a wrong row; divide the log where rows were left out; give positions "
+                    f"in rad (or units=deg), and times in seconds, {GRID.min_rate:g} rows per "
+                    "second or more.",
                     row,
                     name,
                 )
 
 
 def check_coarse(q: Array, grid: Grid, column: str) -> None:
-    """Raises InvalidTable if rows of q (n, joints), all that were read, differ and have the same
-    time.
+    """Check that rows with equal times have equal positions.
+
+    Args:
+        q: positions (n, joints) of all rows of the file [rad].
+        grid: the grid.
+        column: name of the column of times.
+
+    Raises:
+        InvalidTable: too many rows with equal times differ.
     """
-    again = np.setdiff1d(np.arange(len(q)), grid.kept)
-    coarse = int((q[again] != q[again - 1]).any(axis=1).sum()) if len(again) else 0
-    if coarse > _MOST_COARSE * len(q):
+    repeated = np.setdiff1d(np.arange(len(q)), grid.kept)
+    coarse = 0
+    if len(repeated):
+        coarse = int((q[repeated] != q[repeated - 1]).any(axis=1).sum())
+    if coarse > PLAUSIBLE.max_coarse * len(q):
         raise InvalidTable(
             f"{column} repeats itself in {coarse} of {len(q)} rows that differ: write times with "
             "more digits.",

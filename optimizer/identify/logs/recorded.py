@@ -1,4 +1,4 @@
-"""The energy that was measured in each segment of a log."""
+"""Energy measured in each segment of a log."""
 
 from __future__ import annotations
 
@@ -12,20 +12,25 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.evaluate.recording import BLOCK
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.problem.arm import Arm
 
 
 @dataclass(frozen=True)
 class MeasuredEnergy:
-    """Electrical energy by what was measured during this part of a log."""
+    """Electrical energy by measurement during a part of a log."""
 
     electrical: Joules | None
     """Integral of the logged power of the arm's bus. Null if the log has none."""
     by_efforts: Joules | None
     """Integral of the power that the motors take by their logged currents or torques, with the
     losses of the robot's drives and its idle power. Null if the log has none."""
+
+    @property
+    def best(self) -> float | None:
+        """The energy by the logged power, or else by the efforts [J]."""
+        return self.by_efforts if self.electrical is None else self.electrical
 
     def joined(self, other: MeasuredEnergy) -> MeasuredEnergy:
         """The energies of two parts together."""
@@ -35,7 +40,9 @@ class MeasuredEnergy:
 
 
 def measured(log: Log, arm: Arm) -> list[MeasuredEnergy]:
-    """What was measured in each segment of `log.recording()` of `arm`; empty if nothing was."""
+    """Measured energy of each segment of `log.recording()`; empty if neither power nor efforts were
+    logged.
+    """
     drives = arm.drives
     torque = None
     if log.effort is not None and log.effort_meaning != "external":
@@ -64,16 +71,14 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
         return MeasuredEnergy(drawn, None)
     q, v, a = (channel[rows].astype(float) for channel in (log.q, log.v, log.a))
     tau = plant.torques(q, v, a)
-    # what is left of the measured torque when the motion is made is lost
-    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, lost=torque[rows] - tau)
+    # the measured torque beyond that of the motion is lost
+    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, tau_friction=torque[rows] - tau)
     return MeasuredEnergy(drawn, energy.electrical.total)
 
 
 def _pieces(first: int, last: int) -> Iterator[tuple[int, int]]:
-    """Rows from `first` to `last` in pieces of BLOCK rows at most, so that memory does not grow
-    with a log's length.
-    """
-    return pairwise([*range(first, last, BLOCK), last])
+    """Ranges of limited size, so that memory does not grow with the length of a log."""
+    return pairwise([*range(first, last, MOTION_LIMITS.block_rows), last])
 
 
 def _sum(one: float | None, other: float | None) -> float | None:

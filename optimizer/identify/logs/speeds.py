@@ -1,10 +1,9 @@
-"""Whether logged speeds are those of the logged positions, and logged accelerations those of the
-speeds.
-"""
+"""Consistency of logged speeds with positions, and of logged accelerations with speeds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,117 +13,136 @@ from joulepath.optimizer.identify.logs.columns import Columns
 from joulepath.optimizer.identify.logs.filters import derivative, filtered, low_passed, noise
 from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
 
-_MISFIT = 0.2
-"""Greatest deviation of logged speeds from the change of the positions, over the speeds, as
-standard deviations.
-"""
-_LEAST_SPEED = 0.01  # rad/s, standard deviation from which on speeds are compared
-_MOST_FACTOR = 1.5  # by which all speeds may be larger or smaller than the positions say
-_LEAST_LIKE = 0.8  # correlation of speeds that are the right ones, but for their unit or sign
-_SLOW = 5.0  # Hz, of accelerations that are compared: faster ones of noisy speeds are noise
-_LEAST_ACCELERATION = 0.05  # rad/s², standard deviation from which on they are compared
-_MOST_MISFIT, _OF_NOISE = 0.5, 4.0  # of their deviation, and of what the noise of the speeds makes
+
+@dataclass(frozen=True)
+class SpeedSettings:
+    """Tolerances between logged derivatives and derivatives of logged channels."""
+
+    max_speed_error: float = 0.2
+    """Standard deviation of the error of logged speeds over that of the speeds, above which they
+    are replaced [1]."""
+    min_speed: float = 0.01
+    """Standard deviation of speeds, below which they are not compared [rad/s]."""
+    max_factor: float = 1.5
+    """Common factor between all logged speeds and the derivatives of the positions, from which on
+    the log is refused [1]."""
+    min_correlation: float = 0.8
+    """Correlation of speeds that are right up to a factor [1]."""
+    acceleration_cutoff: float = 5.0
+    """Cut-off frequency of compared accelerations [Hz]; above it, derivatives of noisy speeds are
+    noise."""
+    min_acceleration: float = 0.05
+    """Standard deviation of accelerations, below which they are not compared [rad/s²]."""
+    noise_ratio: float = 4.0
+    """Standard deviation of accelerations over their noise, below which they are not compared
+    [1]."""
+    max_acceleration_error: float = 0.5
+    """Standard deviation of the error of logged accelerations over that of the accelerations, above
+    which they are replaced [1]."""
+
+
+SPEEDS = SpeedSettings()
 
 
 def speeds_of(
     q: Array, v: Array | None, a: Array | None, columns: Columns, rate: float, remarks: list[str]
 ) -> tuple[Array, Array]:
-    """Speeds and accelerations, made from positions q (n, joints) where they were not logged, or
-    are not theirs.
+    """Speeds and accelerations, derived where they were not logged or are inconsistent.
 
-    What is not theirs goes to `remarks`. Raises InvalidTable if all speeds are off by one factor.
+    Args:
+        q: positions (n, joints) [rad].
+        v: logged speeds (n, joints) [rad/s], or None.
+        a: logged accelerations (n, joints) [rad/s²], or None.
+        columns: columns of the file.
+        rate: rate of the rows [Hz].
+        remarks: list to receive a warning of inconsistent channels.
+
+    Raises:
+        InvalidTable: all speeds are wrong by a common factor.
     """
     wrong: list[int] = []
     if v is None:
         v = derivative(q, rate)
-    elif wrong := _misfitting(q, v, rate, [columns.names[k] for k in columns.groups["v"]]):
+    elif wrong := _inconsistent_speeds(q, v, rate, [columns.names[k] for k in columns.groups["v"]]):
         v = _replaced(v, derivative(q[:, wrong], rate), wrong)
         remarks.append(
             f"The speeds of joints {numbers_of_joints(wrong)} do not fit their positions, and are "
-            "made from these: "
-            "check units, signs and the order of the columns."
+            "made from these: check units, signs and the order of the columns."
         )
     if a is None:
         return v, derivative(v, rate)
-    odd = _misfitting_accelerations(v, a, rate)
+    odd = _inconsistent_accelerations(v, a, rate)
     if set(odd) - set(wrong):
         remarks.append(
             f"The accelerations of joints {numbers_of_joints(odd)} are not the change of their "
-            "speeds, and are made "
-            "from these: check units, signs and the order of the columns, or leave them out."
+            "speeds, and are made from these: check units, signs and the order of the columns, "
+            "or leave them out."
         )
     odd = sorted({*odd, *wrong})
     return v, _replaced(a, derivative(v[:, odd], rate), odd) if odd else a
 
 
 def _replaced(values: Array, by: Array, joints: list[int]) -> Array:
-    """The channels (n, joints) with those of some joints replaced `by` others (n, len(joints))."""
+    """Channels (n, joints) with some joints replaced by other channels (n, len(joints))."""
     values = values.copy()
     values[:, joints] = by
     return values
 
 
-def _misfitting(q: Array, v: Array, rate: float, names: Sequence[str]) -> list[int]:
-    """The joints whose speeds v (n, joints) [rad/s], from columns `names`, are not the change of q
-    (n, joints) [rad].
+def _inconsistent_speeds(q: Array, v: Array, rate: float, names: Sequence[str]) -> list[int]:
+    """Joints with speeds (n, joints) [rad/s] that are not the derivatives of positions (n, joints).
 
-    Raises InvalidTable if all of them are off by one factor, as in another unit or with the other
-    sign.
+    Raises:
+        InvalidTable: all speeds are wrong by a common factor, as in another unit or of opposite
+            sign.
     """
     wrong, factors, moved = list[int](), list[float](), list[int]()
     for joint in range(q.shape[1]):
-        smooth, change = (
-            low_passed(v[:, [joint]], rate)[:, 0],
-            derivative(q[:, [joint]], rate)[:, 0],
-        )
-        size, real = float(smooth.std()), float(change.std())
-        if max(size, real) > _LEAST_SPEED and float((smooth - change).std()) > _MISFIT * max(
-            size, real
-        ):
+        logged = low_passed(v[:, [joint]], rate)[:, 0]
+        derived = derivative(q[:, [joint]], rate)[:, 0]
+        size, real = float(logged.std()), float(derived.std())
+        largest, error = max(size, real), float((logged - derived).std())
+        if largest > SPEEDS.min_speed and error > SPEEDS.max_speed_error * largest:
             wrong.append(joint)
-        if real > _LEAST_SPEED:
+        if real > SPEEDS.min_speed:
             moved.append(joint)
-            alike = (
-                abs(float(((smooth - smooth.mean()) * (change - change.mean())).mean()))
-                > _LEAST_LIKE * size * real
-            )
-            if alike or size == 0:
-                factors.append(float((smooth * change).mean() / (change**2).mean()))
+            product = (logged - logged.mean()) * (derived - derived.mean())
+            correlated = abs(float(product.mean())) > SPEEDS.min_correlation * size * real
+            if correlated or size == 0:
+                factors.append(float((logged * derived).mean() / (derived**2).mean()))
     if moved and len(factors) == len(moved):
         _check_factor(float(np.median(factors)), names[moved[0]])
     return wrong
 
 
 def _check_factor(factor: float, name: str) -> None:
-    if 1 / _MOST_FACTOR < factor < _MOST_FACTOR:
+    """Check the factor between logged speeds and derivatives of the positions."""
+    if 1 / SPEEDS.max_factor < factor < SPEEDS.max_factor:
         return
-    what = f"{factor:.3g} times the change of the positions"
+    relation = f"{factor:.3g} times the change of the positions"
     if factor == 0:
-        what = "0, while the positions change"
+        relation = "0, while the positions change"
     raise InvalidTable(
-        f"The speeds, as {name}, are {what}: give both in one unit (rad and rad/s, or degrees with "
-        "units=deg) and with "
-        "one sign, or leave the columns of speeds and accelerations out, and they are made from "
-        "the positions.",
+        f"The speeds, as {name}, are {relation}: give both in one unit (rad and rad/s, or degrees "
+        "with units=deg) and with one sign, or leave the columns of speeds and accelerations out, "
+        "and they are made from the positions.",
         None,
         name,
     )
 
 
-def _misfitting_accelerations(v: Array, a: Array, rate: float) -> list[int]:
-    """The joints whose accelerations a (n, joints) [rad/s²] are not the change of v (n, joints)
-    [rad/s].
-    """
-    highest, wrong = min(_SLOW, rate / 5), list[int]()
+def _inconsistent_accelerations(v: Array, a: Array, rate: float) -> list[int]:
+    """Joints with accelerations (n, joints) [rad/s²] that are not the derivatives of speeds."""
+    cutoff, wrong = min(SPEEDS.acceleration_cutoff, rate / 5), list[int]()
     for joint in range(v.shape[1]):
-        speed = filtered(v[:, joint], rate, highest)
-        change = np.gradient(speed, 1 / rate)
+        speed = filtered(v[:, joint], rate, cutoff)
+        derived = np.gradient(speed, 1 / rate)
         by_noise = (
-            2 * np.pi * highest * np.sqrt(highest / rate) * float(noise(v[:, [joint]], rate)[0])
+            2 * np.pi * cutoff * np.sqrt(cutoff / rate) * float(noise(v[:, [joint]], rate)[0])
         )
-        size = float(change.std())
-        if size > max(_LEAST_ACCELERATION, _OF_NOISE * by_noise):
-            error = filtered(a[:, joint], rate, highest) - change
-            if float(error.std()) > _MOST_MISFIT * size:
+        size = float(derived.std())
+        if size > max(SPEEDS.min_acceleration, SPEEDS.noise_ratio * by_noise):
+            error = filtered(a[:, joint], rate, cutoff) - derived
+            if float(error.std()) > SPEEDS.max_acceleration_error * size:
                 wrong.append(joint)
     return wrong

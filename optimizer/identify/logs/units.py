@@ -1,58 +1,64 @@
-"""Units that a log names, in its header as `q1 [deg]` or in a line below it: they must be those
-that it is read in.
-"""
+"""Units that a log names, in its header as `q1 [deg]` or in a line below the header."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.columns import Columns, Group
-from joulepath.optimizer.identify.logs.head import number
+from joulepath.optimizer.identify.logs.columns import Columns
+from joulepath.optimizer.identify.logs.head import is_number
+from joulepath.optimizer.identify.logs.log_formats import ChannelName
 
 _DIGITS = frozenset("0123456789")
-_BEGINS = re.compile(r"[-+]?[.,]?[0-9]")  # of what is rather a number, or several
-_ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
+_NUMBER_START = re.compile(r"[-+]?[.,]?[0-9]")
 
 
 def _unit(pattern: str) -> re.Pattern[str]:
     return re.compile(rf"\W*(?:{pattern})\W*", re.IGNORECASE)
 
 
-_DEGREES, _RADIANS = (
-    _unit(r"(?:deg|degrees?|°|º)(?:\W.*|s|s\^?2)?"),
-    _unit(r"(?:rad|radians?)(?:\W.*|s|s\^?2)?"),
-)
-_OTHER_UNITS: tuple[tuple[tuple[Group, ...], re.Pattern[str], re.Pattern[str], str, str], ...] = (
-    (_ANGLES, _DEGREES, _RADIANS, "units=deg", "units=rad"),
-    (
+@dataclass(frozen=True)
+class _UnitCheck:
+    """Units of some groups of columns."""
+
+    groups: tuple[ChannelName, ...]
+    other: re.Pattern[str]
+    """Units other than the SI unit."""
+    si: re.Pattern[str]
+    """The SI unit."""
+    other_remedy: str
+    """Option for columns in another unit."""
+    si_remedy: str
+    """Option for columns in the SI unit."""
+
+
+_DEGREES = _unit(r"(?:deg|degrees?|°|º)(?:\W.*|s|s\^?2)?")
+_RADIANS = _unit(r"(?:rad|radians?)(?:\W.*|s|s\^?2)?")
+_UNIT_CHECKS = (
+    _UnitCheck(("q", "v", "a", "commanded"), _DEGREES, _RADIANS, "units=deg", "units=rad"),
+    _UnitCheck(
         ("current",),
         _unit(r"ma|milliamp\w*"),
         _unit(r"a|amps?|amperes?"),
         "current_units=mA",
         "current_units=A",
     ),
-    (("power",), _unit("[km]w"), _unit("w"), "W", "W"),
-    (("torque", "effort"), _unit(r"[km]n\W?m|n\W?mm"), _unit(r"n\W?m"), "N·m", "N·m"),
+    _UnitCheck(("power",), _unit("[km]w"), _unit("w"), "W", "W"),
+    _UnitCheck(("torque", "effort"), _unit(r"[km]n\W?m|n\W?mm"), _unit(r"n\W?m"), "N·m", "N·m"),
 )
-"""Of groups: units that are not SI, the SI unit, and what to give where the one or the other is not
-read as it is.
-"""
 
 
-def parted(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Names of columns without the units behind them, in brackets, and these units; empty where
-    there are none.
-    """
-    found = [_parted(name) for name in names]
-    return [bare for bare, _ in found], [unit for _, unit in found]
+def split_units(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Names of columns without units in brackets, and the units; empty for a name without unit."""
+    parts = [_split_unit(name) for name in names]
+    return [bare for bare, _ in parts], [unit for _, unit in parts]
 
 
-def _parted(name: str) -> tuple[str, str]:
-    """A name without the unit in brackets behind it, and the unit; a number there is that of a
-    joint.
-    """
+def _split_unit(name: str) -> tuple[str, str]:
+    """A name without its unit in brackets, and the unit; a number in brackets is that of a
+    joint."""
     begin = max(name.rfind("["), name.rfind("("))
     bare, unit = name[: max(begin, 0)].rstrip(), name[begin + 1 : -1]
     is_unit = bare and name.endswith((")", "]")) and not {*unit} & {*")]"}
@@ -62,22 +68,34 @@ def _parted(name: str) -> tuple[str, str]:
 
 
 def is_line_of_units(cells: Sequence[str]) -> bool:
-    """Whether a line below the header has words alone, which are units then."""
-    said = [cell.strip().strip("\"'").lower() for cell in cells]
-    words = any(cell not in ("", "nan", "none", "null") for cell in said)
-    return words and not any(_BEGINS.match(cell) or number(cell) for cell in said)
+    """Whether a line below the header contains words only."""
+    texts = [cell.strip().strip("\"'").lower() for cell in cells]
+    words = any(cell not in ("", "nan", "none", "null") for cell in texts)
+    return words and not any(_NUMBER_START.match(cell) or is_number(cell) for cell in texts)
 
 
 def check_units(
-    columns: Columns, said: Sequence[str], row: int, scales: Mapping[Group, float]
+    columns: Columns, units: Sequence[str], row: int, scales: Mapping[ChannelName, float]
 ) -> None:
-    """Raises InvalidTable where units (one per column of the file, of line `row`) are not those
-    that the columns are read in: SI units, apart from the groups that `scales` turns into them."""
-    for groups, other, si, of_other, of_si in _OTHER_UNITS:
-        for group in groups:
-            alien, remedy = (other, of_other) if scales.get(group, 1.0) == 1.0 else (si, of_si)
+    """Check that named units are the units in which the columns are read.
+
+    Args:
+        columns: columns of the file.
+        units: unit of each column, or empty.
+        row: number of the line with the units.
+        scales: factor to SI units of each group; 1 for SI units.
+
+    Raises:
+        InvalidTable: a column has another unit.
+    """
+    for check in _UNIT_CHECKS:
+        for group in check.groups:
+            is_si = scales.get(group, 1.0) == 1.0
+            wrong, remedy = (
+                (check.other, check.other_remedy) if is_si else (check.si, check.si_remedy)
+            )
             for k in columns.groups.get(group, ()):
-                if k < len(said) and alien.fullmatch(said[k].strip()):
+                if k < len(units) and wrong.fullmatch(units[k].strip()):
                     name = columns.names[k]
                     raise InvalidTable(
                         f"{name} is in another unit by line {row} than it is read in: give "

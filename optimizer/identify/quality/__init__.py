@@ -1,1 +1,1 @@
-"""Quality of a fit: intervals, errors on held-out moves, excitation, advice."""
+"""Quality of a fit: intervals of energies, errors on held-out moves, excitation, advice."""

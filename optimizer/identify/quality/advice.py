@@ -1,30 +1,28 @@
-"""Which figure to measure better: the one that would take the largest share of the energy's
-variance away.
+"""The figure whose better measurement would reduce the uncertainty of energies most.
 
-If a figure were known, the variance would fall by the square of its correlation with the energy.
-Errors of figures make up for each other: a figure's own term of the variance can be larger than the
-whole, and tells less.
+If a figure were known, the variance of the energy would fall by the share of their squared
+correlation. Errors of figures compensate each other, so the term of a single figure in the variance
+can exceed the whole variance and is no measure.
 
-
-The standard deviation of a figure falls with the square root of the time in motion (Verdonck 2004,
-Radkhah 2007: what a log tells of a figure depends on how it excites it). To halve it takes four
-times the moves.
+The standard deviation of a figure falls with the square root of the time in motion: halving it
+takes four times the moves (Verdonck 2004, Radkhah 2007: the excitation determines how well a log
+determines a figure).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
-from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, Fitted
+from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, FitResult
 from joulepath.optimizer.identify.results import Advice
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-_DO = {
+_LOGGING_ADVICE = {
     "coulomb": "Log slow and fast moves of this joint, in both directions.",
     "viscous": "Log moves of this joint near its greatest speed.",
     "load": "Log slow moves of this joint with the arm stretched out and folded, or with a "
@@ -38,51 +36,59 @@ _DO = {
     "torques.",
     "inverter_linear": "Log the arm at rest in poses of different load, with its power.",
 }
-STEP = 1e-4
 
 
-def advice_of(fitted: Fitted, rows: Rows) -> Advice | None:
-    """The figure to measure, for motions like those of the logs; None without power figures to
-    weigh them by.
-    """
+@dataclass(frozen=True)
+class AdviceSettings:
+    """Settings of the advice."""
+
+    step: float = 1e-4
+    """Step of a figure for finite differences of the energy [SI unit]."""
+
+
+ADVICE = AdviceSettings()
+
+
+def advice_of(fitted: FitResult, rows: Rows) -> Advice | None:
+    """The figure to measure better for motions like those of the rows; None without variance."""
     names, covariance = fitted.estimate.names, fitted.estimate.covariance
-    known = [k for k, (name, _) in enumerate(names) if name in _DO]
-    gradient = np.array([slope(fitted.arm, rows, *names[k]) for k in known])
+    known = [k for k, (name, _) in enumerate(names) if name in _LOGGING_ADVICE]
+    gradient = np.array([energy_derivative(fitted.arm, rows, *names[k]) for k in known])
     part = covariance[np.ix_(known, known)]
-    together, total = part @ gradient, float(gradient @ part @ gradient)
+    with_energy, total = part @ gradient, float(gradient @ part @ gradient)
     if not np.isfinite(total) or total <= 0:
         return None
     own = np.diag(part)
-    shares = np.where(own > 0, together**2 / np.where(own > 0, own * total, 1.0), 0.0)
+    shares = np.where(own > 0, with_energy**2 / np.where(own > 0, own * total, 1.0), 0.0)
     worst = int(np.argmax(shares))
     name, joint = names[known[worst]]
-    return Advice(name, joint, float(shares[worst]), _DO[name])
+    return Advice(name, joint, float(shares[worst]), _LOGGING_ADVICE[name])
 
 
-def slope(arm: FittedArm, rows: Rows, name: str, joint: int | None) -> float:
-    """Derivative of the energy [J] of the rows by a figure."""
-    return (_energy(_changed(arm, name, joint, STEP), rows) - _energy(arm, rows)) / STEP
+def energy_derivative(arm: FittedArm, rows: Rows, name: str, joint: int | None) -> float:
+    """Derivative of the energy [J] of the rows by one figure, by finite differences."""
+    changed = _changed(arm, name, joint, ADVICE.step)
+    return (changed.energy(rows) - arm.energy(rows)) / ADVICE.step
 
 
-def _energy(arm: FittedArm, rows: Rows) -> float:
-    return float(rows.weight @ arm.power(rows)[0])
-
-
-def _changed(arm: FittedArm, name: str, joint: int | None, by: float) -> FittedArm:
-    electrics, changed = arm.electrics, dict[str, Any]()
+def _changed(arm: FittedArm, name: str, joint: int | None, step: float) -> FittedArm:
+    """The arm with one figure larger by a step."""
+    figures = arm.power_parameters
     if name == LINK_MASS_SCALE:
-        return replace(arm, links=arm.links + by)
+        return replace(arm, link_scale=arm.link_scale + step)
     if joint is None:
-        return replace(arm, electrics=replace(electrics, idle=electrics.idle + by))
-    if name in ("copper", "inverter_linear"):
-        part = name.removesuffix("_linear")
-        changed[part] = _raised(getattr(electrics, part), joint, by)
-        return replace(arm, electrics=replace(electrics, **changed))
-    changed[name] = _raised(getattr(arm, name), joint, by)
+        return replace(arm, power_parameters=replace(figures, idle=figures.idle + step))
+    if name == "copper":
+        copper = _increased(figures.copper, joint, step)
+        return replace(arm, power_parameters=replace(figures, copper=copper))
+    if name == "inverter_linear":
+        inverter = _increased(figures.inverter, joint, step)
+        return replace(arm, power_parameters=replace(figures, inverter=inverter))
+    changed: dict[str, Any] = {name: _increased(getattr(arm, name), joint, step)}
     return replace(arm, **changed)
 
 
-def _raised(values: Array, joint: int, by: float) -> Array:
+def _increased(values: Array, joint: int, step: float) -> Array:
     result = values.copy()
-    result[joint] += by
+    result[joint] += step
     return result

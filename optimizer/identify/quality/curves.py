@@ -1,8 +1,9 @@
-"""Measured and modelled torques and powers over time, of so many rows as a picture shows."""
+"""Measured and modelled torques and powers over time, thinned for plots."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,36 +13,48 @@ from joulepath.optimizer.identify.fits.fitting import motor_torque
 from joulepath.optimizer.identify.results import Curves
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-MOST = 1500
-"""Rows of all parts together, but for one more of each part."""
+
+@dataclass(frozen=True)
+class CurveSettings:
+    """Settings of the curves."""
+
+    max_rows: int = 1500
+    """Rows of all parts together; every part may exceed its share by one row."""
+
+
+CURVES = CurveSettings()
 
 
 def curves_of(parts: Sequence[tuple[FittedArm, Rows, Mask]], threshold: float) -> Curves:
-    """Every k-th of the rows in motion that each part's mask (n,) allows, with what its arm makes
-    of them.
+    """Measured and modelled curves of rows in motion.
 
-    The torque of a joint is modelled where it moves faster than the threshold [rad/s].
+    Args:
+        parts: arm, rows and mask (n,) of the rows to show.
+        threshold: speed above which the torque of a joint is modelled [rad/s].
     """
     allowed = [mask & ~rows.rest for _, rows, mask in parts]
-    every = max(1, -(-sum(int(mask.sum()) for mask in allowed) // MOST))
-    found = list[Curves]()
+    every = max(1, -(-sum(int(mask.sum()) for mask in allowed) // CURVES.max_rows))
+    curves = list[Curves]()
     for (arm, rows, _), mask in zip(parts, allowed, strict=True):
-        thin = np.zeros_like(mask)
-        thin[np.flatnonzero(mask)[::every]] = True
-        shown = rows.take(thin)
+        thinned = np.zeros_like(mask)
+        thinned[np.flatnonzero(mask)[::every]] = True
+        shown = rows.take(thinned)
         torque = motor_torque(arm, shown)
-        told = np.isfinite(torque) & (np.abs(shown.v) > threshold)
-        found.append(
+        moving = np.isfinite(torque) & (np.abs(shown.v) > threshold)
+        curves.append(
             Curves(
                 log=shown.log,
                 move=shown.move,
                 time=shown.time,
                 torque=torque,
-                modelled_torque=np.where(told, arm.torque(shown), np.nan),
+                modelled_torque=np.where(moving, arm.torque(shown), np.nan),
                 power=shown.power,
                 modelled_power=np.where(np.isfinite(shown.power), arm.power(shown)[0], np.nan),
             )
         )
     return Curves(
-        **{name: np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])}
+        **{
+            name: np.concatenate([getattr(part, name) for part in curves])
+            for name in vars(curves[0])
+        }
     )

@@ -1,9 +1,8 @@
-"""The interval of an energy: from the figures' covariance, the effect of the move and that of the
-day.
+"""Interval of a predicted energy: errors of the figures, of the move and of the day.
 
-The figures' covariance alone is far too narrow. A move has an error of its own that no figures of
-this model can express, and friction differs from day to day. Both are measured: the first on moves
-that were left out of the fit, the second on logs of different days.
+The covariance of the figures alone is far too narrow. Every move has an error that no figures of
+the model can express, and friction differs from day to day. Both errors are measured: the first
+with moves left out of the fit, the second with logs of different days.
 """
 
 from __future__ import annotations
@@ -18,40 +17,45 @@ from joulepath.models.robot import Array
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.estimates.grouped import jackknife
-from joulepath.optimizer.identify.fits.fitting import Fitted
+from joulepath.optimizer.identify.fits.fitting import FitResult
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# relative standard deviation of friction from day to day, where there are too few logs to measure
-# it: 2 to 4 % in twelve logs of a UR10e over two months
-SESSION = 0.03
-LEAST_SESSIONS = 3
-# share of the square of the moves' mean errors that is their own at least
-LEAST_OWN = 0.1
-# median of the square of a normal error over its variance
-MEDIAN_SQUARE = 0.455
+
+@dataclass(frozen=True)
+class IntervalSettings:
+    """Settings of the interval of a predicted energy."""
+
+    default_session_sd: float = 0.03
+    """Relative standard deviation of friction from day to day if there are few logs [1]: 2 to 4 %
+    in twelve logs of a UR10e over two months."""
+    min_sessions: int = 3
+    """Logs below which the default is taken."""
+    min_own_share: float = 0.1
+    """Smallest share of the moves' own errors in the square of their mean errors [1]."""
+    median_square: float = 0.455
+    """Median of the square of a standard normal variable [1]."""
+
+
+INTERVAL = IntervalSettings()
 
 
 @dataclass(frozen=True)
 class Spread:
-    """`move` [W]: standard deviation of the mean power of a move. `session` [1]: relative, of
-    friction between days.
-    """
+    """Errors that the figures of the model do not express."""
 
-    move: float
-    session: float
+    move_sd: float
+    """Standard deviation of the mean power of a move [W]."""
+    session_sd: float
+    """Relative standard deviation of friction between days [1]."""
 
 
-def energy_sd(fitted: Fitted, spread: Spread, rows: Rows) -> tuple[float, float]:
-    """Energy [J] of rows on the bus, and its standard deviation [J]."""
-    energy = _energy(fitted.arm, rows)
+def energy_sd(fitted: FitResult, spread: Spread, rows: Rows) -> tuple[float, float]:
+    """Predicted energy of rows and its standard deviation [J]."""
+    energy = fitted.arm.energy(rows)
     time = float(rows.weight.sum())
-    session = spread.session * (_energy(without_friction(fitted.arm), rows) - energy)
-    variance = figures_variance(fitted, rows) + (time * spread.move) ** 2 + session**2
+    session = spread.session_sd * (without_friction(fitted.arm).energy(rows) - energy)
+    variance = figures_variance(fitted, rows) + (time * spread.move_sd) ** 2 + session**2
     return energy, float(np.sqrt(variance))
-
-
-def _energy(arm: FittedArm, rows: Rows) -> float:
-    return float(rows.weight @ arm.power(rows)[0])
 
 
 def without_friction(arm: FittedArm) -> FittedArm:
@@ -60,83 +64,87 @@ def without_friction(arm: FittedArm) -> FittedArm:
     return replace(arm, coulomb=zero, viscous=zero, load=zero, curved=zero, couplings=())
 
 
-def figures_variance(fitted: Fitted, rows: Rows) -> float:
-    """Variance [J²] of the energy by the errors of the figures: those of the fit, and of the
-    robot's own beneath it.
-    """
-    without = np.array([[_energy(arm, rows)] for arm in fitted.varied])
+def figures_variance(fitted: FitResult, rows: Rows) -> float:
+    """Variance [J²] of the energy due to errors of fitted figures and of the robot's own figures
+    assumed for the fit."""
+    by_rows = np.array([[arm.energy(rows)] for arm in fitted.row_error_arms])
     power, slope = fitted.arm.power(rows)
     gradient = rows.weight @ slope
-    # what the electrics make of an error of held friction, they make up for in the energy; links
-    # load other motions otherwise
-    tilted = fitted.tilted if fitted.arm.bodies is not None else ()
-    by_links = sum((_energy(arm, rows) - float(rows.weight @ power)) ** 2 for arm in tilted)
-    return float(jackknife(without)[0, 0] + gradient @ fitted.drift @ gradient + by_links)
+    # the power parameters compensate an error of held friction in any motion, but not an error of
+    # the links, which load other motions differently
+    arms = fitted.prior_error_arms if fitted.arm.link_change is not None else ()
+    by_links = sum((arm.energy(rows) - float(rows.weight @ power)) ** 2 for arm in arms)
+    return float(
+        jackknife(by_rows)[0, 0] + gradient @ fitted.prior_covariance @ gradient + by_links
+    )
 
 
-def spread_of(fitted: Fitted, rows: Rows) -> Spread:
-    """From the rows of the fit: each move is predicted by the figures without its cluster."""
-    return Spread(_move_sd(fitted, rows), session_sd(sessions(fitted, rows)))
+def spread_of(fitted: FitResult, rows: Rows) -> Spread:
+    """Spread of the moves and sessions of the fitted rows."""
+    return Spread(_move_sd(fitted, rows), session_sd(session_factors(fitted, rows)))
 
 
-def _move_sd(fitted: Fitted, rows: Rows) -> float:
-    """Standard deviation [W] of the mean error of a move, less what the figures' own errors make of
-    it.
+def _move_sd(fitted: FitResult, rows: Rows) -> float:
+    """Standard deviation [W] of the mean error of a move beyond the errors of the figures.
+
+    Each move is predicted by the arm fitted without its cluster.
     """
     use = np.isfinite(rows.power) & ~rows.rest
     squares, explained = list[float](), list[float]()
     for cluster in np.unique(fitted.clusters.of_row[use]):
-        for move in np.unique(rows.move[use & (fitted.clusters.of_row == cluster)]):
-            part = rows.take(use & (rows.move == move) & (fitted.clusters.of_row == cluster))
+        in_cluster = use & (fitted.clusters.of_row == cluster)
+        for move in np.unique(rows.move[in_cluster]):
+            part = rows.take(in_cluster & (rows.move == move))
             time = float(part.weight.sum())
-            blind, slope = fitted.without[cluster].power(part)
+            predicted, slope = fitted.arms_without_cluster[cluster].power(part)
             gradient = part.weight @ slope
-            lost = float(gradient @ fitted.lost[cluster] @ gradient)
-            squares.append((float(part.weight @ (part.power - blind)) / time) ** 2)
-            explained.append((figures_variance(fitted, part) + lost) / time**2)
+            increase = float(gradient @ fitted.covariance_increase[cluster] @ gradient)
+            squares.append((float(part.weight @ (part.power - predicted)) / time) ** 2)
+            explained.append((figures_variance(fitted, part) + increase) / time**2)
     if not squares:
         return 0.0
     own = own_variance(np.array(squares), np.maximum(explained, 0.0))
-    # of few moves, as wide as Student's distribution is
+    # few moves are a small sample: the interval is as wide as that of Student's distribution
     return float(np.sqrt(own) * stdtrit(len(squares), 0.95) / P95)
 
 
 def own_variance(squares: Array, explained: Array) -> float:
-    """The variance τ² that errors have besides `explained` variances (n,), from their `squares`
-    (n,).
+    """Variance τ² of errors beyond their explained variances.
 
-    Σ squares / (explained + τ²) = n: an error that can be explained by much tells little of τ²
-    (Paule and Mandel 1982). A small share of the errors is their own at least.
+    τ² solves Σ squares / (explained + τ²) = n, so errors with a large explained variance have
+    little influence (Paule and Mandel 1982). A small share of the errors always counts as own.
+
+    Args:
+        squares: squared errors (n,).
+        explained: explained variances (n,).
     """
 
     def excess(own: float) -> float:
         return float((squares / (explained + own)).sum()) - len(squares)
 
-    least, most = LEAST_OWN * float(np.median(squares)) / MEDIAN_SQUARE, float(squares.sum())
+    least = INTERVAL.min_own_share * float(np.median(squares)) / INTERVAL.median_square
     if least <= 0 or excess(least) <= 0:
         return least
-    return float(brentq(excess, least, most))
+    return float(brentq(excess, least, float(squares.sum())))
 
 
-def sessions(fitted: Fitted, rows: Rows) -> tuple[float, ...]:
-    """The size of each log's friction relative to the fit's, from its torques; empty without
-    torques.
-    """
+def session_factors(fitted: FitResult, rows: Rows) -> tuple[float, ...]:
+    """Friction of each log over the fitted friction, from torques; empty without torques."""
     effort = rows.effort * fitted.arm.torque_constant if rows.current else rows.effort
     friction = fitted.arm.friction_torque(rows) - fitted.arm.offset
     rest = effort - fitted.arm.link_torque(rows) - fitted.arm.offset
     use = np.isfinite(effort)
-    found = list[float]()
+    factors = list[float]()
     for log in np.unique(rows.log):
         chosen = use & (rows.log == log)[:, None]
         square = float((friction[chosen] ** 2).sum())
         if square > 0:
-            found.append(float((friction[chosen] * rest[chosen]).sum() / square))
-    return tuple(found)
+            factors.append(float((friction[chosen] * rest[chosen]).sum() / square))
+    return tuple(factors)
 
 
-def session_sd(found: tuple[float, ...]) -> float:
-    """Relative standard deviation of friction between logs; the usual one where there are too few
-    of them.
-    """
-    return float(np.std(found, ddof=1)) if len(found) >= LEAST_SESSIONS else SESSION
+def session_sd(factors: tuple[float, ...]) -> float:
+    """Relative standard deviation of friction between logs; a default for few logs."""
+    if len(factors) < INTERVAL.min_sessions:
+        return INTERVAL.default_session_sd
+    return float(np.std(factors, ddof=1))

@@ -1,12 +1,14 @@
-"""What the links' inertials are made of, what logs tell of them, and whether they are real."""
+"""Base parameters of the links, their excitation by logs, and their physical consistency."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.arm.pseudo_inertia import pseudo_inertias
@@ -14,17 +16,24 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Physical, Structure
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-# of the largest singular value of the scaled columns: below it, a combination of base parameters is
-# not excited
-LEAST_EXCITED = 1e-3
-# of the largest entry: rounding of a solver's least eigenvalue
-ROUNDED = 1e-8
+
+@dataclass(frozen=True)
+class StructureSettings:
+    """Tolerances of excitation and physical consistency."""
+
+    min_excitation: float = 1e-3
+    """Singular value of the columns of unit length over the largest one, up to which a combination
+    of base parameters is not excited [1]."""
+    eigenvalue_tolerance: float = 1e-8
+    """Negative eigenvalue of a pseudo-inertia over its largest entry, up to which it is a rounding
+    error of the solver [1]."""
+
+
+STRUCTURE = StructureSettings()
 
 
 def structure_of(robot: Robot, rows: Rows, options: IdentificationOptions) -> Structure:
-    """Standard and base parameters of bodies and, if they are fitted, rotors; what the rows tell of
-    the bodies'.
-    """
+    """Parameters of bodies and fitted rotors, and their excitation by the rows."""
     rotors = "rotor" in options.fit
     base = base_parameters(robot.model, rotors)
     condition, excited = None, None
@@ -38,27 +47,35 @@ def structure_of(robot: Robot, rows: Rows, options: IdentificationOptions) -> St
             gram += chosen.T @ chosen
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         values = np.sqrt(np.maximum(np.linalg.eigvalsh(gram / np.outer(scale, scale)), 0.0))
-        excited = int((values > LEAST_EXCITED * values[-1]).sum())
+        excited = int((values > STRUCTURE.min_excitation * values[-1]).sum())
         condition = float(values[-1] / values[0]) if values[0] > 0 else np.inf
-    return Structure((BODY + rotors) * robot.nq, base.count, base.expressions, condition, excited)
-
-
-def physical_of(robot: Robot, arm: FittedArm) -> Physical | None:
-    """Whether fitted links are real bodies; None where the robot's own are kept."""
-    if arm.bodies is None:
-        return None
-    matrices = pseudo_inertias(body_parameters(robot.model) + arm.bodies)
-    least = np.linalg.eigvalsh(matrices)[:, 0]
-    return Physical(
-        bool((least >= -ROUNDED * np.abs(matrices).max(axis=(1, 2))).all()), np.asarray(least)
+    return Structure(
+        (PARAMETERS_PER_BODY + rotors) * robot.nq, base.count, base.expressions, condition, excited
     )
 
 
+def physical_of(robot: Robot, arm: FittedArm) -> Physical | None:
+    """Physical consistency of fitted links; None where the robot's own are kept."""
+    if arm.link_change is None:
+        return None
+    matrices = pseudo_inertias(body_parameters(robot.model) + arm.link_change)
+    least = np.linalg.eigvalsh(matrices)[:, 0]
+    tolerance = STRUCTURE.eigenvalue_tolerance * np.abs(matrices).max(axis=(1, 2))
+    return Physical(bool((least >= -tolerance).all()), np.asarray(least))
+
+
 def inertials_of(robot: Robot, change: Array) -> dict[str, Array]:
-    """Figures of links whose parameters are changed by (10 nq,): mass (nq,) [kg], center_of_mass
-    (nq, 3) [m], and inertia (nq, 6) [kg·m²] about it as ixx, ixy, ixz, iyy, iyz, izz; all in the
-    link frames."""
-    parameters = (body_parameters(robot.model) + change).reshape(-1, BODY)
+    """Inertials of links with changed parameters.
+
+    Args:
+        robot: the robot with its own links.
+        change: change (10 nq,) of the links' parameters.
+
+    Returns:
+        `mass` (nq,) [kg], `center_of_mass` (nq, 3) [m], and `inertia` (nq, 6) [kg·m²] about it as
+        ixx, ixy, ixz, iyy, iyz, izz; all in the link frames.
+    """
+    parameters = (body_parameters(robot.model) + change).reshape(-1, PARAMETERS_PER_BODY)
     bodies = [pin.Inertia.FromDynamicParameters(each) for each in parameters]
     rows, columns = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)
     return {

@@ -1,4 +1,4 @@
-"""How well figures predict rows that no fit has seen."""
+"""Errors of figures on rows that were not part of their fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm
-from joulepath.optimizer.identify.fits.fitting import Fitted, motor_torque
+from joulepath.optimizer.identify.fits.fitting import FitResult, motor_torque
 from joulepath.optimizer.identify.quality.curves import curves_of
 from joulepath.optimizer.identify.quality.interval import Spread, energy_sd
 from joulepath.optimizer.identify.results import PowerErrors, Prediction, TorqueErrors, Validation
@@ -19,16 +19,20 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """Rows, and a fit that has seen none of them."""
+    """Held-out rows, and a fit to other rows."""
 
-    fitted: Fitted
+    fitted: FitResult
     spread: Spread
     rows: Rows
 
 
 def validate(robot: Robot, folds: Sequence[Fold], threshold: float) -> Validation:
-    """Errors of fitted and of the robot's own figures; `threshold` [rad/s] is the speed above which
-    a joint moves.
+    """Errors of fitted figures and of the robot's own figures.
+
+    Args:
+        robot: the robot with its own figures.
+        folds: held-out rows with their fits.
+        threshold: smallest speed of a moving joint [rad/s].
     """
     own, power = own_arm(robot), any(np.isfinite(fold.rows.power).any() for fold in folds)
     covered = [coverage(fold) for fold in folds]
@@ -60,7 +64,12 @@ def _prediction(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> Pr
 
 
 def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> TorqueErrors:
-    """Errors of predicted torques."""
+    """Errors of predicted torques.
+
+    Args:
+        folds: arms with the rows to predict.
+        threshold: smallest speed of a moving joint [rad/s].
+    """
     parts = [
         (motor_torque(arm, rows), arm.torque(rows), rows.v, rows.weight) for arm, rows in folds
     ]
@@ -76,7 +85,7 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         )
 
     arm = folds[0][0]
-    copper = arm.electrics.copper / arm.torque_constant**2
+    copper = arm.power_parameters.copper / arm.torque_constant**2
     work, predicted_work = (
         float(weight @ (each * v).sum(axis=1)) for each in (measured, predicted)
     )
@@ -93,7 +102,11 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
 
 
 def power_errors(folds: Sequence[tuple[Rows, Array]]) -> PowerErrors:
-    """Errors of predicted powers (n,) [W]: of rows in motion, and of the energy of each move."""
+    """Errors of predicted power over rows in motion, and of the energy of each move.
+
+    Args:
+        folds: rows, with predicted powers (n,) [W].
+    """
     errors, relative = list[Array](), list[Array]()
     for rows, predicted in folds:
         use = np.isfinite(rows.power) & ~rows.rest
@@ -116,13 +129,17 @@ def power_errors(folds: Sequence[tuple[Rows, Array]]) -> PowerErrors:
 
 
 def coverage(fold: Fold) -> tuple[Array, Array]:
-    """Whether each move's measured energy lies between P5 and P95 (moves,), and half that interval
-    (moves,) [%].
+    """Intervals of the energies of the moves of a fold.
+
+    Returns:
+        Whether each move's measured energy lies between P5 and P95 (moves,), and half the width of
+        the interval (moves,) [%].
     """
-    inside, half, rows = list[bool](), list[float](), fold.rows
-    for move in np.unique(rows.move[~rows.rest & np.isfinite(rows.power)]):
-        part = rows.take((rows.move == move) & ~rows.rest & np.isfinite(rows.power))
+    inside, half_widths = list[bool](), list[float]()
+    rows = fold.rows.take(~fold.rows.rest & np.isfinite(fold.rows.power))
+    for move in np.unique(rows.move):
+        part = rows.take(rows.move == move)
         energy, sd = energy_sd(fold.fitted, fold.spread, part)
         inside.append(abs(float(part.weight @ part.power) - energy) <= P95 * sd)
-        half.append(100 * P95 * sd / energy)
-    return np.array(inside), np.array(half)
+        half_widths.append(100 * P95 * sd / energy)
+    return np.array(inside), np.array(half_widths)

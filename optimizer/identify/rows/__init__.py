@@ -1,1 +1,1 @@
-"""What fits see of logs: rows, the moves and motions that they belong to, and what is held out."""
+"""Rows for the fits: averaged samples of logs, their moves and motions, clusters and splits."""

@@ -1,61 +1,74 @@
-"""Clusters of rows: what is left out as one to see how well an estimate is known."""
+"""Clusters of rows: the units that the jackknife leaves out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.identify.estimates.grouped import IntArray
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
-Numbers = npt.NDArray[np.int64]
 
-# fewer motions than this tell little of the spread: single moves take their place; if they are as
-# few, seconds of them
-LEAST_GROUPS = 5
-SECOND = 1.0
-# more clusters than this tell nothing more and take time
-MOST_CLUSTERS = 60
-# of residuals that are rounding
-LEAST_VARIANCE = 1e-9
+@dataclass(frozen=True)
+class ClusterSettings:
+    """Settings of the clusters of rows."""
+
+    min_count: int = 5
+    """Motions, or moves, below which the next smaller unit serves as cluster: fewer clusters do
+    not measure a spread."""
+    max_count: int = 60
+    """Largest number of clusters; more cost time and do not improve the spread."""
+    slice_duration: float = 1.0
+    """Duration of the smallest unit, a slice of a move [s]."""
+    variance_floor: float = 1e-9
+    """Variance added to that of residuals, which may be rounding errors alone [unit²]."""
+
+
+CLUSTERS = ClusterSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
-    """The cluster (n,) of each row, numbered from 0 to `count` - 1."""
+    """Partition of rows: the cluster `of_row` (n,) of every row, from 0 to `count` - 1."""
 
-    of_row: Numbers
+    of_row: IntArray
     count: int
 
 
-def clusters_of(rows: Rows) -> Clusters:
-    """Motions as clusters, or moves where there are few motions, or seconds where there are few
-    moves.
-    """
+def clusters_of(rows: Rows, settings: ClusterSettings = CLUSTERS) -> Clusters:
+    """Partition rows into motions; with few motions into moves, with few moves into slices."""
     unit = rows.group
-    if len(rows.groups) < LEAST_GROUPS:
+    if len(rows.groups) < settings.min_count:
         unit = rows.move
-        if len(np.unique(rows.move[~rows.rest])) < LEAST_GROUPS:
-            unit = np.floor(np.cumsum(rows.weight) / SECOND).astype(np.int64)
+        if len(np.unique(rows.move[~rows.rest])) < settings.min_count:
+            unit = np.floor(np.cumsum(rows.weight) / settings.slice_duration).astype(np.int64)
     number = np.unique(unit, return_inverse=True)[1]
     count = int(number.max()) + 1
-    if count > MOST_CLUSTERS:
-        number, count = number * MOST_CLUSTERS // count, MOST_CLUSTERS
+    if count > settings.max_count:
+        number, count = number * settings.max_count // count, settings.max_count
     return Clusters(np.asarray(number, dtype=np.int64), count)
 
 
-def shared_variance(residuals: Array, weight: Array, clusters: Clusters) -> float:
-    """Variance of a row (n,) that tells as much as if all rows were independent, in the unit of the
-    residuals squared.
+def effective_variance(residuals: Array, weight: Array, clusters: Clusters) -> float:
+    """Variance of a row as if all rows were independent.
 
-    The rows of a move share an error that the model cannot express. The mean residual of a cluster
-    of n rows has then a larger variance than 1/n of a row's.
+    The rows of a move share an error that the model does not express, so the mean residual of a
+    cluster of n rows has a larger variance than 1/n of the variance of a row. The returned
+    variance makes both agree.
+
+    Args:
+        residuals: residuals (n,).
+        weight: weights (n,) of the rows.
+        clusters: partition of the rows.
+
+    Returns:
+        The variance, in the squared unit of the residuals.
     """
     weighted = np.sqrt(weight) * residuals
     size = np.bincount(clusters.of_row, minlength=clusters.count)
     total = np.bincount(clusters.of_row, weighted, minlength=clusters.count)
     shared = float(np.mean(total[size > 0] ** 2 / size[size > 0]))
-    alone = float(weighted @ weighted / max(weight.sum(), 1e-300))
-    return max(shared, alone) + LEAST_VARIANCE
+    independent = float(weighted @ weighted / max(weight.sum(), 1e-300))
+    return max(shared, independent) + CLUSTERS.variance_floor

@@ -1,8 +1,7 @@
-"""The rows that fits see: logs averaged over short blocks of samples, with the moves that they
-belong to.
+"""Rows for the fits: logs averaged over short blocks of samples, with their moves.
 
-An average over a block is a low-pass filter. It is the same for torques and for motion, so that it
-adds no phase.
+An average over a block is a low-pass filter. It is the same for torques and for motion, so it adds
+no phase.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.deadline import checkpoint
@@ -23,64 +21,85 @@ from joulepath.optimizer.dynamics.link_regressor import (
     rigid_torques,
 )
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identify.estimates.grouped import IntArray
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.rows.same_motion import groups_of_motions
 
-Numbers = npt.NDArray[np.int64]
 
-# rate [Hz] of the rows: motions of arms and their torques are slower by far
-RATE = 100.0
-# of all logs together, and with regressors, of 3 kB each: residuals of neighbours are so alike that
-# more tell no more
-MOST_ROWS, MOST_REGRESSORS = 20_000, 8_000
-# rad; a joint that stays within it over a move does not move
-STILL = 1e-3
-# rad/s; a slower joint that stands still has no speed but noise
-SLOW = 0.02
-# times the power at rest by the robot's own figures that no mean of a log reaches, nor the same
-# part of it
-FAR_POWER = 20.0
-# a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s]
-# between them is left out
-LONGEST, BLOCK, PAUSE = 7.5, 5.0, 0.5
+@dataclass(frozen=True)
+class RowSettings:
+    """Settings of the averaging of logs into rows."""
+
+    rate: float = 100.0
+    """Rate of the rows [Hz]; motions of arms and their torques are slower by far."""
+    max_rows: int = 20_000
+    """Largest number of rows of all logs; neighbouring residuals are so correlated that more rows
+    carry no more information."""
+    max_regressor_rows: int = 8_000
+    """Largest number of rows with regressors, of 3 kB each."""
+    still_range: float = 1e-3
+    """Range of a joint over a move up to which the joint stands still [rad]."""
+    still_speed: float = 0.02
+    """Speed of a joint that stands still, up to which the speed is noise [rad/s]."""
+    max_power_ratio: float = 20.0
+    """Ratio of the mean power of a log to the robot's own power at rest, or of the latter to the
+    former, from which on the channel is not the power of the bus [1]."""
+    max_move_duration: float = 7.5
+    """Duration above which a move is cut into blocks; each block then counts as a move [s]."""
+    block_duration: float = 5.0
+    """Duration of a block [s]."""
+    block_gap: float = 0.5
+    """Time left out between two blocks [s]."""
+
+
+ROWS = RowSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows (n, nq) of all logs: q [rad], v [rad/s], a [rad/s²], `rigid` torques of links and load
-    [N·m], and those of the `links` alone.
-
-    `time` (n,) [s] is the middle of a row, from the start of its log. `effort` (n, nq) is the motor
-    torque [N·m], or the motor current [A] if `current`; `power` (n,) [W] and `temperature` (n, nq)
-    [°C]; all of them NaN where not logged. `log`, `move` (n,) are numbers from 0; moves count
-    through all logs, and rows at rest belong to the move before. `group` (n,): moves along the same
-    motion share one. `weight` (n,) [s] is the time that a row stands for, `regressor` (n, nq, 10
-    nq) is that of the links, None where their inertials are taken as known. `wrench` (n, 6) [N,
-    N·m] acts beneath the base, NaN where not logged. `wrench_regressor` (n, 6, 10 nq) is that of
-    the links; with it, the wrench is without what the arm carries.
-    """
+    """Rows of all logs, n in number; a channel is NaN where it was not logged."""
 
     time: Array
+    """Middle of a row (n,), from the start of its log [s]."""
     q: Array
+    """Positions (n, nq) [rad]."""
     v: Array
+    """Velocities (n, nq) [rad/s]."""
     a: Array
+    """Accelerations (n, nq) [rad/s²]."""
     rigid: Array
-    links: Array
+    """Rigid-body torques (n, nq) of links and load [N·m]."""
+    link_torques: Array
+    """Rigid-body torques (n, nq) of the links alone [N·m]."""
     effort: Array
+    """Motor torques (n, nq) [N·m], or motor currents [A] if `current`."""
     power: Array
+    """Power on the arm's bus (n,) [W]."""
     temperature: Array
+    """Temperatures of the joints (n, nq) [°C]."""
     wrench: Array
-    log: Numbers
-    move: Numbers
-    group: Numbers
+    """Force and torque (n, 6) beneath the base [N, N·m]; without the part of the load if there is
+    a `wrench_regressor`."""
+    log: IntArray
+    """Number of the log (n,), from 0."""
+    move: IntArray
+    """Number of the move (n,), from 0 through all logs; rows at rest belong to the previous
+    move."""
+    group: IntArray
+    """Number of the motion (n,); moves along the same motion share it."""
     rest: Mask
+    """Whether the arm rests (n,)."""
     weight: Array
+    """Time that a row stands for (n,) [s]."""
     current: bool
+    """Whether `effort` is a current."""
     regressor: Array | None = None
+    """Regressor (n, nq, 10 nq) of the links' torques; None where the inertials count as known."""
     wrench_regressor: Array | None = None
+    """Regressor (n, 6, 10 nq) of the links' wrench beneath the base."""
 
     def take(self, rows: Mask) -> Rows:
-        """Only these rows (n,)."""
+        """The chosen rows (n,) only."""
         parts = {
             name: value[rows]
             for name, value in self.__dict__.items()
@@ -89,18 +108,26 @@ class Rows:
         return Rows(**parts, current=self.current)
 
     @property
-    def groups(self) -> Numbers:
-        """Numbers of the groups in which something moves, in order."""
+    def groups(self) -> IntArray:
+        """Sorted numbers of the motions."""
         return np.unique(self.group[~self.rest])
 
 
 def rows_of(
     robot: Robot, logs: Sequence[Log], regressor: bool = False, wrench: bool = False
 ) -> Rows:
-    """The rows of logs of one robot, with the regressors of its links or without.
+    """Average logs of one robot into rows.
 
-    Raises InvalidProblem if a log is of another robot, has other joints, or a power that is none of
-    the arm's bus."""
+    Args:
+        robot: the robot of all logs.
+        logs: at least one log.
+        regressor: whether to compute the regressors of the links' torques.
+        wrench: whether to compute the regressors of the wrench beneath the base.
+
+    Raises:
+        InvalidProblem: a log is of another robot, has another number of joints, or its power is
+            not the power of the arm's bus.
+    """
     if not logs:
         raise InvalidProblem("logs", "logs must name at least one log.")
     for log in logs:
@@ -114,11 +141,11 @@ def rows_of(
         raise InvalidProblem(
             "logs", f"The efforts of the logs must mean the same, not {' and '.join(meanings)}."
         )
-    every = _stride(logs, MOST_REGRESSORS if regressor else MOST_ROWS)
+    stride = _stride(logs, ROWS.max_regressor_rows if regressor else ROWS.max_rows)
     pieces, moves, number = [], 0, 0
     for number, log in enumerate(logs):
         checkpoint()
-        piece, moves = _rows_of_log(robot, log, number, moves, every)
+        piece, moves = _rows_of_log(robot, log, number, moves, stride)
         if regressor:
             model = robot.model.copy()
             model.gravity.linear = log.gravity
@@ -126,14 +153,14 @@ def rows_of(
         if wrench:
             piece |= _wrench(robot, log, piece)
         pieces.append(piece)
-    # taken out one by one, and not copied if there is nothing to join: regressors are large
+    # popped one by one, and not copied if there is one piece only: regressors are large
     joined = {name: _joined([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
     joined["group"] = groups_of_motions(joined["q"], joined["v"], joined["move"], joined["rest"])
     return Rows(**joined, current=meanings == ["current"])
 
 
 def _wrench(robot: Robot, log: Log, rows: dict[str, Array]) -> dict[str, Array]:
-    """The regressor of the wrench beneath the base, and the wrench without what the arm carries."""
+    """Regressor of the wrench beneath the base, and the wrench without the part of the load."""
     load = log.payload
     loaded = robot.loaded_model(load.mass, load.com, load.inertia, log.gravity)
     regressor = base_wrench_regressor(loaded, rows["q"], rows["v"], rows["a"])
@@ -146,14 +173,13 @@ def _check_power(robot: Robot, log: Log) -> None:
     if log.power is None or expected <= 0 or not np.isfinite(log.power).any():
         return
     mean = float(np.nanmean(log.power, dtype=float))
-    if not expected / FAR_POWER < mean < FAR_POWER * expected:
+    if not expected / ROWS.max_power_ratio < mean < ROWS.max_power_ratio * expected:
         raise InvalidProblem(
             "logs",
             f"The power of {'a log' if log.name is None else log.name} is {mean:.3g} W in the "
-            f"mean, and {robot.name} "
-            f"draws some {expected:.3g} W at rest: this is not the power of the arm's bus in W. "
-            "Log it in W, with the "
-            "sign that is positive where the arm draws power, or leave its column out.",
+            f"mean, and {robot.name} draws some {expected:.3g} W at rest: this is not the power "
+            "of the arm's bus in W. Log it in W, with the sign that is positive where the arm "
+            "draws power, or leave its column out.",
         )
 
 
@@ -161,20 +187,29 @@ def _joined(parts: list[Any]) -> Any:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def _stride(logs: Sequence[Log], most: int) -> int:
-    """Every how many rows of `RATE` one is taken, so that there are at most so many."""
-    rows = sum(log.duration * min(log.rate, RATE) for log in logs)
-    return max(1, int(np.ceil(rows / most)))
+def _stride(logs: Sequence[Log], max_rows: int) -> int:
+    """Smallest k such that every k-th row of all logs makes at most `max_rows` rows."""
+    rows = sum(log.duration * min(log.rate, ROWS.rate) for log in logs)
+    return max(1, int(np.ceil(rows / max_rows)))
 
 
 def _rows_of_log(
-    robot: Robot, log: Log, number: int, moves: int, every: int
+    robot: Robot, log: Log, number: int, moves: int, stride: int
 ) -> tuple[dict[str, Array], int]:
-    """The rows of one log by name, and the number of moves up to its end; `moves` is that of the
-    logs before.
+    """Channels of the rows of one log.
+
+    Args:
+        robot: the robot.
+        log: the log.
+        number: number of the log.
+        moves: number of moves of all previous logs.
+        stride: every how many rows one is kept.
+
+    Returns:
+        The channels by name, and the number of moves including those of this log.
     """
-    size = max(1, round(log.rate / RATE))
-    starts, of_move, rest = _blocks(log, size, every)
+    size = max(1, round(log.rate / ROWS.rate))
+    starts, of_move, rest = _blocks(log, size, stride)
     if not len(starts):
         raise InvalidProblem("logs", "A log has no move that is as long as a row.")
 
@@ -185,8 +220,8 @@ def _rows_of_log(
 
     joints = (robot.nq,)
     q, v, a = (mean(channel, joints) for channel in (log.q, log.v, log.a))
-    # where the command rests, the arm may still come to rest
-    still = _still(q, of_move, rest) & (np.abs(v) < SLOW)
+    # the arm may still settle after its command has come to rest
+    still = _standing_joints(q, of_move, rest) & (np.abs(v) < ROWS.still_speed)
     v[still], a[still] = 0.0, 0.0
     payload = log.payload
     model = robot.loaded_model(payload.mass, payload.com, payload.inertia, log.gravity)
@@ -202,7 +237,7 @@ def _rows_of_log(
         "v": v,
         "a": a,
         "rigid": rigid,
-        "links": links,
+        "link_torques": links,
         "effort": mean(log.effort, joints),
         "power": mean(log.power, ()),
         "temperature": mean(log.temperature, joints),
@@ -210,30 +245,29 @@ def _rows_of_log(
         "log": np.full(len(starts), number),
         "move": of_move + moves,
         "rest": rest,
-        "weight": np.full(len(starts), size * every / log.rate),
+        "weight": np.full(len(starts), size * stride / log.rate),
     }, moves + int(of_move.max()) + 1
 
 
-def _still(q: Array, move: Numbers, rest: Mask) -> Mask:
-    """Where a joint stands still (n, nq): in rests, and in moves over which it stays in place. Its
-    speed is noise.
-    """
+def _standing_joints(q: Array, move: IntArray, rest: Mask) -> Mask:
+    """Whether a joint stands still (n, nq): in rests, and in moves without its motion."""
     still = np.repeat(rest[:, None], q.shape[1], axis=1)
     for number in np.unique(move):
         rows = np.flatnonzero((move == number) & ~rest)
         if rows.size:
-            still[np.ix_(rows, np.flatnonzero(np.ptp(q[rows], axis=0) < STILL))] = True
+            joints = np.flatnonzero(np.ptp(q[rows], axis=0) < ROWS.still_range)
+            still[np.ix_(rows, joints)] = True
     return still
 
 
-def _blocks(log: Log, size: int, every: int) -> tuple[Numbers, Numbers, Mask]:
-    """First samples of the blocks, the move of each from 0, and whether the arm rests there."""
-    starts, of_move, rest = list[Numbers](), list[Numbers](), list[Mask]()
+def _blocks(log: Log, size: int, stride: int) -> tuple[IntArray, IntArray, Mask]:
+    """First sample of every row, its move from 0, and whether the arm rests."""
+    starts, of_move, rest = list[IntArray](), list[IntArray](), list[Mask]()
     number = 0
     for move in log.moves:
         for part in _parts(log, move):
-            first = np.arange(part.start, part.end - size + 1, size * every)
-            # the rest before the first move belongs to it, any other to the move before
+            first = np.arange(part.start, part.end - size + 1, size * stride)
+            # a rest belongs to the previous move; the first rest belongs to the first move
             number += not part.at_rest
             starts.append(first)
             of_move.append(np.full(len(first), max(number - 1, 0)))
@@ -244,9 +278,9 @@ def _blocks(log: Log, size: int, every: int) -> tuple[Numbers, Numbers, Mask]:
 
 
 def _parts(log: Log, move: LogMove) -> list[LogMove]:
-    """The move, or the blocks of a long one."""
-    if move.at_rest or move.end - move.start <= LONGEST * log.rate:
+    """The move itself, or the blocks of a long move."""
+    if move.at_rest or move.end - move.start <= ROWS.max_move_duration * log.rate:
         return [move]
-    length, pause = int(BLOCK * log.rate), int(PAUSE * log.rate)
-    starts = range(move.start, move.end - length // 2, length + pause)
+    length, gap = int(ROWS.block_duration * log.rate), int(ROWS.block_gap * log.rate)
+    starts = range(move.start, move.end - length // 2, length + gap)
     return [LogMove(start, min(start + length, move.end), False) for start in starts]

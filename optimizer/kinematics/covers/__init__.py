@@ -1,1 +1,1 @@
-"""Boxes that cover all configurations that reach a pose."""
+"""Boxes that cover all configurations of a pose, for lower bounds."""

@@ -1,15 +1,16 @@
-"""Boxes of joint positions, narrowed to what can reach a pose whose orientation is free in part.
+"""Boxes of joint positions, narrowed to the configurations that reach a pose with a partly free
+orientation.
 
-For q in a box with middle c and half sides h, δ = q - c: the TCP is at p(q) = p(c) + J δ + r with
-|r| ≤ 1/2 Σ_jk L_max(j,k) h_j h_k. The columns of J are z_j × (p - o_j), and L_j bounds the distance
-of the TCP from joint j's origin o_j: the second derivative of p by q_j and q_k, j ≤ k, is z_j ×
-(z_k × (p - o_k)). In the same way the tool's axis is a(q) = a(c) + A δ + s with columns z_j × a and
-|s| ≤ 1/2 (Σ_j h_j)², and lies within 2 sin(half_angle / 2) of the cone's direction.
+For q in a box with middle c and half sides h, let δ = q - c. The TCP is at p(q) = p(c) + J δ + r
+with |r| ≤ 1/2 Σ_jk L_max(j,k) h_j h_k. The columns of J are z_j × (p - o_j), and L_j bounds the
+distance of the TCP from the origin o_j of joint j: the second derivative of p by q_j and q_k, j ≤
+k, is z_j × (z_k × (p - o_k)). Likewise the tool's axis is a(q) = a(c) + A δ + s with columns z_j ×
+a and |s| ≤ 1/2 (Σ_j h_j)², and lies within 2 sin(half_angle / 2) of the cone's direction.
 
 So J δ = e - r, with e the error of the middle, is a linear system with a bounded right-hand side.
-For any matrix P, with M = P J, M_jj δ_j = (P e)_j - (P r)_j - Σ_{k≠j} M_jk δ_k: an interval for δ_j
-(the Krawczyk operator without its restriction to square systems; Neumaier, Interval methods for
-systems of equations, 1990, chapter 5). A box whose intervals are empty holds no configuration that
+For any matrix P, with M = P J, M_jj δ_j = (P e)_j - (P r)_j - Σ_{k≠j} M_jk δ_k gives an interval
+for δ_j (the Krawczyk operator without its restriction to square systems; Neumaier, Interval methods
+for systems of equations, 1990, chapter 5). A box with an empty interval holds no configuration that
 reaches the pose.
 """
 
@@ -28,33 +29,48 @@ from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
-# what intervals are widened by, for rounding [rad]
-ROUNDING = 1e-9
-# added to the diagonal of J Jᵀ [m²]: P is near the pseudoinverse, and bounded where J loses its
-# rank
-DAMPING = 1e-6
-# least diagonal of M with which an interval is divided by it
-LEAST_DIAGONAL = 1e-6
-# a cone narrower than this is held by its axis, too [rad]; a wider one leaves the axis next to free
-WIDEST_CONE = np.pi / 2
+
+@dataclass(frozen=True)
+class PoseBoxSettings:
+    """Settings of the narrowing."""
+
+    rounding: float = 1e-9
+    """Margin of intervals for rounding [rad]."""
+    damping: float = 1e-6
+    """Addition to the diagonal of J Jᵀ [m²]: P is near the pseudoinverse, and bounded where J loses
+    its rank.
+    """
+    least_diagonal: float = 1e-6
+    """Smallest diagonal element of M by which an interval is divided."""
+    widest_cone: float = np.pi / 2
+    """Half angle of a cone below which the tool's axis is bounded, too [rad]; a wider cone leaves
+    the axis nearly free.
+    """
+
+
+SETTINGS = PoseBoxSettings()
 
 
 @dataclass(frozen=True)
 class Placed:
-    """An arm at the middles of b boxes: joint axes and origins (b, nq, 3), the TCP and the tool's
-    axis (b, 3) in the base frame, and the centre of mass (b, nq, 3) of each link."""
+    """Arm at the middles of b boxes, in the base frame."""
 
     axes: Array
+    """Joint axes, shape (b, nq, 3)."""
     origins: Array
+    """Origins of the joints, shape (b, nq, 3) [m]."""
     tcp: Array
+    """Position of the TCP, shape (b, 3) [m]."""
     tool_axis: Array
+    """Tool's axis, shape (b, 3)."""
     centres: Array
+    """Centre of mass of each link, shape (b, nq, 3) [m]."""
 
 
 @dataclass(frozen=True)
 class PoseBoxes:
-    """What of boxes of joint positions (b, nq) [rad] can reach a pose. Holds for every chain of
-    revolute joints.
+    """Narrowing of boxes of joint positions (b, nq) [rad] to a pose, for every chain of revolute
+    joints.
     """
 
     arm: Arm
@@ -80,24 +96,26 @@ class PoseBoxes:
 
     @cached_property
     def levers(self) -> Array:
-        """Greatest distance (nq,) [m] of the TCP from each joint's origin."""
+        """Largest distance (nq,) [m] of the TCP from the origin of each joint."""
         lengths = np.linalg.norm(self._placements[1:, :3, 3], axis=1)
         steps = np.append(lengths, np.linalg.norm(self._T_last_tcp[:3, 3]))
         return np.asarray(np.cumsum(steps[::-1])[::-1])
 
     @cached_property
     def free(self) -> Mask:
-        """Joints (nq,) that move neither the TCP nor the tool's axis: the last one, if both lie on
-        its axis.
+        """Mask (nq,) of the joints that move neither the TCP nor the tool's axis: the last one, if
+        both lie on its axis.
         """
         free = np.zeros(len(self.levers), dtype=bool)
         across = np.hypot(*self._T_last_tcp[:2, 3])
         tilted = np.hypot(*(self._T_last_tcp[:3, :3] @ self.pose.axis)[:2])
-        free[-1] = across < ROUNDING and (tilted < ROUNDING or self.pose.half_angle >= WIDEST_CONE)
+        free[-1] = across < SETTINGS.rounding and (
+            tilted < SETTINGS.rounding or self.pose.half_angle >= SETTINGS.widest_cone
+        )
         return free
 
     def placed(self, q: Array) -> Placed:
-        """The arm at q (b, nq) [rad]."""
+        """Arm at q (b, nq) [rad]."""
         frames = link_frames(self._placements, q)[:, 1:]
         tcp = frames[:, -1] @ self._T_last_tcp
         centres = (
@@ -112,43 +130,51 @@ class PoseBoxes:
         )
 
     def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Mask]:
-        """Middles and half sides (b, nq) [rad] of boxes that hold all that can reach the pose;
-        which (b,) are not empty.
+        """Narrows boxes to the configurations that reach the pose.
 
-        A box is never wider than the one that it is made of.
+        Args:
+            centre: middles of the boxes, shape (b, nq) [rad].
+            half: half sides, shape (b, nq) [rad].
+
+        Returns:
+            Middles and half sides (b, nq) [rad] of boxes within the given ones that hold all these
+            configurations, and a mask (b,) of the non-empty boxes.
         """
         at = self.placed(centre)
         J, error, slack = self._system(at, half)
-        # damped pseudoinverse; the narrowing holds for any matrix
-        P = np.linalg.solve(J @ J.transpose(0, 2, 1) + DAMPING * np.eye(J.shape[1]), J).transpose(
-            0, 2, 1
-        )
+        # Damped pseudoinverse; the narrowing holds for any matrix.
+        P = np.linalg.solve(
+            J @ J.transpose(0, 2, 1) + SETTINGS.damping * np.eye(J.shape[1]), J
+        ).transpose(0, 2, 1)
         M = P @ J
         diagonal = np.einsum("bjj->bj", M)
-        safe = diagonal > LEAST_DIAGONAL
+        safe = diagonal > SETTINGS.least_diagonal
         divisor = np.where(safe, diagonal, 1.0)
         beside = np.einsum("bjk,bk->bj", np.abs(M), half) - np.abs(diagonal) * half
         blurred = np.einsum("bjm,bm->bj", np.abs(P), slack)
         middle = np.einsum("bjm,bm->bj", P, error) / divisor
-        reach = (beside + blurred) / divisor + ROUNDING
+        reach = (beside + blurred) / divisor + SETTINGS.rounding
         low = np.where(safe, np.maximum(-half, middle - reach), -half)
         high = np.where(safe, np.minimum(half, middle + reach), half)
-        # each equation by itself, too
+        # Each equation by itself.
         possible = (
-            np.abs(error) <= np.einsum("bmj,bj->bm", np.abs(J), half) + slack + ROUNDING
+            np.abs(error) <= np.einsum("bmj,bj->bm", np.abs(J), half) + slack + SETTINGS.rounding
         ).all(axis=1)
         possible &= (low <= high).all(axis=1)
         return centre + (low + high) / 2, np.maximum(high - low, 0.0) / 2, possible
 
     def _system(self, at: Placed, half: Array) -> tuple[Array, Array, Array]:
-        """J (b, m, nq), the error (b, m) of the middles, and what bounds each row's remainder (b,
-        m).
+        """Linear system of the boxes.
+
+        Returns:
+            J (b, m, nq), the error (b, m) of the middles, and a bound (b, m) of the remainder of
+            each row.
         """
         arms = at.tcp[:, None] - at.origins
         J = np.cross(at.axes, arms).transpose(0, 2, 1)
         error = self.pose.position - at.tcp
         slack = np.repeat(second_order(self.levers, half)[:, None], 3, axis=1)
-        if self.pose.half_angle >= WIDEST_CONE:
+        if self.pose.half_angle >= SETTINGS.widest_cone:
             return J, error, slack
         tilt = np.cross(at.axes, at.tool_axis[:, None]).transpose(0, 2, 1)
         chord = 2 * np.sin(self.pose.half_angle / 2)
@@ -160,13 +186,13 @@ class PoseBoxes:
         )
 
     def least_potential(self, centre: Array, half: Array) -> Array:
-        """A lower bound (b,) [J] on the potential energy in boxes: by the gradient in the middle,
-        or by the levers.
+        """Lower bound (b,) [J] of the potential energy in boxes: by the gradient in the middle, or
+        by the levers.
         """
         at, (masses, _) = self.placed(centre), self._bodies
         g = np.asarray(self.arm.gravity)
         potential = -(at.centres @ g) @ masses
-        # Σ_{i ≥ j} m_i (c_i - o_j), and -g · (z_j × that)
+        # Σ_{i ≥ j} m_i (c_i - o_j), and -g · (z_j × this sum)
         beyond = np.cumsum((masses[:, None] * at.centres)[:, ::-1], axis=1)[:, ::-1]
         beyond = beyond - np.cumsum(masses[::-1])[::-1, None] * at.origins
         gradient = -np.cross(at.axes, beyond) @ g
@@ -178,8 +204,8 @@ class PoseBoxes:
 
 
 def second_order(levers: Array, half: Array) -> Array:
-    """1/2 Σ_jk lever_max(j,k) h_j h_k (b,) for boxes of half sides (b, nq): what first-order terms
-    leave out.
+    """Bound 1/2 Σ_jk lever_max(j,k) h_j h_k (b,) of second-order terms in boxes of half sides
+    (b, nq).
     """
     # Σ_j lever_j h_j (h_j + 2 Σ_{k<j} h_k)
     before = np.cumsum(half, axis=1) - half

@@ -1,32 +1,30 @@
-"""Boxes of joint positions that hold all configurations of a pose that is turned about an axis of
-the tool, for arms of Universal Robots' form.
+"""Boxes of joint positions that hold all configurations of a pose turned about an axis of the tool,
+for arms of Universal Robots' form.
 
-The turn is cut into cells of half width h [rad] about their middles. Within a cell, a direction of
-the tool is within h of its place for the middle, and a point of it within δ = 2 r sin(h / 2), r its
-distance from the axis. The closed form (`ur_closed_form`) is followed with these bounds. For two
-unit vectors that are e apart, one of them at the angle a from a pole, the azimuths about it differ
-by asin(sin e / sin a) at most, as a cap of radius e is seen from the pole; with e ≥ a, or ≥ π - a,
-they may be any. In the plane the same holds with lengths: asin(δ / ρ).
+The turn is divided into cells of half width h [rad] about their middles. Within a cell, a direction
+of the tool is within h of its direction for the middle, and a point of the tool within δ = 2 r
+sin(h / 2), r its distance from the axis. The closed form (`ur_closed_form`) is evaluated with these
+bounds. For two unit vectors at an angle e, one of them at the angle a from a pole, the azimuths
+about the pole differ by at most asin(sin e / sin a), as a cap of radius e is seen from the pole;
+with e ≥ a, or e ≥ π - a, they may differ by any angle. In the plane the same holds with lengths:
+asin(δ / ρ).
 
-- The last axis' origin is at the distance ρ from the first axis, ρ off by δ at most: q1 = φ +
-  asin(d4 / ρ), or φ + π
-  - asin(d4 / ρ), with φ its azimuth. asin is monotone. q1 is within r1 of its middle then.
+- The last axis' origin is at the distance ρ from the first axis, with ρ within δ: q1 = φ +
+  asin(d4 / ρ), or φ + π - asin(d4 / ρ), with φ its azimuth. asin is monotone. So q1 is within r1 of
+  its middle.
 - The second axis n turns by r1. So the angle between n and the last axis z, which is abs(q5), is
-  within e = r1 + h; q6
-  is the azimuth of n about z, and ψ = q2 + q3 + q4 that of z about n, from the arm's plane: both
-  are off by asin(sin e
-  / sin a) at most.
-- The fourth axis is at (ahead, height) - d5 (sin ψ, -cos ψ) in the arm's plane, ahead = ±sqrt(ρ² -
-  d4²): within r4 of
-  its place for the middles, by what these and ψ may be off. If ψ may be any, it is on the whole
-  circle.
-- D is its distance from the second axis: cos q3 = (D² - a2² - a3²) / (2 a2 a3), which is monotone
-  in D. With q2 = η -
-  β(q3), η its azimuth: dβ / dq3 = 1 / 2 + (a3² - a2²) / (2 D²), greatest and least at the ends of
-  D's interval. So q2
-  changes by no more than η and this times q3, and q4 = ψ - η + β - q3 likewise, with 1 - dβ / dq3.
+  within e = r1 + h. q6 is the azimuth of n about z, and ψ = q2 + q3 + q4 the azimuth of z about n,
+  from the arm's plane: both are within asin(sin e / sin a).
+- The fourth axis is at (ahead, height) - d5 (sin ψ, -cos ψ) in the arm's plane, with
+  ahead = ±sqrt(ρ² - d4²): within r4 of its position for the middles, from the bounds of ahead,
+  height and ψ. If ψ is unbounded, the fourth axis is on the whole circle.
+- D is the distance of the fourth axis from the second: cos q3 = (D² - a2² - a3²) / (2 a2 a3), which
+  is monotone in D. With q2 = η - β(q3), η the azimuth of the fourth axis:
+  dβ / dq3 = 1 / 2 + (a3² - a2²) / (2 D²), with its extrema at the ends of the interval of D. So q2
+  changes by no more than η plus this rate times q3, and q4 = ψ - η + β - q3 likewise, with the rate
+  1 - dβ / dq3.
 
-Where an interval of ρ or D leaves the reach, it is cut; where it lies outside, the cell has no
+An interval of ρ or D that leaves the reach is clipped; if it lies outside, the cell has no
 configuration on this branch. So branches that begin or end within a cell are in its boxes, and so
 are singular configurations.
 """
@@ -48,29 +46,33 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 
-# what intervals are widened by, for rounding: that of an arc cosine of nearly one [rad, m]
 ROUNDING = 2e-7
-# configurations of an arm at an angle at most
+"""Margin of intervals for rounding, as of an arc cosine near one [rad, m]."""
+
 BRANCHES = 8
+"""Largest number of configurations of an arm at one angle of the turn."""
 
 
 @dataclass(frozen=True)
 class _Interval:
-    """Middles `at` and half widths `off` (k,)."""
+    """Intervals with middles `at` and half widths `off` (k,)."""
 
     at: Array
     off: Array
 
     @staticmethod
     def between(a: Array, b: Array) -> _Interval:
-        """From the lesser to the greater of two values (k,)."""
+        """Intervals between two values (k,), in either order."""
         return _Interval((a + b) / 2, np.abs(b - a) / 2)
 
 
 @dataclass(frozen=True)
 class _Wrist:
-    """Of each cell (k,): whether there is a configuration, q1, q5, q6, and the fourth axis in the
-    arm's plane [m]: its place (k, 2), within `off`; and q2 + q3 + q4."""
+    """Bounds of the wrist in each cell (k,).
+
+    `held` marks the cells that may hold a configuration. `place` (k, 2) [m] is the fourth axis in
+    the arm's plane, within `off` (k,) [m], and `heading` is q2 + q3 + q4.
+    """
 
     held: Mask
     q1: _Interval
@@ -83,8 +85,9 @@ class _Wrist:
 
 @dataclass(frozen=True)
 class TurnedPose:
-    """The configurations of a pose that leaves the rotation about its axis free, by the angle of
-    this turn [rad] from the orientation R (3, 3)."""
+    """Configurations of a pose with a free rotation about its axis, over the angle [rad] of this
+    rotation from the orientation R (3, 3).
+    """
 
     form: URClosedForm
     arm: Arm
@@ -93,8 +96,10 @@ class TurnedPose:
 
     @classmethod
     def of(cls, arm: Arm, pose: ConeOrientedPose, given: Pose | None = None) -> TurnedPose | None:
-        """From the orientation of a `given` pose, or any; None for an arm of another form, or a
-        pose that leaves more free."""
+        """Turned pose, with the angle measured from a `given` pose, or from an arbitrary one.
+
+        None for an arm of another form, or a pose with more freedom.
+        """
         form = URClosedForm.of(arm.robot.model)
         if form is None or pose.half_angle > 0:
             return None
@@ -105,9 +110,17 @@ class TurnedPose:
     def boxes(
         self, angle: Array, h: Array, branch: npt.NDArray[np.intp]
     ) -> tuple[Array, Array, Mask]:
-        """Middles and half sides (k, 6) [rad] of boxes that hold, but for full turns, all
-        configurations of a `branch` (k,), of BRANCHES, at angles within `h` of `angle` (k,) [rad];
-        and which (k,) may hold any."""
+        """Boxes that hold, up to full turns, all configurations of branches near given angles.
+
+        Args:
+            angle: middles of the cells, shape (k,) [rad].
+            h: half widths of the cells, shape (k,) [rad].
+            branch: index of the branch, below BRANCHES, shape (k,).
+
+        Returns:
+            Middles and half sides (k, 6) [rad], and a mask (k,) of the boxes that may hold
+            configurations.
+        """
         T = np.tile(np.eye(4), (len(angle), 1, 1))
         T[:, :3, :3] = self.R @ Rotation.from_rotvec(angle[:, None] * self.pose.axis).as_matrix()
         T[:, :3, 3] = self.pose.position
@@ -118,7 +131,7 @@ class TurnedPose:
 
 @dataclass(frozen=True)
 class _Turned:
-    """Flange poses T (k, 4, 4) at the middles of cells, of half widths `h` (k,) [rad]."""
+    """Flange poses T (k, 4, 4) at the middles of cells with half widths `h` (k,) [rad]."""
 
     form: URClosedForm
     T: Array
@@ -126,8 +139,8 @@ class _Turned:
     h: Array
 
     def boxes(self, shoulder: Array, wrist: Array, elbow: Array) -> tuple[Array, Array, Mask]:
-        """Boxes (k, 6) of the cells on branches that are given by their signs (k,), and which (k,)
-        may hold any.
+        """Boxes (k, 6) of the cells on branches given by their signs (k,), and a mask (k,) of the
+        possible ones.
         """
         form, at = self.form, self._wrist(shoulder, wrist)
         reach = abs(abs(form.a2) - abs(form.a3)), abs(form.a2) + abs(form.a3)
@@ -161,7 +174,7 @@ class _Turned:
         form, T, h = self.form, self.T, self.h
         x_axis, y_axis, z_axis = (T[:, :3, k] for k in range(3))
         centre = T[:, :3, 3] - form.d6 * z_axis
-        # the last axis' origin moves on a circle about the tool's axis
+        # The last axis' origin moves on a circle about the tool's axis.
         beside = centre - self.pose.position
         radius = np.linalg.norm(np.cross(beside, self.pose.direction), axis=1)
         moved = 2 * np.sin(h / 2) * radius + ROUNDING
@@ -200,8 +213,8 @@ class _Turned:
 
 
 def _seen_from_pole(off: Array, angle: Array) -> Array:
-    """By how much (k,) [rad] the azimuth of a unit vector at an `angle` from a pole changes at most
-    if it is `off`.
+    """Largest change (k,) [rad] of the azimuth of a unit vector at an `angle` from a pole that
+    moves by `off`.
     """
     inside = off < np.minimum(angle, np.pi - angle)
     sine = np.sin(np.minimum(off, np.pi / 2)) / np.where(inside, np.sin(angle), 1.0)
@@ -209,8 +222,8 @@ def _seen_from_pole(off: Array, angle: Array) -> Array:
 
 
 def _azimuth_off(off: Array, distance: Array) -> Array:
-    """By how much (k,) [rad] the azimuth of a point at a `distance` from an axis changes at most if
-    it is `off` [m].
+    """Largest change (k,) [rad] of the azimuth of a point at a `distance` from an axis that moves
+    by `off` [m].
     """
     inside = off < distance
     return np.where(
@@ -219,7 +232,7 @@ def _azimuth_off(off: Array, distance: Array) -> Array:
 
 
 def _times(rate: Array, off: Array) -> Array:
-    """Products (k,), zero where nothing changes, however fast."""
+    """Products (k,), zero for a constant, whatever its rate."""
     return np.where(
         off > 0, np.where(np.isfinite(rate), rate, np.inf) * np.maximum(off, ROUNDING), 0.0
     )

@@ -1,48 +1,50 @@
 """One pose of an arm of the form `SphericalShoulder`: its configurations over the last angle, and
-where there are any.
+their intervals.
 
-A `sheet` is one of the eight branches: the signs (shoulder, elbow, wrist), 1 or -1, of the angle χ
-between the third axis and the first, of θ and of ψ. The module's text of `spherical_shoulder` has
-the formulas.
+A branch is given by three `signs` (shoulder, elbow, wrist), 1 or -1, of the angle χ between the
+third axis and the first, of θ and of ψ. The module `spherical_shoulder` has the formulas.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import acos, atan2, hypot, remainder, tau
+from math import acos, remainder, tau
 
 import numpy as np
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.seven.spherical_shoulder import SphericalShoulder, wave_parts
+from joulepath.optimizer.kinematics.seven.interval_edges import interval_edges
+from joulepath.optimizer.kinematics.seven.spherical_shoulder import (
+    SphericalShoulder,
+    harmonic_parts,
+)
 from joulepath.optimizer.kinematics.seven.spinors import Complex, unitary
 
-# zeros of the polynomial this near the unit circle may be angles; nearer to each other than APART
-# [rad] they are one
-NEAR_CIRCLE, APART = 1e-4, 1e-9
-# coefficients of less than this share of the greatest are rounding
-NEGLIGIBLE = 1e-14
-# a squared sine counts as zero from this below [1]: cosines are clipped to 1
-ROUNDING = 1e-12
-# rounding of an angle on a limit [rad]
-ANGLE = 1e-9
-# a squared sine is zero at an edge to this: an angle where it has a double zero is found to some
-# 1e-8 rad
-ZERO = 1e-7
-# a squared distance [m²] that is none
-TINY = 1e-12
 
-# a real polynomial in exp(iq) and exp(-iq), by its coefficients of the powers of exp(iq) from 0 on:
-# those of exp(-iq) are their conjugates. Plain numbers: several times as fast as arrays of so few
-Polynomial = list[complex]
-ONE: Polynomial = [1 + 0j]
+@dataclass(frozen=True)
+class PoseSettings:
+    """Tolerances of the intervals of the last angle."""
+
+    rounding: float = 1e-12
+    """Squared sine down to which, below zero, it counts as zero: cosines are clipped to 1."""
+    limit_rounding: float = 1e-9
+    """Angle beyond a limit that is due to rounding [rad]."""
+    edge: float = 1e-7
+    """Largest squared sine at an edge of an interval: the angle of a double zero is found to some
+    1e-8 rad.
+    """
+    least_square: float = 1e-12
+    """Smallest squared distance that divides [m²]."""
+
+
+SETTINGS = PoseSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class RedundantPose:
-    """The flange of an arm of this form at T (4, 4)."""
+    """Arm of the form `SphericalShoulder` with its flange at the pose T (4, 4)."""
 
     form: SphericalShoulder
     T: Array
@@ -54,59 +56,63 @@ class RedundantPose:
 
     @cached_property
     def shoulder(self) -> Array:
-        """S (3,) in the frame of the last link."""
+        """Position (3,) [m] of S in the frame of the last link."""
         return self.form.shoulder_in_7(self.T)
 
     def from_wrist(self, q7: Array) -> Array:
-        """v (3, n) [m] at q7 (n,) [rad]."""
-        return np.asarray(self._wrist_waves @ angle_waves(np.cos(q7), np.sin(q7)))
+        """Vector v (3, n) [m] at last angles q7 (n,) [rad]."""
+        return np.asarray(self._wrist_harmonics @ harmonics(np.cos(q7), np.sin(q7)))
 
     @cached_property
-    def _wrist_waves(self) -> Array:
+    def _wrist_harmonics(self) -> Array:
         """Coefficients (3, 3) [m] of 1, cos q7 and sin q7 in v, as columns."""
         x, y, z = self.shoulder.tolist()
         P = self.form.placements[6]
-        waves = np.empty((3, 3))
-        waves[:, 0] = P[:3, 3] + P[:3, 2] * z
-        waves[2, 0] -= self.form.sixth
-        waves[:, 1], waves[:, 2] = P[:3, 0] * x + P[:3, 1] * y, P[:3, 1] * x - P[:3, 0] * y
-        return waves
+        rows = np.empty((3, 3))
+        rows[:, 0] = P[:3, 3] + P[:3, 2] * z
+        rows[2, 0] -= self.form.sixth
+        rows[:, 1], rows[:, 2] = P[:3, 0] * x + P[:3, 1] * y, P[:3, 1] * x - P[:3, 0] * y
+        return rows
 
     @cached_property
-    def waves(self) -> Array:
+    def coefficients(self) -> Array:
         """Coefficients (2, 3) of 1, cos q7 and sin q7 in |v|² [m²] and in v_z [m]."""
-        v = self._wrist_waves
-        # the parts of cos and sin are at right angles, and as long as each other
+        v = self._wrist_harmonics
+        # The vectors of cos and sin are perpendicular and have the same length.
         square = v[:, 0] @ v
-        waves = np.array([2 * square, v[2]])
-        waves[0, 0] = square[0] + v[:, 1] @ v[:, 1]
-        return waves
+        rows = np.array([2 * square, v[2]])
+        rows[0, 0] = square[0] + v[:, 1] @ v[:, 1]
+        return rows
 
     @cached_property
-    def range_waves(self) -> tuple[Array, Array, Array]:
-        """`wave_parts` of |v|² and v_z, and of v_x and v_y."""
-        return wave_parts(self.waves, self._wrist_waves[:2])
+    def range_harmonics(self) -> tuple[Array, Array, Array]:
+        """`harmonic_parts` of |v|² and v_z, and of v_x and v_y."""
+        return harmonic_parts(self.coefficients, self._wrist_harmonics[:2])
 
     def angles(self, q7: Array, elbow: Array, wrist: Array) -> tuple[Array, Array]:
-        """θ and ψ (n,) [rad] at q7 (n,) on sheets of these signs (n,); cosines beyond 1 count as
-        1."""
-        theta, psi, _ = self._angles_of(angle_waves(np.cos(q7), np.sin(q7)), elbow, wrist)
+        """Angles θ and ψ (n,) [rad] at last angles q7 (n,) on branches with these signs (n,).
+
+        Cosines beyond 1 count as 1.
+        """
+        theta, psi, _ = self._angles_of(harmonics(np.cos(q7), np.sin(q7)), elbow, wrist)
         return theta, psi
 
     def _angles_of(self, seventh: Array, elbow: Array, wrist: Array) -> tuple[Array, Array, Array]:
-        """`angles` by the waves (3, n) of q7, and the waves (3, n) of θ."""
-        form, (distance, v_z) = self.form, self.waves @ seventh
+        """Angles θ and ψ from the harmonics (3, n) of q7, and the harmonics (3, n) of θ."""
+        form, (distance, v_z) = self.form, self.coefficients @ seventh
         cos = to_cosine((form.squares - distance) / (2 * form.rho * form.nu))
-        fourth = angle_waves(cos, elbow * np.sqrt((1 - cos) * (1 + cos)))
+        fourth = harmonics(cos, elbow * np.sqrt((1 - cos) * (1 + cos)))
         along = form.along_fifth @ fourth - form.fifth_in_6[2] * v_z
         reach = form.inclined * np.sqrt(np.maximum(distance - v_z * v_z, 0.0))
         across = np.sqrt(np.maximum((reach - along) * (reach + along), 0.0))
         return elbow * np.arccos(cos), wrist * np.arctan2(across, along), fourth
 
-    def configurations(self, q7: Array, sheet: Array) -> Array:
-        """Configurations (n, 7) [rad] in [-π, π] at q7 (n,) on sheets (n, 3)."""
-        shoulder, elbow, wrist = sheet.T
-        seventh = angle_waves(np.cos(q7), np.sin(q7))
+    def configurations(self, q7: Array, signs: Array) -> Array:
+        """Configurations (n, 7) [rad] in [-π, π] at last angles q7 (n,) on branches with signs
+        (n, 3).
+        """
+        shoulder, elbow, wrist = signs.T
+        seventh = harmonics(np.cos(q7), np.sin(q7))
         theta, psi, fourth = self._angles_of(seventh, elbow, wrist)
         last = self._last(q7, theta, psi, seventh, fourth)
         return np.ascontiguousarray(self.completed(last, backwards(last), shoulder).T)
@@ -119,8 +125,11 @@ class RedundantPose:
         shoulder: Array,
         free: dict[int, Array] | None = None,
     ) -> Array:
-        """Configurations (n, 7) [rad] with the given angles (n,). On a singularity the first joint
-        (0) or the fifth (4) may have any angle (n,): that in `free`."""
+        """Configurations (n, 7) [rad] with given angles (n,) [rad].
+
+        At a singularity, `free` gives the arbitrary angles (n,) [rad] of the first joint (key 0) or
+        the fifth joint (key 4).
+        """
         last = self.wrist(q7, theta, psi)
         free = {} if free is None else free
         if 4 in free:
@@ -128,22 +137,24 @@ class RedundantPose:
         return np.ascontiguousarray(self.completed(last, backwards(last), shoulder, free.get(0)).T)
 
     def wrist(self, q7: Array, theta: Array, psi: Array) -> Array:
-        """The last four joint positions (4, n) [rad] at the given angles (n,)."""
+        """Positions (4, n) [rad] of the last four joints at given angles (n,) [rad]."""
         return self._last(
             q7,
             theta,
             psi,
-            angle_waves(np.cos(q7), np.sin(q7)),
-            angle_waves(np.cos(theta), np.sin(theta)),
+            harmonics(np.cos(q7), np.sin(q7)),
+            harmonics(np.cos(theta), np.sin(theta)),
         )
 
     def _last(self, q7: Array, theta: Array, psi: Array, seventh: Array, fourth: Array) -> Array:
-        """`wrist` with the waves (3, n) of q7 and of θ."""
-        form, v, S = self.form, self._wrist_waves @ seventh, self.form.shoulder_waves.T @ fourth
+        """The result of `wrist` from the harmonics (3, n) of q7 and of θ."""
+        form = self.form
+        v = self._wrist_harmonics @ seventh
+        S = self.form.shoulder_harmonics.T @ fourth
         last = np.empty((4, len(q7)))
         last[0], last[3] = form.q4_at_zero - theta, q7
         last[2] = psi - np.arctan2(v[1], v[0]) + form.fifth_azimuth
-        # the fifth angle is between the azimuths of S, seen from both sides
+        # The fifth angle is between the azimuths of S, seen from both sides.
         c, s = np.cos(last[2]), np.sin(last[2])
         v[0], v[1] = c * v[0] - s * v[1], s * v[0] + c * v[1]
         x, y = form.placements[5, :2, :3] @ v
@@ -153,12 +164,18 @@ class RedundantPose:
     def completed(
         self, last: Array, back: Complex, shoulder: Array, q1: Array | None = None
     ) -> Array:
-        """Joint positions (7, n) [rad] in [-π, π] with the last four (4, n), of which `back` (4, n)
-        are the numbers e^{-iq}, and signs of the shoulder (n,)."""
+        """Joint positions (7, n) [rad] in [-π, π] from the last four.
+
+        Args:
+            last: positions of the last four joints, shape (4, n) [rad].
+            back: complex numbers e^{-iq} of `last`, shape (4, n).
+            shoulder: signs of the shoulder, shape (n,).
+            q1: first angles (n,) [rad] at the shoulder's singularity.
+        """
         form, q, spinor = self.form, np.empty((7, len(shoulder))), self._spinors(back)
         size, phase = np.abs(spinor), np.arctan2(spinor.imag, spinor.real)
-        # the other shoulder has the third axis lean to the other side; the turns left half of the
-        # last angles out
+        # With the other shoulder the third axis leans to the other side. The spinors omit half of
+        # the sum of the last angles.
         left, out = np.pi / 2 * (1 - shoulder), np.add.reduce(last, axis=0)
         azimuth = phase[1] - phase[0] if q1 is None else q1 + form.lean_azimuth - left
         if q1 is None:
@@ -172,13 +189,16 @@ class RedundantPose:
         return np.asarray(np.minimum(np.maximum(wrapped(q), -np.pi), np.pi))
 
     def third_axis(self, q7: Array, theta: Array, psi: Array) -> Complex:
-        """The third axis in the frame of joint 1 at q1 = 0, x + iy (n,), at angles (n,)."""
+        """Third axis in the frame of joint 1 at q1 = 0, as x + iy (n,), at given angles (n,)
+        [rad].
+        """
         ahead, aside = self._spinors(backwards(self.wrist(q7, theta, psi)))
         return np.asarray(2 * ahead.conj() * aside)
 
     def _spinors(self, back: Complex) -> Complex:
-        """Spinors (2, n), but for factors, of the rotation from joint 1 at q1 = 0 to link 3, with
-        e^{-iq} of the last four joints (4, n)."""
+        """Spinors (2, n), up to a factor, of the rotation from joint 1 at q1 = 0 to link 3, from
+        e^{-iq} (4, n) of the last four joints.
+        """
         first, *others = self.form.backwards
         spinor = np.ones((2, back.shape[1]), dtype=complex)
         spinor[1] = back[0]
@@ -189,17 +209,17 @@ class RedundantPose:
 
     @cached_property
     def _from_last(self) -> Complex:
-        """What carries spinors from the last link to joint 1 at q1 = 0."""
+        """Unitary matrix that carries spinors from the last link to joint 1 at q1 = 0."""
         return unitary(self.form.placements[0, :3, :3].T @ self.orientation)
 
     def elbows(self, limits: Limits | None) -> list[float]:
-        """The signs of θ with which the fourth joint may be within the limits."""
-        form, square, low, high = self.form, self.waves[0], -np.pi, np.pi
+        """Signs of θ with which the fourth joint may be within the limits."""
+        form, square, low, high = self.form, self.coefficients[0], -np.pi, np.pi
         if limits is not None:
             low, high = float(limits.q_min[3]), float(limits.q_max[3])
         size, scale = float(np.hypot(square[1], square[2])), 2 * form.rho * form.nu
         cosines = [
-            (form.squares - float(square[0]) + side * size) / scale + side * ROUNDING
+            (form.squares - float(square[0]) + side * size) / scale + side * SETTINGS.rounding
             for side in (1.0, -1.0)
         ]
         least, most = (acos(min(max(each, -1.0), 1.0)) for each in cosines)
@@ -208,19 +228,24 @@ class RedundantPose:
             elbow: remainder(form.q4_at_zero - elbow * middle - (low + high) / 2, tau)
             for elbow in (1.0, -1.0)
         }
-        return [elbow for elbow, each in away.items() if abs(each) <= half + ANGLE]
+        return [
+            elbow for elbow, each in away.items() if abs(each) <= half + SETTINGS.limit_rounding
+        ]
 
     def intervals(self, elbow: float) -> list[tuple[float, float]]:
-        """The intervals [rad] of q7, each within a turn, in which both sheets of this elbow are;
-        (-π, π) if nothing bounds them. An interval may be one angle."""
+        """Intervals [rad] of q7, each within a turn, with configurations on both branches of an
+        elbow.
+
+        An interval may be a single angle. A whole turn is (-π, π).
+        """
         edges = self._edges
         own = self._excesses[0 if elbow > 0 else 1]
         if not len(edges):
-            return [(-np.pi, np.pi)] if own[0] >= -ROUNDING else []
+            return [(-np.pi, np.pi)] if own[0] >= -SETTINGS.rounding else []
         at, between = own[: len(edges)], own[len(edges) :]
-        inside = (between >= -ROUNDING).tolist()
-        # an edge of the other elbow's sheets is none here
-        bounds = np.abs(at) < ZERO
+        inside = (between >= -SETTINGS.rounding).tolist()
+        # An edge of the branches with the other elbow is no edge here.
+        bounds = np.abs(at) < SETTINGS.edge
         if all(inside) and not bounds.any():
             return [(-np.pi, np.pi)]
         found = [
@@ -228,7 +253,7 @@ class RedundantPose:
             for k, q7 in enumerate(edges)
             if bounds[k] and not inside[k - 1] | inside[k]
         ]
-        # from an edge on, so that no interval starts before the first one
+        # Starting at an edge, so that no interval begins before the first one.
         first = int(bounds.argmax())
         start: float | None = None
         for k in [*range(first, len(edges)), *range(first)]:
@@ -246,16 +271,16 @@ class RedundantPose:
 
     @cached_property
     def _excesses(self) -> Array:
-        """The excess (2, k) at the edges, then between each and the next, for both elbows; without
-        edges, anywhere.
+        """Excess (2, k) at the edges, then between consecutive edges, for both elbows; without
+        edges, at one angle.
 
-        That is the lesser of sin²θ and of sin²ψ r²/|v|²: negative off the sheets.
+        The excess is the smaller one of sin²θ and of sin²ψ r²/|v|², negative outside the intervals.
         """
         form, edges, q7 = self.form, self._edges, np.zeros(max(2 * len(self._edges), 1))
         if len(edges):
             q7[: len(edges)], q7[len(edges) : -1] = edges, (edges[1:] + edges[:-1]) / 2
             q7[-1] = (edges[0] + 2 * np.pi + edges[-1]) / 2
-        distance, v_z = self.waves @ angle_waves(np.cos(q7), np.sin(q7))
+        distance, v_z = self.coefficients @ harmonics(np.cos(q7), np.sin(q7))
         cos = (form.squares - distance) / (2 * form.rho * form.nu)
         clipped = to_cosine(cos)
         k0, kc, ks = form.along_fifth
@@ -263,107 +288,31 @@ class RedundantPose:
         along = k0 + kc * clipped - form.fifth_in_6[2] * v_z + np.array([aside, -aside])
         reach = form.inclined**2 * np.maximum(distance - v_z * v_z, 0.0)
         return np.asarray(
-            np.minimum(1 - cos * cos, (reach - along * along) / np.maximum(distance, TINY))
+            np.minimum(
+                1 - cos * cos, (reach - along * along) / np.maximum(distance, SETTINGS.least_square)
+            )
         )
 
     @cached_property
     def _edges(self) -> Array:
-        """Angles (k,) [rad] in [-π, π), sorted, at which a sheet of any sign may end."""
-        form, (square, height) = self.form, self.waves.tolist()
-        scale = 2 * form.rho * form.nu
-        cos = _wave((form.squares - square[0]) / scale, -square[1] / scale, -square[2] / scale)
-        v_z, d2 = _wave(*height), _wave(*square)
-        k0, kc, ks = form.along_fifth
-        flat = _sum((kc, cos), (-float(form.fifth_in_6[2]), v_z), (k0, ONE))
-        sin2, flat2 = _sum((1.0, ONE), (-1.0, _product(cos, cos))), _product(flat, flat)
-        incline = form.inclined**2
-        P = _sum((incline, d2), (-incline, _product(v_z, v_z)), (-1.0, flat2), (-(ks**2), sin2))
-        if abs(ks) > ROUNDING:
-            P = _sum((1.0, _product(P, P)), (-4 * ks**2, _product(flat2, sin2)))
-        found = sorted([*_angles(P), *self._straight()])
-        return np.array(
-            [each for k, each in enumerate(found) if k == 0 or each - found[k - 1] > APART]
-        )
-
-    def _straight(self) -> list[float]:
-        """Angles [rad] at which the elbow is stretched or folded, or nearly: |cos θ| = 1."""
-        still, ahead, aside = self.waves[0].tolist()
-        reach, size, phase = (
-            2 * self.form.rho * self.form.nu,
-            hypot(ahead, aside),
-            atan2(aside, ahead),
-        )
-        if size <= NEGLIGIBLE * reach:
-            return []
-        cosines = [(self.form.squares - still + each) / size for each in (reach, -reach)]
-        turned = [
-            acos(min(max(each, -1.0), 1.0))
-            for each in cosines
-            if abs(each) < 1 + NEAR_CIRCLE**2 / 2
-        ]
-        return [remainder(phase + side * each, tau) for side in (1.0, -1.0) for each in turned]
+        """Sorted angles (k,) [rad] in [-π, π) that may end an interval of any branch."""
+        return interval_edges(self.form, self.coefficients)
 
 
 def to_cosine(x: Array) -> Array:
-    """x clipped to [-1, 1]: several times as fast as numpy's for few numbers."""
+    """x clipped to [-1, 1], several times faster than np.clip for few numbers."""
     return np.asarray(np.minimum(np.maximum(x, -1.0), 1.0))
 
 
-def angle_waves(c: Array, s: Array) -> Array:
-    """1, cosine and sine (3, n) of angles (n,), of these two."""
-    waves = np.empty((3, len(c)))
-    waves[0], waves[1], waves[2] = 1.0, c, s
-    return waves
+def harmonics(c: Array, s: Array) -> Array:
+    """Harmonics 1, cosine and sine (3, n) of angles (n,), from their cosines and sines."""
+    rows = np.empty((3, len(c)))
+    rows[0], rows[1], rows[2] = 1.0, c, s
+    return rows
 
 
 def backwards(q: Array) -> Complex:
-    """The numbers e^{-iq} of angles q [rad]."""
+    """Complex numbers e^{-iq} of angles q [rad]."""
     found = np.empty(q.shape, dtype=complex)
     found.real, found.imag = np.cos(q), -np.sin(q)
     return found
-
-
-def _wave(a: float, b: float, c: float) -> Polynomial:
-    """a + b cos q + c sin q."""
-    return [complex(a), complex(b, -c) / 2]
-
-
-def _sum(*terms: tuple[float, Polynomial]) -> Polynomial:
-    """The sum of polynomials, each times a factor."""
-    total = [0j] * max(len(each) for _, each in terms)
-    for factor, each in terms:
-        for k, coefficient in enumerate(each):
-            total[k] += factor * coefficient
-    return total
-
-
-def _product(p: Polynomial, r: Polynomial) -> Polynomial:
-    """The product of two polynomials."""
-    total = [0j] * (len(p) + len(r) - 1)
-    for k, a in enumerate(p):
-        for j, b in enumerate(r):
-            total[k + j] += a * b
-            # that with the other power of opposite sign; of both, the one that is not negative
-            if k and j:
-                other = a * b.conjugate() if k >= j else a.conjugate() * b
-                total[abs(k - j)] += other if k != j else 2 * other.real
-    return total
-
-
-def _angles(polynomial: Polynomial) -> list[float]:
-    """The angles q [rad] at which a polynomial is zero, or nearly."""
-    size = [abs(each) for each in polynomial]
-    least, degree = NEGLIGIBLE * max(size), len(size) - 1
-    while degree and size[degree] <= least:
-        degree -= 1
-    if not degree:
-        return []
-    # by falling powers; the eigenvalues of the companion are the zeros
-    falling = [*polynomial[degree:0:-1], *(each.conjugate() for each in polynomial[: degree + 1])]
-    companion = np.eye(2 * degree, k=-1, dtype=complex)
-    companion[0] = [-each / falling[0] for each in falling[1:]]
-    return [
-        atan2(root.imag, root.real)
-        for root in np.linalg.eigvals(companion).tolist()
-        if abs(abs(root) - 1) < NEAR_CIRCLE
-    ]

@@ -1,9 +1,11 @@
-"""Rotations as spinors: the first columns (2,) of unitary matrices U (2, 2), a turn by q about z
-being diag(e^{-iq/2}, e^{iq/2}). A product of rotations costs half of what matrices do, and its
-Euler angles are the arguments of two numbers.
+"""Rotations as spinors.
+
+The spinor of a rotation is the first column (2,) of its unitary matrix U (2, 2), where a turn by q
+about z is diag(e^{-iq/2}, e^{iq/2}). A product of rotations costs half as much as with rotation
+matrices, and the Euler angles are the arguments of two complex numbers.
 
 The rotation R_z(φ) R_y(χ) R_z(ψ), with χ from 0 to π, has the spinor (cos(χ/2) e^{-i(φ + ψ)/2},
-sin(χ/2) e^{i(φ - ψ)/2}): so φ and ψ follow from the sum and the difference of its arguments (H.
+sin(χ/2) e^{i(φ - ψ)/2}). So φ and ψ follow from the sum and the difference of its arguments (H.
 Goldstein, "Classical Mechanics", 1980, section 4-5).
 """
 
@@ -20,9 +22,9 @@ Complex = NDArray[np.complex128]
 
 
 def unitary(R: Array) -> Complex:
-    """U (2, 2) of a rotation R (3, 3), but for its sign."""
+    """Unitary matrix U (2, 2) of a rotation R (3, 3), up to its sign."""
     (a, b, c), (d, e, f), (g, h, k) = R.tolist()
-    # the greatest part of the quaternion divides the others (S. Shepperd, 1978)
+    # The largest component of the quaternion divides the others (S. Shepperd, 1978).
     w, x, y, z = 1 + a + e + k, 1 + a - e - k, 1 - a + e - k, 1 - a - e + k
     most = max(w, x, y, z)
     if most == w:

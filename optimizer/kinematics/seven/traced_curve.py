@@ -1,9 +1,9 @@
-"""A self-motion that is known by points along it: cubics between them, which Newton's method leads
+"""Self-motion known by points along it: cubics between the points, which Newton's method projects
 onto the curve.
 
-A member is the configuration of the curve across from the cubic: in the plane through its point at
-right angles to the direction there, which goes evenly from one tangent to the next. So the
-parameter of a member is found without kinematics, from the cubic alone.
+A member is the configuration of the curve across from a point of a cubic: in the plane through this
+point perpendicular to a direction that changes linearly from one tangent to the next. So the
+parameter of a member follows from the cubic alone, without kinematics.
 """
 
 from __future__ import annotations
@@ -16,30 +16,39 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
-from joulepath.optimizer.kinematics.seven.across_curve import onto
+from joulepath.optimizer.kinematics.seven.across_curve import project_across
 from joulepath.optimizer.kinematics.seven.curve_tracing import TracedPath
-from joulepath.optimizer.kinematics.seven.traced_stack import Rows, TracedStack
+from joulepath.optimizer.kinematics.seven.traced_curve_stack import Rows, TracedCurveStack
 from joulepath.optimizer.problem.branches import BranchLabel
 
-# distance [rad] from the cubics within which a member is, and from the curve at which a
-# configuration is one
-BESIDE, SAME = 0.05, 1e-5
-# rounding of an angle on a limit [rad]
-ROUNDING = 1e-9
-# how much faster [1] a joint may turn between points than on the way from one to the next
-FASTER = 1.5
+
+@dataclass(frozen=True)
+class TracedCurveSettings:
+    """Tolerances of members and margins of boxes."""
+
+    beside: float = 0.05
+    """Largest joint distance of a member from the cubics [rad]."""
+    same: float = 1e-5
+    """Largest joint distance of a configuration on the curve from its member [rad]."""
+    rounding: float = 1e-9
+    """Angle that is due to rounding [rad]."""
+    rate_factor: float = 1.5
+    """Factor of the largest rate of a joint between nodes, which bounds its rate on the curve."""
+
+
+SETTINGS = TracedCurveSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class TracedCurve:
-    """`SelfMotion` that holds the flange at T (4, 4), number `row` of the curves of this pose.
+    """`SelfMotion` of the flange pose T (4, 4), in row `row` of the curves of this pose.
 
-    `arcs` are the intervals of its parameter that are meant: all of it, or what is within limits.
+    `arcs` are the intervals of its parameter: all of it, or the part within limits.
     """
 
     chain: Chain
     T: Array
-    stack: TracedStack
+    stack: TracedCurveStack
     row: int
     label: BranchLabel
     arcs: list[tuple[float, float]]
@@ -47,48 +56,49 @@ class TracedCurve:
     @classmethod
     def of(cls, chain: Chain, T: Array, path: TracedPath, label: BranchLabel) -> TracedCurve:
         """The whole curve along a path."""
-        stack = TracedStack.of([path])
+        stack = TracedCurveStack.of([path])
         half = float(stack.half[0])
         return cls(chain, T, stack, 0, label, [(-half, half)])
 
     def cut(self, arcs: list[tuple[float, float]]) -> TracedCurve:
-        """The same curve on these arcs."""
+        """The same curve on other arcs."""
         return TracedCurve(self.chain, self.T, self.stack, self.row, self.label, arcs)
 
     @property
     def nodes(self) -> Array:
-        """The points (m, nq) [rad] that it is known by, without full turns left out."""
+        """Known points (m, nq) [rad] of the curve, without jumps by full turns."""
         return self.stack.nodes[self._part]
 
     @property
     def closed(self) -> bool:
-        """Whether it ends where it begins, but for full turns."""
+        """Whether the curve ends at its start, up to full turns."""
         return bool(self.stack.half[self.row] == np.pi)
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Indices of the joints that move."""
-        return tuple(np.flatnonzero(np.ptp(self.nodes, axis=0) > ROUNDING).tolist())
+        """Indices of the moving joints."""
+        return tuple(np.flatnonzero(np.ptp(self.nodes, axis=0) > SETTINGS.rounding).tolist())
 
     def at(self, parameter: Array) -> Array:
-        """The configurations (n, nq) [rad] at parameters (n,) on the arcs."""
+        """Configurations (n, nq) [rad] at parameters (n,) on the arcs."""
         return members([self], [np.asarray(parameter, dtype=float)])[0]
 
     def parameter(self, q: Array) -> float:
-        """The parameter of the member nearest to q (nq,) [rad], nearly."""
+        """Parameter of the member nearest to q (nq,) [rad], approximately."""
         return self.clipped(self._nearest(q)[0])
 
     def passes(self, q: Array) -> bool:
         """Whether a configuration (nq,) [rad] that holds the pose is a member."""
         parameter, away = self._nearest(q)
-        if away > BESIDE:
+        if away > SETTINGS.beside:
             return False
         return bool(
-            np.abs(wrapped(self.at(np.array([self.clipped(parameter)]))[0] - q)).max() < SAME
+            np.abs(wrapped(self.at(np.array([self.clipped(parameter)]))[0] - q)).max()
+            < SETTINGS.same
         )
 
     def clipped(self, parameter: float) -> float:
-        """The nearest parameter on an arc."""
+        """Nearest parameter on an arc."""
         found = []
         for lower, upper in self.arcs:
             middle = (lower + upper) / 2
@@ -102,44 +112,46 @@ class TracedCurve:
         return float(min(found)[1])
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """See `SelfMotion`; by the greatest rate of each joint between nodes.
+        """Boxes that cover the curve, see `SelfMotion.boxes`; from the largest rate of each joint
+        between nodes.
 
-        No bound rests on this alone: where curves may be missed, bounds cover all configurations.
+        No bound rests on them alone: where curves may be missed, bounds cover all configurations.
         """
         centre = self.at(np.asarray(parameter, dtype=float))
         if len(self.nodes) == 1:
-            return centre, np.full_like(centre, ROUNDING)
+            return centre, np.full_like(centre, SETTINGS.rounding)
         rates = np.abs(
             np.diff(self.nodes, axis=0) / np.diff(self.stack.knots[self._part])[:, None]
         ).max(axis=0)
         return centre, np.minimum(
-            FASTER * np.asarray(half, dtype=float)[:, None] * rates + ROUNDING, np.pi
+            SETTINGS.rate_factor * np.asarray(half, dtype=float)[:, None] * rates
+            + SETTINGS.rounding,
+            np.pi,
         )
 
     @property
     def _part(self) -> slice:
-        """The rows of its points."""
+        """Rows of the points of the curve."""
         return slice(int(self.stack.first[self.row]), int(self.stack.last[self.row]) + 1)
 
     def _nearest(self, q: Array) -> tuple[float, float]:
-        """The parameter of the point between nodes across from q (nq,), and how far [rad] it is
-        from q, or more.
+        """Parameter of the point between nodes across from q (nq,), and an upper bound of its
+        distance [rad].
         """
         stack, part = self.stack, self._part
         k: Rows = np.arange(part.start, max(part.stop - 1, part.start + 1))
         unwound = nearest_turn(q, stack.nodes[k])
-        ways = np.maximum(stack.ways[k], ROUNDING)
-        share = ((unwound - stack.nodes[k]) * stack.tangents[k]).sum(axis=1) / ways
+        lengths = np.maximum(stack.segment_lengths[k], SETTINGS.rounding)
+        share = ((unwound - stack.nodes[k]) * stack.tangents[k]).sum(axis=1) / lengths
         chosen = (
             np.abs(stack.at(k, np.minimum(np.maximum(share, 0.0), 1.0)) - unwound)
             .max(axis=1)
             .argsort()[:3]
         )
         k, unwound = k[chosen], unwound[chosen]
-        share = stack.in_line(k, np.minimum(np.maximum(share[chosen], 0.0), 1.0), unwound)
-        # next to a point, rounding may have it beyond the ends of both ways: it is little beyond
-        # either
-        beyond = np.abs(share - np.minimum(np.maximum(share, 0.0), 1.0)) * ways[chosen]
+        share = stack.shares_across(k, np.minimum(np.maximum(share[chosen], 0.0), 1.0), unwound)
+        # Next to a node, rounding may place the point slightly beyond the ends of both segments.
+        beyond = np.abs(share - np.minimum(np.maximum(share, 0.0), 1.0)) * lengths[chosen]
         away = np.abs(stack.at(k, share) - unwound).max(axis=1) + beyond
         best = int(away.argmin())
         after = min(int(k[best]) + 1, part.stop - 1)
@@ -148,16 +160,18 @@ class TracedCurve:
 
 
 def members(curves: Sequence[TracedCurve], parameters: Sequence[Array]) -> list[Array]:
-    """The configurations (n, nq) [rad] of each of the curves of one pose at its parameters (n,)."""
+    """Configurations (n, nq) [rad] of each curve of one pose at its parameters (n,)."""
     one, counts = curves[0], [len(at) for at in parameters]
     rows = np.repeat([curve.row for curve in curves], counts)
-    k, share = one.stack.pieces(np.concatenate(parameters), rows)
+    k, share = one.stack.locate(np.concatenate(parameters), rows)
     return np.split(on_curve(one, k, share), np.cumsum(counts)[:-1])
 
 
 def on_curve(one: TracedCurve, k: Rows, share: Array) -> Array:
-    """The members (n, nq) [rad] across from the cubics at shares (n,) of the ways from points k
-    (n,) to the next ones. `one` is any curve of the pose."""
-    q = onto(one.chain, one.stack.at(k, share), one.stack.along(k, share), one.T)
-    # np.clip takes five times as long for so few
+    """Members (n, nq) [rad] at shares (n,) of the segments that begin at the points k (n,).
+
+    `one` is any curve of the pose.
+    """
+    q = project_across(one.chain, one.stack.at(k, share), one.stack.along(k, share), one.T)
+    # np.clip takes five times as long for so few numbers.
     return np.asarray(np.minimum(np.maximum(wrapped(q), -np.pi), np.pi))

@@ -1,8 +1,7 @@
-"""Where the curves of `traced_curve` that hold one pose are within position limits, all curves at
-once.
+"""Parts of the curves of one pose within position limits, all curves at once.
 
-A cubic is within the hull of its four control points: most are inside all limits, or outside one,
-by that alone.
+A cubic lies within the hull of its four control points: this alone shows most cubics to be inside
+all limits, or outside one.
 """
 
 from __future__ import annotations
@@ -14,52 +13,63 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.seven.across_curve import LEFT, led
+from joulepath.optimizer.kinematics.seven.across_curve import ACROSS, project_onto_curve
 from joulepath.optimizer.kinematics.seven.hermite import hermite_weights
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve, on_curve
-from joulepath.optimizer.kinematics.seven.traced_stack import Rows, TracedStack
+from joulepath.optimizer.kinematics.seven.traced_curve_stack import Rows, TracedCurveStack
 
-# parts of a piece that may cross limits, between whose ends it is held against them
-PARTS = 8
-WEIGHTS = hermite_weights(np.linspace(0.0, 1.0, PARTS + 1))
-# steps to where a curve crosses limits, if Newton's method does not find it
-CROSSINGS = 16
-# longest step of that, and distance [rad] from the cubics within which a curve is
-NEAR = 0.05
-# rounding of an angle on a limit [rad]
-ROUNDING = 1e-9
+
+@dataclass(frozen=True)
+class TracedLimitsSettings:
+    """Settings of the search for crossings of limits."""
+
+    parts: int = 8
+    """Number of parts of an undecided segment whose ends are tested against the limits."""
+    steps: int = 16
+    """Largest number of steps towards a crossing that Newton's method does not find."""
+    near: float = 0.05
+    """Longest step of Newton's method, and largest joint distance of a curve from its cubics
+    [rad].
+    """
+    rounding: float = 1e-9
+    """Angle beyond a limit that is due to rounding [rad]."""
+
+
+SETTINGS = TracedLimitsSettings()
+PART_WEIGHTS = hermite_weights(np.linspace(0.0, 1.0, SETTINGS.parts + 1))
 
 
 @dataclass(frozen=True, eq=False)
-class _Range:
-    """The joints that have limits, the middles (m,) of their ranges and half their widths (m,)
-    [rad].
-    """
+class _JointRanges:
+    """Ranges of the joints with limits: middles (m,) and half widths (m,) [rad]."""
 
     joints: Rows
     middle: Array
     half: Array
 
     @classmethod
-    def of(cls, q_min: Array, q_max: Array) -> _Range:
-        """Of limits (nq,) [rad]; a joint that may turn all around has none."""
+    def of(cls, q_min: Array, q_max: Array) -> _JointRanges:
+        """Ranges of limits (nq,) [rad]; a joint that may turn all around has none."""
         joints = np.flatnonzero(q_max - q_min < 2 * np.pi)
         return cls(joints, ((q_min + q_max) / 2)[joints], ((q_max - q_min) / 2)[joints])
 
     def excess(self, q: Array) -> Array:
-        """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
+        """Largest angle (n,) [rad] of configurations (n, nq) beyond the limits, negative inside."""
         return self.beyond(q[:, self.joints])
 
     def beyond(self, angles: Array) -> Array:
-        """The same (…) of angles (…, m) [rad] of the joints that have limits."""
+        """Largest angle (…) [rad] beyond the limits, from angles (…, m) [rad] of the joints with
+        limits.
+        """
         away = np.abs(wrapped(angles - self.middle)) - self.half
         return np.asarray(np.maximum.reduce(away, axis=-1))
 
 
-def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
-    """The curves of one pose, cut to where they are within limits (nq,) [rad] but for full turns;
-    without those that are nowhere."""
-    limits = _Range.of(q_min, q_max)
+def cut_to_limits(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
+    """Curves of one pose, cut to the limits (nq,) [rad] up to full turns; curves wholly outside are
+    left out.
+    """
+    limits = _JointRanges.of(q_min, q_max)
     if not curves or not len(limits.joints):
         return list(curves)
     cut = _cut(curves, limits)
@@ -70,22 +80,22 @@ def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[Tr
     ]
 
 
-def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float, float]]]:
-    """The arcs of each curve within limits."""
+def _cut(curves: Sequence[TracedCurve], limits: _JointRanges) -> list[list[tuple[float, float]]]:
+    """Arcs of each curve within the limits."""
     stack = curves[0].stack
     inside, undecided = _by_hull(stack, limits)
-    at, piece = np.zeros(0), np.zeros(0, dtype=np.intp)
+    at, segment = np.zeros(0), np.zeros(0, dtype=np.intp)
     if len(undecided):
-        excess = limits.beyond(stack.at_each(undecided, WEIGHTS, limits.joints))
+        excess = limits.beyond(stack.at_each(undecided, PART_WEIGHTS, limits.joints))
         held = excess <= 0
         row, part = np.nonzero(held[:, 1:] != held[:, :-1])
-        piece = undecided[row]
-        if len(piece):
-            at = _crossings(curves[0], limits, piece, part, excess[row])
-    gap = stack.knots[np.minimum(piece + 1, len(inside) - 1)] - stack.knots[piece]
-    ends = stack.knots[piece] + at * gap
-    # piece by piece, and so curve by curve
-    crossed, behind = ends.tolist(), [0, *np.searchsorted(piece, stack.last).tolist()]
+        segment = undecided[row]
+        if len(segment):
+            at = _crossings(curves[0], limits, segment, part, excess[row])
+    gap = stack.knots[np.minimum(segment + 1, len(inside) - 1)] - stack.knots[segment]
+    ends = stack.knots[segment] + at * gap
+    # Crossings are sorted by segments, and so by curves.
+    crossed, behind = ends.tolist(), [0, *np.searchsorted(segment, stack.last).tolist()]
     first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
     return [
         _arcs(
@@ -95,17 +105,17 @@ def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float
     ]
 
 
-def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
-    """Which nodes (n,) are inside limits, and the rows of those nodes after which the cubic may
-    cross one.
+def _by_hull(stack: TracedCurveStack, limits: _JointRanges) -> tuple[Mask, Rows]:
+    """Mask (n,) of the nodes inside the limits, and rows of the nodes that begin undecided
+    segments.
     """
     q, tangents = stack.nodes[:, limits.joints], stack.tangents[:, limits.joints]
     own = wrapped(q - limits.middle)
     inside: Mask = np.logical_and.reduce(np.abs(own) <= limits.half, axis=1)
     points = np.empty((4, len(q) - 1, len(limits.joints)))
     points[0] = own[:-1]
-    # the other ones without full turns left out
-    third = stack.ways[:-1, None] / 3
+    # The other control points follow without jumps by full turns.
+    third = stack.segment_lengths[:-1, None] / 3
     points[1], points[3] = points[0] + third * tangents[:-1], points[0] + (q[1:] - q[:-1])
     points[2] = points[3] - third * tangents[1:]
     least, most = np.minimum.reduce(points, axis=0), np.maximum.reduce(points, axis=0)
@@ -115,7 +125,7 @@ def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
     outside = ((least > limits.half) & (most < beyond)) | (
         (most < -limits.half) & (least > -beyond)
     )
-    # of nodes on a limit, rounding may have it that hull and node differ
+    # At nodes on a limit, rounding may make hull and node disagree.
     both, either = inside[:-1] & inside[1:], inside[:-1] | inside[1:]
     crossing = ~(held & both) & (either | ~np.logical_or.reduce(outside, axis=1))
     crossing[stack.last[:-1]] = False
@@ -125,8 +135,9 @@ def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
 def _arcs(
     curve: TracedCurve, ends: list[float], first: bool, last: bool
 ) -> list[tuple[float, float]]:
-    """The arcs of a curve that crosses limits at `ends`; `first`, `last`: whether its own ends are
-    inside.
+    """Arcs of a curve that crosses limits at `ends`.
+
+    `first` and `last` tell whether the ends of the curve itself are inside.
     """
     if not ends:
         return curve.arcs if first else []
@@ -136,66 +147,89 @@ def _arcs(
         ends.append(curve.arcs[0][1])
     arcs = list(zip(ends[::2], ends[1::2], strict=True))
     if curve.closed and first and last:
-        # the arc goes on behind the curve's own start
+        # The last arc continues beyond the start of the curve.
         (_, before), (after, _) = arcs[0], arcs[-1]
         arcs = [*arcs[1:-1], (after, before + 2 * np.pi)]
     return arcs
 
 
-def _crossings(one: TracedCurve, limits: _Range, k: Rows, part: Rows, excess: Array) -> Array:
-    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, in the
-    given parts (n,) of these; the cubics exceed them by so much (n, PARTS + 1) at the ends of all.
-    `one` is any curve of the pose."""
+def _crossings(one: TracedCurve, limits: _JointRanges, k: Rows, part: Rows, excess: Array) -> Array:
+    """Shares of segments at which the curves cross limits.
+
+    Args:
+        one: any curve of the pose.
+        limits: ranges of the joints.
+        k: points that begin the segments, shape (n,).
+        part: part of each segment with the crossing, shape (n,).
+        excess: angles of the cubics beyond the limits at the ends of all parts, shape (n, parts +
+            1) [rad].
+
+    Returns:
+        The shares (n,).
+    """
     stack, rows = one.stack, np.arange(len(k))
-    # a parabola through the ends of the part and of the next one crosses limits next to where the
-    # curve does
+    # A parabola through the ends of the part and of an adjacent one crosses the limit near the
+    # crossing of the curve.
     low, high = excess[rows, part], excess[rows, part + 1]
-    beside = np.where(part < PARTS - 1, part + 2, part - 1)
+    beside = np.where(part < SETTINGS.parts - 1, part + 2, part - 1)
     chord = low / (low - high)
     bend = (excess[rows, beside] + low + high) / 2 - 1.5 * np.where(beside > part, high, low)
     root = np.minimum(np.maximum(chord - bend * chord * (chord - 1) / (high - low), 0.0), 1.0)
-    near = stack.at(k, (part + root) / PARTS)
+    near = stack.at(k, (part + root) / SETTINGS.parts)
     q, exact = _on_limits(one, limits, near)
-    at = stack.in_line(k, (part + root) / PARTS, q)
-    exact &= (at >= 0) & (at <= 1) & (np.maximum.reduce(np.abs(near - q), axis=1) < NEAR)
+    at = stack.shares_across(k, (part + root) / SETTINGS.parts, q)
+    exact &= (at >= 0) & (at <= 1) & (np.maximum.reduce(np.abs(near - q), axis=1) < SETTINGS.near)
     rest = np.flatnonzero(~exact)
     if len(rest):
-        # what is aimed at is inside, by half of what rounding is given
+        # The target is inside the limits by half of the rounding tolerance.
         at[rest] = _zeros(
-            lambda share: limits.excess(on_curve(one, k[rest], share)) + ROUNDING / 2,
-            np.array([part[rest], part[rest] + 1]) / PARTS,
+            lambda share: limits.excess(on_curve(one, k[rest], share)) + SETTINGS.rounding / 2,
+            np.array([part[rest], part[rest] + 1]) / SETTINGS.parts,
             low[rest] <= 0,
         )
     return at
 
 
-def _on_limits(one: TracedCurve, limits: _Range, q: Array) -> tuple[Array, Mask]:
-    """The configurations (n, nq) [rad] of the curves next to q (n, nq) with a joint on its limit,
-    and which are found (n,)."""
+def _on_limits(one: TracedCurve, limits: _JointRanges, q: Array) -> tuple[Array, Mask]:
+    """Configurations (n, nq) [rad] of the curves next to q (n, nq) with a joint on its limit, and a
+    mask (n,) of those found.
+    """
     n, nq = q.shape
     rows = np.arange(n)
     own = wrapped(q[:, limits.joints] - limits.middle)
     binding = (np.abs(own) - limits.half).argmax(axis=1)
     joint, side = limits.joints[binding], np.sign(own[rows, binding])
-    target = q[rows, joint] + side * (limits.half[binding] - ROUNDING / 2) - own[rows, binding]
+    target = (
+        q[rows, joint] + side * (limits.half[binding] - SETTINGS.rounding / 2) - own[rows, binding]
+    )
     along = np.zeros((n, nq))
     along[rows, joint] = 1.0
-    q, left = led(one.chain, q, along, target - q[rows, joint], one.T, NEAR)
-    return q, (left < LEFT) & (limits.excess(q) <= 0)
+    q, left = project_onto_curve(one.chain, q, along, target - q[rows, joint], one.T, SETTINGS.near)
+    return q, (left < ACROSS.tolerance) & (limits.excess(q) <= 0)
 
 
 def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Array:
-    """Where a function of shares (n,) is zero, to ROUNDING, between those given (2, n); inside, if
-    that is not found. `inside` (n,): whether it is negative at the first of them."""
+    """Zeros (n,) of a function of shares (n,) between the given ones (2, n), by the Illinois
+    method.
+
+    Args:
+        beyond: function, negative inside the limits.
+        share: brackets of the zeros, shape (2, n).
+        inside: whether the first end of each bracket is inside, shape (n,).
+
+    Returns:
+        The zeros, to half of the rounding tolerance, or the inner ends of the brackets if the
+        search fails.
+    """
     low, high = share
     f_low, f_high = beyond(low), beyond(high)
     found = np.full(len(low), np.nan)
-    for _ in range(CROSSINGS):
-        # regula falsi after Illinois: the end that stays counts half
+    for _ in range(SETTINGS.steps):
+        # Illinois variant of the regula falsi: the value at an end that stays is halved.
         span = np.where(f_high == f_low, 1.0, f_high - f_low)
         at = np.minimum(np.maximum(low - f_low * (high - low) / span, low), high)
         f = beyond(at)
-        found = np.where(np.isnan(found) & (np.abs(f) < ROUNDING / 2), at, found)
+        found = np.where(np.isnan(found) & (np.abs(f) < SETTINGS.rounding / 2), at, found)
         if not np.isnan(found).any():
             break
         is_low = (f <= 0) == inside

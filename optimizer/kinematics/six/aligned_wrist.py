@@ -1,5 +1,5 @@
-"""The self-motion of a spherical wrist with its first and last axis in one line: both joints turn,
-the flange stays.
+"""Self-motion of a spherical wrist whose first and last axes coincide: both joints turn, the flange
+stays.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from joulepath.optimizer.problem.branches import BranchLabel
 
 @dataclass(frozen=True, eq=False)
 class AlignedWrist:
-    """The self-motion through a configuration q (6,) [rad] with the fourth and the sixth axis in
-    one line.
+    """Self-motion through a configuration q (6,) [rad] with coinciding fourth and sixth axes.
 
-    The parameter is the fourth joint's position h. The sixth turns against it if the axes point the
-    same way (`turn`
-    -1), with it if they are opposed (`turn` 1): q6 = q[5] + turn (h - q[3]). The other joints rest.
+    The parameter is the position h of the fourth joint. The sixth joint turns against it if the
+    axes have the same direction (`turn` -1), with it if they are opposed (`turn` 1): q6 = q[5] +
+    turn (h - q[3]). The other joints rest.
     """
 
     label: BranchLabel
@@ -31,28 +30,28 @@ class AlignedWrist:
 
     @property
     def arcs(self) -> list[tuple[float, float]]:
-        """The whole circle."""
+        """The whole circle [rad]."""
         return [(-np.pi, np.pi)]
 
     def parameter(self, q: Array) -> float:
-        """h [rad] of q (6,)."""
+        """Parameter h [rad] of q (6,)."""
         return self.clipped(float(q[3]))
 
     def clipped(self, parameter: float) -> float:
-        """The parameter [rad] without its full turns."""
+        """The parameter [rad], shifted by full turns into [-π, π]."""
         return float(nearest_turn(np.asarray(parameter), np.asarray(0.0)))
 
     def at(self, parameter: Array) -> Array:
-        """The configurations (n, 6) [rad] at parameters (n,)."""
+        """Configurations (n, 6) [rad] at parameters (n,)."""
         q = self._unwrapped(np.asarray(parameter, dtype=float))
         return np.clip(wrapped(q), -np.pi, np.pi)
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """See `SelfMotion`. Both joints move as the parameter does: the boxes are exact."""
-        centre, half = (
-            self._unwrapped(np.asarray(parameter, dtype=float)),
-            np.asarray(half, dtype=float),
-        )
+        """Boxes that cover the curve, see `SelfMotion.boxes`; exact, since both joints move by the
+        parameter.
+        """
+        centre = self._unwrapped(np.asarray(parameter, dtype=float))
+        half = np.asarray(half, dtype=float)
         sides = np.zeros_like(centre)
         sides[:, 3] = sides[:, 5] = half
         return centre, sides

@@ -1,13 +1,13 @@
-"""The branches of an arm with a spherical wrist whose base is ortho-parallel, as most industrial
-arms are.
+"""Branches of an arm with an ortho-parallel base and a spherical wrist, the form of most industrial
+arms.
 
-The second axis is at right angles to the first, the third parallel to the second. The last three
-meet in one point, the wrist, each at right angles to the next at some position. The arm's plane is
-at right angles to the second axis.
+The second axis is perpendicular to the first, the third parallel to the second. The last three axes
+meet in one point, the wrist, each perpendicular to the next one at some position. The arm's plane
+is perpendicular to the second axis.
 
-The names of such arms' branches need few lengths of this plane: M. Brandstötter, A. Angerer, M.
-Hofbaur, "An analytical solution of the inverse kinematics problem of industrial serial manipulators
-with an ortho-parallel basis and a spherical wrist" (2014).
+The names of the branches need few lengths in this plane: M. Brandstötter, A. Angerer, M. Hofbaur,
+"An analytical solution of the inverse kinematics problem of industrial serial manipulators with an
+ortho-parallel basis and a spherical wrist" (2014).
 """
 
 from __future__ import annotations
@@ -21,21 +21,29 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.joint_axes import MEETING, PARALLEL, JointAxes, meeting_point
+from joulepath.optimizer.kinematics.joint_axes import AXES, JointAxes, meeting_point
+from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.problem.branches import Elbow, Label, Shoulder, Wrist
 
-# sine of the wrist angle below which the wrist counts as aligned: then every member of its
-# self-motion reaches the pose to half of what is promised of a solution
-ALIGNED = 5e-10
-# distance [m] beyond the reach at which a pose may lie by rounding alone
-ROUNDING = 1e-10
-# a part of the label is singular where its sine, or the shoulder's distance [m], is below this:
-# nearer to it, a pose that is rounded to double precision no longer determines the joints to 1e-9
-# rad
-SINGULAR = 1e-6
+
+@dataclass(frozen=True)
+class SphericalWristSettings:
+    """Thresholds of singular configurations."""
+
+    aligned: float = 5e-10
+    """Sine of the wrist angle, or distance [m], below which the wrist counts as aligned: every
+    member of its self-motion then reaches the pose to half the promised accuracy.
+    """
+    singular: float = 1e-6
+    """Sine, or distance of the shoulder [m], below which a part of the label is singular: closer to
+    it, a pose rounded to double precision no longer determines the joints to 1e-9 rad.
+    """
 
 
-# all branches, in the order of their names
+SPHERICAL_WRIST = SphericalWristSettings()
+
+
+# All branches, in the order of their names.
 LABELS = tuple(
     Label(*parts)
     for parts in product(*(sorted(get_args(part)) for part in (Shoulder, Elbow, Wrist)))
@@ -43,45 +51,54 @@ LABELS = tuple(
 
 
 def branch_numbers(measures: Array) -> Array:
-    """The branches (...), as indices of LABELS, with these `SphericalWrist.measures` (..., 3)."""
+    """Branches (...), as indices of LABELS, from `SphericalWrist.measures` (..., 3)."""
     ahead, elbow, wrist = measures[..., 0], measures[..., 1], measures[..., 2]
     return np.asarray(4 * (ahead >= 0) + 2 * (ahead * elbow < 0) + (wrist < 0))
 
 
 @dataclass(frozen=True, eq=False)
 class SphericalWrist:
-    """Where the parts of the label change.
+    """Geometry of the singularities, where the parts of the label change.
 
-    In the arm's plane, forward and up of the first axis: `shoulder` (2,) [m] the second axis,
-    `upper` and `fore` the length [m] and, at zero, angle [rad] of the links from second to third
-    axis and from there to the wrist. These turn with `turns` (2,) times q2 and q3. `offset` [m] is
-    the distance of the wrist's plane from the first axis, `bend` [rad] the wrist angle at q5 = 0.
-    `up` and `origin` (3,) are direction and point of the first axis, `wrist` (3,) the wrist in the
-    flange frame.
+    Lengths are in the arm's plane, forward and up of the first axis.
     """
 
     shoulder: Array
+    """Position (2,) of the second axis [m]."""
     upper: tuple[float, float]
+    """Length [m] and, at zero, angle [rad] of the link from the second axis to the third."""
     fore: tuple[float, float]
+    """Length [m] and, at zero, angle [rad] of the link from the third axis to the wrist."""
     turns: tuple[float, float]
+    """Factors of q2 and q3 in the angles of the links, 1 or -1."""
     offset: float
+    """Distance of the wrist's plane from the first axis [m]."""
     bend: float
+    """Wrist angle at q5 = 0 [rad]."""
     up: Array
+    """Direction (3,) of the first axis."""
     origin: Array
+    """Point (3,) on the first axis [m]."""
     wrist: Array
+    """Position (3,) of the wrist in the flange frame [m]."""
     last_axis: Array
+    """Direction (3,) of the last axis in the flange frame."""
 
     @classmethod
     def of(cls, axes: JointAxes) -> SphericalWrist | None:
-        """The geometry of an arm's axes; None for an arm of another kind."""
+        """Geometry of an arm with these axes; None for an arm of another form."""
         z, p = axes.directions, axes.points
         if len(z) != 6:
             return None
         wrist, distance = meeting_point(z[3:], p[3:])
-        square = all(abs(z[i] @ z[j]) < PARALLEL for i, j in ((0, 1), (3, 4), (4, 5)))
-        if distance > MEETING or not square or np.linalg.norm(np.cross(z[1], z[2])) > PARALLEL:
+        square = all(abs(z[i] @ z[j]) < AXES.parallel for i, j in ((0, 1), (3, 4), (4, 5)))
+        if (
+            distance > AXES.meeting
+            or not square
+            or np.linalg.norm(np.cross(z[1], z[2])) > AXES.parallel
+        ):
             return None
-        # away from the ground, if the first axis is upright
+        # The direction away from the ground if the first axis is upright.
         up = z[0] * (-1.0 if z[0][2] < -0.5 else 1.0)
         forward = np.cross(z[1], up)
         reach = float((p[1] - p[0]) @ forward)
@@ -104,20 +121,19 @@ class SphericalWrist:
         )
 
     def label(self, q: Array) -> Label:
-        """The branch of a configuration (6,) [rad]; on a singularity, one of those that meet
-        there."""
+        """Branch of a configuration (6,) [rad]; at a singularity, one of the meeting branches."""
         return LABELS[int(branch_numbers(self.measures(q)))]
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
-        """The parts of the label that are singular at a configuration (6,) [rad]."""
+        """Singular parts of the label at a configuration (6,) [rad]."""
         measures = zip(("shoulder", "elbow", "wrist"), self.measures(q), strict=True)
-        return tuple(part for part, value in measures if abs(value) < SINGULAR)
+        return tuple(part for part, value in measures if abs(value) < SPHERICAL_WRIST.singular)
 
     def measures(self, q: Array) -> Array:
-        """Distance [m] of the wrist ahead of the first axis, sines of elbow and wrist (..., 3), at
-        q (..., 6) [rad].
+        """Distances from the three singularities, (..., 3), at q (..., 6) [rad].
 
-        Each is zero where its part of the label changes.
+        They are the distance of the wrist ahead of the first axis [m], and the sines of the elbow
+        and wrist angles. Each is zero at the singularity that changes its part of the label.
         """
         lift = self.turns[0] * q[..., 1]
         first, second = self.upper[1] + lift, self.fore[1] + lift + self.turns[1] * q[..., 2]
@@ -130,11 +146,15 @@ class SphericalWrist:
         return found
 
     def bent(self, sine: float, aligned: bool) -> Array:
-        """The positions (2,) [rad] of the fifth joint with a wrist angle of this sine; one for no
-        sine.
+        """Positions of the fifth joint for the sine of a wrist angle.
 
-        They are near the `aligned` wrist, whose axes point the same way, or else near the folded
-        one.
+        Args:
+            sine: sine of the wrist angle, at least 0.
+            aligned: whether the wrist is near alignment, with both axes in the same direction;
+                otherwise it is near folding.
+
+        Returns:
+            Two positions (2,) [rad], or one (1,) if the sine is zero.
         """
         angles = [
             atan2(side, 1.0 if aligned else -1.0)
@@ -143,13 +163,13 @@ class SphericalWrist:
         return np.asarray(wrapped(np.array(angles) - self.bend))
 
     def distance_to_reach(self, T: Array) -> float | None:
-        """Distance [m] by which the wrist is out of reach with the flange at T (4, 4); None for an
+        """Distance [m] by which the wrist is out of reach at the flange pose T (4, 4); None for an
         arm with an offset.
 
         The orientation does not matter. In the arm's plane the wrist can be anywhere between two
         circles about the second axis, ahead of the first axis or behind it.
         """
-        if abs(self.offset) > ALIGNED:
+        if abs(self.offset) > SPHERICAL_WRIST.aligned:
             return None
         radius, height = self._wrist_at(T)
         least, most = abs(self.upper[0] - self.fore[0]), self.upper[0] + self.fore[0]
@@ -159,10 +179,10 @@ class SphericalWrist:
         return min(max(0.0, least - distance, distance - most) for distance in distances)
 
     def turns_freely(self, T: Array) -> bool:
-        """Whether the first axis, or the second, may turn with the flange at T (4, 4), because the
+        """Whether the first or the second axis may turn at the flange pose T (4, 4), because the
         wrist lies on it.
 
-        The wrist then turns back. Of an arm with an offset no axis but the second can.
+        The wrist then compensates the turn. Of an arm with an offset, only the second axis can.
         """
         radius, height = self._wrist_at(T)
         ahead = sqrt(max(radius**2 - self.offset**2, 0.0))
@@ -171,15 +191,17 @@ class SphericalWrist:
                 hypot(side - self.shoulder[0], height - self.shoulder[1])
                 for side in (ahead, -ahead)
             )
-            < ALIGNED
+            < SPHERICAL_WRIST.aligned
         )
-        if on_second and abs(self.upper[0] - self.fore[0]) < ALIGNED:
+        if on_second and abs(self.upper[0] - self.fore[0]) < SPHERICAL_WRIST.aligned:
             return True
         distance = self.distance_to_reach(T)
-        return radius < ALIGNED and distance is not None and distance <= ROUNDING
+        return (
+            radius < SPHERICAL_WRIST.aligned and distance is not None and distance <= REACH.rounding
+        )
 
     def _wrist_at(self, T: Array) -> tuple[float, float]:
-        """Distance from the first axis, and height along it [m], of the wrist with the flange at T
+        """Distance from the first axis and height along it [m] of the wrist at the flange pose T
         (4, 4).
         """
         away = T[:3, :3] @ self.wrist + T[:3, 3] - self.origin

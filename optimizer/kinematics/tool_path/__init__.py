@@ -1,1 +1,1 @@
-"""Tool paths: their shape over time, and the joints that follow them."""
+"""Tool paths: the shape and course of the TCP, and joint paths along them."""

@@ -1,10 +1,11 @@
-"""Points of a course that those of a motion are compared with, in the order of both.
+"""Comparison of a motion with a course: the course point for each point of the motion, in the order
+of both.
 
-Each point of a motion has the point of the course that is least off, with what it leaves out since
-the point before: so each depends on the one before it. All are looked for at once, from a guess of
-those before; then again from what was found, until nothing changes. What is found then is what
-going from point to point finds: the first point depends on nothing, and each other one on a point
-that did not change.
+Each point of the motion is matched with the course point of least deviation, including the part of
+the course omitted since the previous match: so each match depends on the one before. All points are
+matched at once, from a guess of their predecessors, and again from the result until nothing
+changes. A fixed point equals the matching point by point, by induction: the first match depends on
+nothing, and every other one on a match that did not change.
 """
 
 from __future__ import annotations
@@ -16,30 +17,43 @@ import numpy.typing as npt
 
 from joulepath.models.robot import Array
 
-# a point is looked for so many times as far ahead on the course as the motion and its tolerances
-# reach
-AHEAD = 2.0
-# m²: two points of the course that are nearer are the same
-TINY = 1e-24
-# how often all points are looked for at once, and how many numbers that may take
-AT_ONCE, MOST_AT_ONCE = 8, 2_000_000
+
+@dataclass(frozen=True)
+class MatchingSettings:
+    """Settings of the search for matches."""
+
+    look_ahead: float = 2.0
+    """Distance of the search ahead on the course, relative to the distance that the motion and its
+    tolerances reach.
+    """
+    least_square: float = 1e-24
+    """Squared distance of two course points below which they are one [m²]."""
+    rounds: int = 8
+    """Largest number of rounds in which all points are matched at once."""
+    most_numbers: int = 2_000_000
+    """Largest number of array elements of such a round."""
+
+
+SETTINGS = MatchingSettings()
 
 
 @dataclass(frozen=True)
 class _Places:
-    """Places on a course (k,): the number of the piece, the share of it, the length [m] up to
-    there, and the point (k, d); and what is `left_out` (k,) [m] since the place before."""
+    """Places on a course."""
 
     piece: npt.NDArray[np.intp]
+    """Index of the piece, shape (k,)."""
     share: Array
+    """Share of the piece, shape (k,)."""
     length: Array
+    """Length of the course up to the place, shape (k,) [m]."""
     point: Array
+    """Point of the course, shape (k, d)."""
     left_out: Array
+    """Omitted part of the course since the previous place, shape (k,) [m]."""
 
     def before(self, first: Array) -> _Places:
-        """The places before each of them: the `first` point (d,) of the course, and all but the
-        last.
-        """
+        """Previous places: the first point (d,) of the course, then all places but the last."""
         return _Places(
             np.append(0, self.piece[:-1]),
             np.append(0.0, self.share[:-1]),
@@ -50,53 +64,61 @@ class _Places:
 
 
 class _Course:
-    """A course through points (m, d), the distances between which are lengths [m]; `reach` [m] is
-    that of the tolerances."""
+    """Course through points (m, d), whose distances are lengths [m]; `reach` [m] is the length of
+    the tolerances.
+    """
 
     def __init__(self, known: Array, reach: float) -> None:
         self.known, self.reach = known, reach
         self.chords = np.diff(known, axis=0)
         self.squares = (self.chords**2).sum(axis=1)
-        self.gone = np.concatenate([[0.0], np.cumsum(np.sqrt(self.squares))])
+        self.lengths = np.concatenate([[0.0], np.cumsum(np.sqrt(self.squares))])
 
     def guess(self, moved: Array) -> _Places:
-        """Places (k,) at the lengths that a motion moves, `moved` (k,) [m] from each of its points
-        to the next.
+        """Places (k,) proportional to the length of a motion, which moves by `moved` (k,) [m] up to
+        each of its points.
         """
-        way = np.cumsum(moved)
-        length = way * (self.gone[-1] / max(way[-1], TINY))
+        distance = np.cumsum(moved)
+        length = distance * (self.lengths[-1] / max(distance[-1], SETTINGS.least_square))
         piece = np.clip(
-            np.searchsorted(self.gone, length, side="right") - 1, 0, len(self.chords) - 1
+            np.searchsorted(self.lengths, length, side="right") - 1, 0, len(self.chords) - 1
         )
         share = np.clip(
-            (length - self.gone[piece]) / np.sqrt(np.maximum(self.squares[piece], TINY)), 0.0, 1.0
+            (length - self.lengths[piece])
+            / np.sqrt(np.maximum(self.squares[piece], SETTINGS.least_square)),
+            0.0,
+            1.0,
         )
         point = self.known[piece] + share[:, None] * self.chords[piece]
-        return _Places(piece, share, length, point, np.zeros_like(way))
+        return _Places(piece, share, length, point, np.zeros_like(distance))
 
     def after(self, before: _Places, asked: Array, moved: Array) -> _Places | None:
-        """The places (k,) of points (k, d), from those before them; None if that takes too many
-        numbers.
+        """Matches (k,) of points `asked` (k, d), from their previous places; None if the arrays
+        would be too large.
 
-        Of the places that are not too far ahead, the one is taken that is least off, with what it
-        leaves out.
+        Among the places within reach, the one of least deviation plus omitted length is taken.
         """
         first = np.maximum(before.piece - 1, 0)
-        last = np.searchsorted(self.gone, before.length + AHEAD * moved + self.reach)
+        last = np.searchsorted(
+            self.lengths, before.length + SETTINGS.look_ahead * moved + self.reach
+        )
         last = np.minimum(last, len(self.chords))
         width = int((last - first).max())
-        if width * asked.size > MOST_AT_ONCE and len(asked) > 1:
+        if width * asked.size > SETTINGS.most_numbers and len(asked) > 1:
             return None
         pieces = first[:, None] + np.arange(width)
         too_far = pieces >= last[:, None]
         pieces = np.minimum(pieces, len(self.chords) - 1)
         start, chord, square = self.known[pieces], self.chords[pieces], self.squares[pieces]
-        # where the course turns back, two of its points may be the same
+        # Where the course turns back, two of its points may coincide.
         share = np.clip(
-            ((asked[:, None] - start) * chord).sum(axis=2) / np.maximum(square, TINY), 0.0, 1.0
+            ((asked[:, None] - start) * chord).sum(axis=2)
+            / np.maximum(square, SETTINGS.least_square),
+            0.0,
+            1.0,
         )
         points = start + share[..., None] * chord
-        lengths = self.gone[pieces] + share * np.sqrt(square)
+        lengths = self.lengths[pieces] + share * np.sqrt(square)
         apart = ((points - before.point[:, None]) ** 2).sum(axis=2)
         skipped = np.sqrt(np.maximum((lengths - before.length[:, None]) ** 2 - apart, 0.0)) / 2
         off = np.linalg.norm(asked[:, None] - points, axis=2) + skipped
@@ -112,16 +134,22 @@ class _Course:
 
 
 def matched(at: Array, known: Array, asked: Array, reach: float) -> tuple[Array, Array, float]:
-    """Fractions (k,) of a course that are compared with a motion; what is left out before each (k,)
-    [m], and after the last [m].
+    """Matches the points of a motion with those of a course.
 
-    `known` (m, d) are the points at fractions `at` (m,), `asked` (k, d) those of the motion;
-    `reach` [m] is by how much the tolerances allow to look farther.
+    Args:
+        at: fractions of the known course points, shape (m,).
+        known: course points, shape (m, d).
+        asked: points of the motion, shape (k, d).
+        reach: length by which the tolerances extend the search [m].
+
+    Returns:
+        The fractions (k,) of the matches, the omitted length (k,) [m] before each, and the length
+        [m] after the last one.
     """
-    course = _Course(known, AHEAD * reach)
+    course = _Course(known, SETTINGS.look_ahead * reach)
     moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)
     found, same = course.guess(moved), 0
-    for _ in range(AT_ONCE):
+    for _ in range(SETTINGS.rounds):
         again = course.after(found.before(known[0]), asked, moved)
         if again is None:
             break
@@ -130,13 +158,13 @@ def matched(at: Array, known: Array, asked: Array, reach: float) -> tuple[Array,
         if same == len(asked):
             break
     for k in range(same, len(asked)):
-        _go_on(course, found, k, asked, moved)
+        _match_next(course, found, k, asked, moved)
     best = at[found.piece] + found.share * (at[found.piece + 1] - at[found.piece])
-    return best, found.left_out, float(course.gone[-1] - found.length[-1])
+    return best, found.left_out, float(course.lengths[-1] - found.length[-1])
 
 
-def _go_on(course: _Course, found: _Places, k: int, asked: Array, moved: Array) -> None:
-    """Put the place of point `k` into those that are `found`, from the one before it."""
+def _match_next(course: _Course, found: _Places, k: int, asked: Array, moved: Array) -> None:
+    """Sets the match of point `k` in `found`, from the one before it; in place."""
     own = slice(max(k - 1, 0), max(k - 1, 0) + 1)
     last = _Places(
         found.piece[own], found.share[own], found.length[own], found.point[own], found.left_out[own]
@@ -147,9 +175,7 @@ def _go_on(course: _Course, found: _Places, k: int, asked: Array, moved: Array) 
         )
     place = course.after(last, asked[k : k + 1], moved[k : k + 1])
     assert place is not None
-    found.piece[k], found.share[k], found.length[k] = (
-        place.piece[0],
-        place.share[0],
-        place.length[0],
-    )
+    found.piece[k] = place.piece[0]
+    found.share[k] = place.share[0]
+    found.length[k] = place.length[0]
     found.point[k], found.left_out[k] = place.point[0], place.left_out[0]

@@ -1,9 +1,9 @@
-"""From the course of the TCP to that of the joints: inverse kinematics by Newton's method, each
-point from the last.
+"""Joint paths along a course of the TCP: inverse kinematics by Newton's method, each point starting
+from the previous one.
 
-Several configurations of the first pose are followed at once. Each leads along one curve in joint
-space, as far as the arm reaches and no singularity stops it. The joint path is a quintic spline
-through what was found.
+Several configurations of the first pose are continued at once. Each leads along one curve in joint
+space, as far as the arm reaches without passing a singularity. The joint path is a quintic spline
+through the result.
 """
 
 from __future__ import annotations
@@ -22,45 +22,52 @@ from joulepath.optimizer.kinematics import newton
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.kinematics.tool_path.turning_sheet import (
-    TurningSheet,
+from joulepath.optimizer.kinematics.tool_path.turning_grid import (
+    TurningGrid,
     shortest,
     turning_of,
     turning_through,
     values_of,
 )
-from joulepath.optimizer.motion import bspline
-from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 
-# longest way [m] from point to point, and how many there are at least on a straight piece and on
-# half of a corner
-STEP, ON_PIECE = 0.005, 32
-# joints that move farther from point to point [rad] are followed in so many times as many steps
-FAR, FINER = 0.03, 4
-# a configuration is on the course if it misses the pose by less [m, rad]
-REACHED = 1e-9
-# a joint that turns farther from one point to the next [rad] does so at a singularity
-JUMP = 0.25
-# knot spans of the joint path on each piece of the course at first, and at most in all; traced
-# points in each of them at least; and the share of the tolerances that the fit may take
-FIRST_SPANS, MOST_SPANS, SAMPLES_IN_SPAN, SHARE = 2, 500, 2, 0.5
 
-# values by which a turning is given: the first that leads to the end of the course counts
-KNOTS = (10, 18, 34)
-# longest step [rad] of a turn of the tool at the start
-TURN_STEP = 0.1
+@dataclass(frozen=True)
+class TraceSettings:
+    """Settings of traces."""
+
+    step: float = 0.005
+    """Largest distance between points [m]."""
+    points_on_piece: int = 32
+    """Smallest number of points on a straight piece, and on half of a corner."""
+    far: float = 0.03
+    """Joint movement between points above which a trace is repeated with more points [rad]."""
+    refinement: int = 4
+    """Factor of the number of points in the repetition."""
+    reached: float = 1e-9
+    """Largest pose error of a configuration on the course [m, rad]."""
+    jump: float = 0.25
+    """Joint movement between points above which the arm passes a singularity [rad]."""
+    turning_values: tuple[int, ...] = (10, 18, 34)
+    """Numbers of values of a turning; the first number that leads to the end of the course is
+    used.
+    """
+    turn_step: float = 0.1
+    """Longest step of a turn of the tool at the start [rad]."""
+
+
+TRACE = TraceSettings()
 
 Obstacle = Literal["unreachable", "singular"]
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Configurations q (m, nq) [rad] at the fractions `at` (m,) of a course, and why they end
-    before its end, if so.
+    """Configurations q (m, nq) [rad] at the fractions `at` (m,) of a course.
 
-    The tool is turned on the way by `turning`, if it is. With other turnings the course is followed
-    to `farthest`.
+    `obstacle` tells why they end before the end of the course, if they do. `turning` is the turning
+    of the tool on the way, if any. With other turnings the course can be followed up to the
+    fraction `farthest`.
     """
 
     q: Array
@@ -71,21 +78,21 @@ class Trace:
 
     @property
     def followed(self) -> float:
-        """The share of the course that was followed."""
+        """Fraction of the course up to which it was followed."""
         return max(float(self.at[-1]), self.farthest)
 
 
 @lru_cache(maxsize=16)
 def chain_of(robot: Robot) -> Chain:
-    """The chain of a robot."""
+    """Chain of a robot."""
     return Chain.of(robot.model)
 
 
 def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
-    """The course followed from each configuration q_start (n, nq) [rad] of its first pose.
+    """Traces of a course from each configuration q_start (n, nq) [rad] of its first pose.
 
-    Where the tool may turn about an axis, it does so where the course cannot be followed without.
-    From a free start it turns evenly to the end, or not at all if that is free, too.
+    If the tool may turn about an axis, it does so where the course cannot be followed otherwise.
+    From a free start the tool turns uniformly to the end, or not at all if the end is free, too.
     """
     if course.free_start and course.turning is None:
         return _evenly_turned(arm, course, q_start)
@@ -93,10 +100,9 @@ def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
 
 
 def traces_of_each(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> list[Trace]:
-    """`traces` of courses whose ends are given in full, each from its own configuration q_start (n,
-    nq) [rad].
+    """Traces of courses with fixed ends, each from its own configuration q_start (n, nq) [rad].
 
-    Courses of one shape, which may be turned about the path's free axis, are followed together.
+    Courses of one shape, which may be turned about the path's free axis, are traced together.
     """
     found, left = dict[int, Trace](), list(range(len(courses)))
     while left:
@@ -113,8 +119,8 @@ def traces_of_each(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> l
 def _turned_where_needed(
     arm: Arm, courses: Sequence[ToolCourse], found: Sequence[Trace]
 ) -> list[Trace]:
-    """What was found of one course or of one each, with a turning where that is allowed and nothing
-    else leads on.
+    """Traces of one course, or of one course each, with a turning where it is allowed and
+    needed.
     """
     own = list(courses) * len(found) if len(courses) == 1 else courses
     return [
@@ -128,7 +134,7 @@ def _turned_where_needed(
 def _evenly_turned(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
     turned = np.array([_angle_at(arm, course, q) for q in q_start])
     free = course.free_end, course.free_start
-    angles = np.linspace(turned, turned * course.free_end, KNOTS[0], axis=1)
+    angles = np.linspace(turned, turned * course.free_end, TRACE.turning_values[0], axis=1)
     courses = [
         replace(course, turning=turning_of(values_of(each, *free), *free)) for each in angles
     ]
@@ -137,8 +143,8 @@ def _evenly_turned(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
 
 
 def _angle_at(arm: Arm, course: ToolCourse, q_start: Array) -> float:
-    """The angle [rad] by which the tool is turned at the start of a course in a configuration
-    q_start (nq,) [rad].
+    """Turning angle [rad] of the tool at the start of a course in a configuration q_start (nq,)
+    [rad].
     """
     return course.angle_at_start(tcp_pose(arm, q_start)) if course.free_start else 0.0
 
@@ -146,33 +152,42 @@ def _angle_at(arm: Arm, course: ToolCourse, q_start: Array) -> float:
 def turned_start(
     arm: Arm, course: ToolCourse, q_start: Array, before: float, after: float
 ) -> Array | None:
-    """The configuration (nq,) [rad] to which the arm turns the tool at the start of a course, from
-    q_start (nq,) at one angle [rad] to another one; None if it cannot."""
+    """Configuration after a turn of the tool at the start of a course.
+
+    Args:
+        arm: arm with its TCP.
+        course: course of the tool path.
+        q_start: configuration at the angle `before`, shape (nq,) [rad].
+        before: turning angle before [rad].
+        after: turning angle after [rad].
+
+    Returns:
+        The configuration (nq,) [rad]; None if the arm cannot turn so far.
+    """
     chain, q = chain_of(arm.robot), q_start
     (T,) = replace(course, turning=None).poses(np.zeros(1))
-    angles = np.linspace(before, after, int(np.ceil(abs(after - before) / TURN_STEP)) + 1)[1:]
+    angles = np.linspace(before, after, int(np.ceil(abs(after - before) / TRACE.turn_step)) + 1)[1:]
     for pose in flange_pose(
         course.turned(np.tile(T, (len(angles), 1, 1)), angles), arm.T_flange_tcp
     ):
-        (found,), (missed,) = newton.solved(chain, q[None], pose)
-        if missed > REACHED or np.abs(found - q).max() > JUMP:
+        (found,), (residual,) = newton.solved(chain, q[None], pose)
+        if residual > TRACE.reached or np.abs(found - q).max() > TRACE.jump:
             return None
         q = found
     return q
 
 
 def with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
-    """The trace of a turning with which the course is followed to its end, where another one is
-    `stopped` on the way.
+    """Trace with a turning that leads to the end of the course, in place of a `stopped` trace.
 
-    If there is none: how far the course is followed.
+    Without such a turning, the stopped trace with the fraction `farthest`.
     """
     angle = _angle_at(arm, course, stopped.q[0])
-    sheet = TurningSheet.of(arm, chain_of(arm.robot), course, stopped.q[0], turned=angle)
-    chosen = sheet.least(shortest, course.free_end, course.free_start)
-    for knots in KNOTS if chosen is not None else ():
+    grid = TurningGrid.of(arm, chain_of(arm.robot), course, stopped.q[0], turned=angle)
+    chosen = grid.least(shortest, course.free_end, course.free_start)
+    for knots in TRACE.turning_values if chosen is not None else ():
         turning = turning_through(
-            sheet.at, sheet.angles[chosen], knots, course.free_end, course.free_start
+            grid.at, grid.angles[chosen], knots, course.free_end, course.free_start
         )
         q_start = turned_start(arm, course, stopped.q[0], angle, float(turning(0.0)))
         if q_start is None:
@@ -180,24 +195,30 @@ def with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
         (trace,) = _traces(arm, [replace(course, turning=turning)], q_start[None])
         if trace.obstacle is None:
             return replace(trace, turning=turning)
-    return replace(stopped, farthest=sheet.reached if chosen is None else 0.0)
+    return replace(stopped, farthest=grid.reached if chosen is None else 0.0)
 
 
 def _traces(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> list[Trace]:
-    """A course with its turning, if any, followed from each start: one for all, or one each, of the
-    same shape.
+    """Traces from each start: of one course for all, or of one course each with the same shape.
 
-    Where joints move far from point to point, it is followed once more with more points.
+    Where joints move far between points, the trace is repeated with more points.
     """
-    found = _traced(arm, courses, q_start, courses[0].grid(ON_PIECE, STEP))
+    found = _traced(arm, courses, q_start, courses[0].grid(TRACE.points_on_piece, TRACE.step))
     coarse = [
         k
         for k, each in enumerate(found)
-        if len(each.q) > 1 and np.abs(np.diff(each.q, axis=0)).max() > FAR
+        if len(each.q) > 1 and np.abs(np.diff(each.q, axis=0)).max() > TRACE.far
     ]
     if coarse:
         own = courses if len(courses) == 1 else [courses[k] for k in coarse]
-        finer = _traced(arm, own, q_start[coarse], courses[0].grid(FINER * ON_PIECE, STEP / FINER))
+        finer = _traced(
+            arm,
+            own,
+            q_start[coarse],
+            courses[0].grid(
+                TRACE.refinement * TRACE.points_on_piece, TRACE.step / TRACE.refinement
+            ),
+        )
         found = [finer[coarse.index(k)] if k in coarse else each for k, each in enumerate(found)]
     return found
 
@@ -207,97 +228,46 @@ def _traced(arm: Arm, courses: Sequence[ToolCourse], q_start: Array, at: Array) 
     q = np.full((len(q_start), len(at), q_start.shape[1]), np.nan)
     q[:, 0] = q_start
     last, obstacle = np.zeros(len(q_start), dtype=int), list[Obstacle | None]([None] * len(q_start))
-    going = np.arange(len(q_start))
+    active = np.arange(len(q_start))
     for k in range(1, len(at)):
         checkpoint()
-        guess = before = q[going, k - 1]
+        guess = before = q[active, k - 1]
         if k > 1:
-            guess = before + (before - q[going, k - 2]) * (
+            guess = before + (before - q[active, k - 2]) * (
                 (at[k] - at[k - 1]) / (at[k - 1] - at[k - 2])
             )
-        pose = poses[0, k] if len(courses) == 1 else poses[going, k]
-        found, missed = newton.solved(chain, guess, flange_pose(pose, arm.T_flange_tcp))
-        jumped = np.abs(found - before).max(axis=1) > JUMP
-        for node, is_missed, is_jump in zip(going, missed > REACHED, jumped, strict=True):
+        pose = poses[0, k] if len(courses) == 1 else poses[active, k]
+        found, residual = newton.solved(chain, guess, flange_pose(pose, arm.T_flange_tcp))
+        jumped = np.abs(found - before).max(axis=1) > TRACE.jump
+        for node, is_missed, is_jump in zip(active, residual > TRACE.reached, jumped, strict=True):
             if is_missed or is_jump:
                 obstacle[node] = "unreachable" if is_missed else "singular"
-        kept = ~(jumped | (missed > REACHED))
-        going = going[kept]
-        if not len(going):
+        kept = ~(jumped | (residual > TRACE.reached))
+        active = active[kept]
+        if not len(active):
             break
-        q[going, k], last[going] = found[kept], k
+        q[active, k], last[active] = found[kept], k
     return [Trace(q[n, : last[n] + 1], at[: last[n] + 1], obstacle[n]) for n in range(len(q_start))]
 
 
-def joint_path(arm: Arm, course: ToolCourse, trace: Trace) -> Spline | None:
-    """The path γ(s), s ∈ [0, 1], through a whole trace; None if it turns too sharply for the
-    tolerances.
-
-    The spline has more knots where it is off the course: near corners and singularities.
-    """
-    course = replace(course, turning=trace.turning)
-    breaks = course.grid(FIRST_SPANS)
-    while len(breaks) <= MOST_SPANS:
-        checkpoint()
-        denser = _denser(arm, course, trace, breaks)
-        if denser is None:
-            return None
-        trace = denser
-        knots = bspline.clamped(breaks)
-        path = Spline(bspline.DEGREE, knots, bspline.fit(trace.q, trace.at, knots, resting=1))
-        checked = np.sort(np.concatenate([trace.at, (trace.at[1:] + trace.at[:-1]) / 2]))
-        off = course.ratios(tcp_pose(arm, path.curve(checked)), course.poses(checked))
-        bad = np.unique(
-            np.searchsorted(breaks, checked[off > SHARE], side="right").clip(1, len(breaks) - 1)
-        )
-        if not len(bad):
-            return path
-        breaks = np.union1d(breaks, (breaks[bad] + breaks[bad - 1]) / 2)
-    return None
-
-
-def _denser(arm: Arm, course: ToolCourse, trace: Trace, breaks: Array) -> Trace | None:
-    """A trace with enough points for a spline with these breaks; None if one of them is not
-    found."""
-    few = np.flatnonzero(np.histogram(trace.at, breaks)[0] < SAMPLES_IN_SPAN)
-    inside = (np.arange(SAMPLES_IN_SPAN) + 0.5) / SAMPLES_IN_SPAN
-    at = (breaks[few, None] + inside * np.diff(breaks)[few, None]).ravel()
-    chain, found = chain_of(arm.robot), np.empty((len(at), trace.q.shape[1]))
-    guesses = np.stack([np.interp(at, trace.at, q) for q in trace.q.T], axis=1)
-    for k, pose in enumerate(course.poses(at)):
-        (found[k],), (missed,) = newton.solved(
-            chain, guesses[k][None], flange_pose(pose, arm.T_flange_tcp)
-        )
-        if missed > REACHED or np.abs(found[k] - guesses[k]).max() > JUMP:
-            return None
-    order = np.argsort(np.concatenate([trace.at, at]), kind="stable")
-    return replace(
-        trace, q=np.concatenate([trace.q, found])[order], at=np.concatenate([trace.at, at])[order]
-    )
-
-
-def path_ratios(arm: Arm, course: ToolCourse, q: Array) -> dict[str, float]:
-    """The worst deviations of configurations q (k, nq) [rad] from a course, over their
-    tolerances."""
-    position, rotation = course.deviation(tcp_pose(arm, q))
-    return {
-        "path_position": float(position.max()) / course.path.position_tolerance,
-        "path_rotation": float(rotation.max()) / course.path.rotation_tolerance,
-    }
-
-
 def within(trace: Trace, lower: Array, upper: Array) -> bool:
-    """Whether a trace keeps within joint limits (nq,) [rad]."""
+    """Whether a trace stays within joint limits (nq,) [rad]."""
     return bool(((trace.q >= lower) & (trace.q <= upper)).all())
 
 
 def turned(
     trace: Trace, lower: Array, upper: Array, choices: Sequence[Sequence[float]]
 ) -> Trace | None:
-    """The trace by full turns of its joints within joint limits (nq,) [rad], nearest to their
-    middle.
+    """The trace, shifted by full turns into joint limits, nearest to their middle.
 
-    `choices` are the positions of each joint at its start. None if no full turns are.
+    Args:
+        trace: trace of a course.
+        lower: lower limits, shape (nq,) [rad].
+        upper: upper limits, shape (nq,) [rad].
+        choices: possible positions of each joint at the start of the trace [rad].
+
+    Returns:
+        The shifted trace; None if no full turns fit.
     """
     shift = np.zeros(len(lower))
     for joint, positions in enumerate(choices):

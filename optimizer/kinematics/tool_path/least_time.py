@@ -1,12 +1,13 @@
-"""The least time in which the TCP goes along a tool path whose speed has a bound.
+"""Least duration of motions along a tool path with a bound on the TCP speed.
 
-A motion along a course passes by each of its points, in their order: for each point there is a time
-at which the TCP is within twice the position tolerance of it. (Once for how far the motion may be
-from the course, and once for what the certificate lets it leave out of the course, which lies
-within the tolerance of what it goes along.) At both ends it is at the very point. So between the
-times of two points, c apart, the TCP moves by c - 4 ε at least, or c - 2 ε where one of them is an
-end, or c from end to end. The sum over any points of the course is the least way of the TCP: few
-points for a straight line, more where it bends. This over the greatest speed is the least time.
+A motion along a course passes each of its points, in order: for each point there is a time at which
+the TCP is within 2 ε, twice the position tolerance, of it. (One ε is the tolerance of the motion
+from the course, the other one the part of the course that the certificate lets the motion omit,
+which lies within the tolerance of the followed part.) At both ends the TCP is exactly at the point.
+So between the times of two points at a distance c, the TCP moves by at least c - 4 ε, by c - 2 ε if
+one of them is an end, and by c from end to end. The sum over any sequence of course points is a
+lower bound of the distance: few points suffice for a straight line, more are better at bends. The
+bound over the largest speed is the least duration.
 """
 
 from __future__ import annotations
@@ -16,29 +17,31 @@ import numpy as np
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE
+from joulepath.optimizer.problem.tool_path import TOOL_PATH
 
-# pieces into which the course is divided, its corners kept
-PIECES = (1, 2, 4, 8, 16, 32)
+DIVISIONS = (1, 2, 4, 8, 16, 32)
+"""Numbers of parts of each piece of the course for which the bound is computed."""
 
 
-def least_way(course: ToolCourse) -> float:
-    """What the TCP moves by at least [m] on motions along a course within its tolerance."""
+def least_tcp_distance(course: ToolCourse) -> float:
+    """Lower bound of the distance [m] that the TCP moves on motions along a course within its
+    tolerance.
+    """
     ends = np.linalg.norm(np.diff(course.poses(np.array([0.0, 1.0]))[:, :3, 3], axis=0))
     best = float(ends)
-    for count in PIECES:
+    for count in DIVISIONS:
         points = course.poses(course.grid(count))[:, :3, 3]
-        missed = np.full(len(points), 2 * course.path.position_tolerance)
-        missed[[0, -1]] = 0.0
-        apart = np.linalg.norm(np.diff(points, axis=0), axis=1) - missed[1:] - missed[:-1]
+        slack = np.full(len(points), 2 * course.path.position_tolerance)
+        slack[[0, -1]] = 0.0
+        apart = np.linalg.norm(np.diff(points, axis=0), axis=1) - slack[1:] - slack[:-1]
         best = max(best, float(np.maximum(apart, 0.0).sum()))
     return best
 
 
 def least_time(arm: Arm, course: ToolCourse) -> float:
-    """Least duration [s] of motions along a course; zero where no speed of the TCP is given."""
+    """Least duration [s] of motions along a course; zero without a speed limit of the TCP."""
     fixed = course.path.fixed_speed
     most = np.inf if arm.tcp_speed is None else arm.tcp_speed
     if fixed is not None:
-        most = min(most, fixed * (1 + SPEED_TOLERANCE))
-    return least_way(course) / (most * (1 + RATIO_TOLERANCE)) if np.isfinite(most) else 0.0
+        most = min(most, fixed * (1 + TOOL_PATH.speed_tolerance))
+    return least_tcp_distance(course) / (most * (1 + RATIO_TOLERANCE)) if np.isfinite(most) else 0.0

@@ -1,10 +1,10 @@
-"""Inverse kinematics along a path of the TCP: Levenberg-Marquardt, each point from the
-configuration of the last.
+"""Inverse kinematics along a path of the TCP by the Levenberg-Marquardt method, each point starting
+from the previous one.
 
-The points are positions alone (three equations, orientation free) or whole poses. A step is the
-damped least squares step Jᵀ (J Jᵀ + μ I)⁻¹ e (Levenberg 1944, Marquardt 1963; Wampler 1986 for
-arms). Of all steps with the same effect, it moves the joints least. scipy's Levenberg-Marquardt,
-from MINPACK, needs at least as many equations as unknowns.
+The points are positions (three equations, free orientation) or poses. A step is the damped
+least-squares step Jᵀ (J Jᵀ + μ I)⁻¹ e (Levenberg 1944, Marquardt 1963; Wampler 1986 for arms), the
+one of least joint movement among all steps with the same effect. scipy's Levenberg-Marquardt
+method, from MINPACK, needs at least as many equations as unknowns.
 
 A configuration is part of the motion only if it reaches its point, is not nearly singular and is
 within the limits.
@@ -29,13 +29,26 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.pose import Pose
 
-MOST_ITERATIONS = 200
-# error [m, rad] at which the search for a point has converged: a ten-thousandth of the finest
-# tolerance
-CONVERGED = 1e-13
-# longest step of a joint [rad]: beyond it, the linearisation is a poor model
-LONGEST_STEP = 0.5
-LEAST_DAMPING, FIRST_DAMPING, MOST_DAMPING = 1e-15, 1e-3, 1e10
+
+@dataclass(frozen=True)
+class FollowingSettings:
+    """Settings of the Levenberg-Marquardt method."""
+
+    max_iterations: int = 200
+    """Largest number of iterations per point."""
+    converged: float = 1e-13
+    """Error at which a point has converged [m, rad]: a ten-thousandth of the finest tolerance."""
+    longest_step: float = 0.5
+    """Longest step of a joint [rad]; beyond it, the linearisation is a poor model."""
+    least_damping: float = 1e-15
+    """Smallest damping μ."""
+    first_damping: float = 1e-3
+    """Initial damping μ."""
+    most_damping: float = 1e10
+    """Damping μ above which the search ends."""
+
+
+SETTINGS = FollowingSettings()
 
 Reason = Literal["unreachable", "near_singular", "outside_limits", "deadline"]
 
@@ -74,16 +87,26 @@ def follow(
     near_singular: float = 1e-2,
     deadline: Deadline = NEVER,
 ) -> list[PathPoint]:
-    """Configurations along a path of positions (n, 3) [m] or poses of the TCP in the base frame.
+    """Configurations along a path of the TCP.
 
-    The search for the first point starts from `guess` (nq,) [rad], for each other point from the
-    last configuration that is part of the motion. If that fails, it starts once more from `guess`.
-    A point is reached if its error is at most `tolerance` [m, rad]. `near_singular` is the least
-    smallest singular value of a configuration that is part of the motion. No search for a point
-    begins after `deadline`.
+    The search for the first point starts from `guess`, and for every other point from the last
+    configuration of the motion. If this fails, it starts once more from `guess`.
 
-    Raises InvalidProblem or OutsideLimits, or DeadlineExceeded if the deadline passes before the
-    first search.
+    Args:
+        arm: arm with its TCP.
+        targets: positions (n, 3) [m], or poses, of the TCP in the base frame.
+        guess: start configuration, shape (nq,) [rad].
+        tolerance: largest error of a reached point [m, rad].
+        near_singular: smallest singular value of the configurations of the motion, at least.
+        deadline: deadline after which no search for a point begins.
+
+    Returns:
+        The result for each point.
+
+    Raises:
+        InvalidProblem: an argument is invalid.
+        OutsideLimits: the guess is outside the limits.
+        DeadlineExceeded: the deadline passed before the first search.
     """
     guess = frozen(guess, (arm.robot.nq,), "guess")
     arm.check_inside("guess", guess)
@@ -97,10 +120,7 @@ def follow(
         if deadline.passed:
             if not points:
                 raise DeadlineExceeded([])
-            start = search.found(wanted, last)
-            points.append(
-                PathPoint(start.q, start.position, start.rotation, start.singular_value, "deadline")
-            )
+            points.append(search.found(wanted, last).point("deadline"))
             continue
         attempts = [search.solve(wanted, last)]
         if attempts[0].worst > tolerance and last is not guess:
@@ -115,9 +135,7 @@ def follow(
             reason = "outside_limits"
         if reason is None:
             last = found.q
-        points.append(
-            PathPoint(found.q, found.position, found.rotation, found.singular_value, reason)
-        )
+        points.append(found.point(reason))
     return points
 
 
@@ -132,9 +150,12 @@ class _Found:
     def worst(self) -> float:
         return max(self.position, self.rotation or 0.0)
 
+    def point(self, reason: Reason | None) -> PathPoint:
+        return PathPoint(self.q, self.position, self.rotation, self.singular_value, reason)
+
 
 class _Search:
-    """Levenberg-Marquardt for one arm."""
+    """Levenberg-Marquardt method for one arm."""
 
     def __init__(self, arm: Arm) -> None:
         self._model = arm.robot.model.copy()
@@ -145,32 +166,28 @@ class _Search:
         self._data = self._model.createData()
 
     def solve(self, wanted: Array, start: Array) -> _Found:
-        """The configuration at which the search from `start` (nq,) for a position (3,) or pose (4,
-        4) ends.
-        """
-        q, error, damping = start, self._error(wanted, start), FIRST_DAMPING
+        """Searches a configuration for a position (3,) or pose (4, 4) from `start` (nq,) [rad]."""
+        q, error, damping = start, self._error(wanted, start), SETTINGS.first_damping
         jacobian = self._jacobian(q)[: len(error)]
-        for _ in range(MOST_ITERATIONS):
-            if np.abs(error).max() < CONVERGED or damping > MOST_DAMPING:
+        for _ in range(SETTINGS.max_iterations):
+            if np.abs(error).max() < SETTINGS.converged or damping > SETTINGS.most_damping:
                 break
             step = jacobian.T @ np.linalg.solve(
                 jacobian @ jacobian.T + damping * np.eye(len(error)), error
             )
-            step /= max(1.0, np.abs(step).max() / LONGEST_STEP)
+            step /= max(1.0, np.abs(step).max() / SETTINGS.longest_step)
             tried = self._error(wanted, q + step)
             if tried @ tried < error @ error:
                 q, error = q + step, tried
-                jacobian, damping = (
-                    self._jacobian(q)[: len(error)],
-                    max(damping / 10, LEAST_DAMPING),
-                )
+                jacobian = self._jacobian(q)[: len(error)]
+                damping = max(damping / 10, SETTINGS.least_damping)
             else:
                 damping *= 10
-        # full turns of a joint reach the same pose: the configuration nearest to the start is meant
+        # Full turns of a joint do not change the pose: take the configuration nearest to the start.
         return self.found(wanted, nearest_turn(q, start))
 
     def found(self, wanted: Array, q: Array) -> _Found:
-        """How far a configuration is from a position (3,) or pose (4, 4)."""
+        """Errors of a configuration against a position (3,) or pose (4, 4)."""
         error = self._error(wanted, q)
         jacobian = self._jacobian(q)[: len(error)]
         return _Found(
@@ -181,8 +198,8 @@ class _Search:
         )
 
     def _error(self, wanted: Array, q: Array) -> Array:
-        """From the TCP to the point, in base axes: translation (3,) [m] and, for a pose, rotation
-        vector (3,) [rad].
+        """Translation (3,) [m] and, for a pose, rotation vector (3,) [rad] from the TCP to the
+        point, in base axes.
         """
         pin.forwardKinematics(self._model, self._data, q)
         T = pin.updateFramePlacement(self._model, self._data, self._tcp)

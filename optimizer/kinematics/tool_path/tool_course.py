@@ -1,5 +1,5 @@
-"""The course of a tool path: the pose of the TCP at every fraction of the way, and how far another
-pose is from it.
+"""Course of a tool path: the TCP pose at every fraction of its length, and the deviation of a
+motion from it.
 """
 
 from __future__ import annotations
@@ -18,49 +18,65 @@ from joulepath.optimizer.kinematics.tool_path.course_matching import matched
 from joulepath.optimizer.kinematics.tool_path.course_shapes import Shape, shape_of
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.targets import Side
-from joulepath.optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
+from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
 
-# poses of the course that a motion is compared with, on each piece of its shape at least, and the
-# way between two [m] at most
-COMPARED, STEP = 100, 0.002
-# how much of the length of a course by distance its turns are counted as
-TURNS = 1e-3
-# fractions of a course that differ by less are the same
-SAME_FRACTION = 1e-9
+
+@dataclass(frozen=True)
+class CourseSettings:
+    """Resolution of comparisons with a course."""
+
+    compared_poses: int = 100
+    """Smallest number of compared poses on each piece of the shape."""
+    compared_distance: float = 0.002
+    """Largest distance between compared poses [m]."""
+    turning_weight: float = 1e-3
+    """Length of turns in place in a course by distance, relative to its whole length."""
+    same_fraction: float = 1e-9
+    """Difference of fractions below which they are one."""
+
+
+SETTINGS = CourseSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class ToolCourse:
-    """The course of a tool path in its shape."""
+    """Course of a tool path: its TCP pose as a function of the fraction of the path, from 0 to
+    1.
+    """
 
     path: ToolPath
     shape: Shape
-    # ways [m] along the shape, and the fractions of this course at them; None where these are those
-    # of the way
     by_distance: tuple[Array, Array] | None = None
-    # the angle [rad] by which the tool is turned about the path's free axis at a fraction of the
-    # way; None: by none
+    """Distances [m] along the shape and the course's fractions there; None if fractions are
+    proportional to the distance along the shape.
+    """
     turning: CubicSpline | None = None
-    # whether the tool may be turned about this axis at the start and at the goal, too
+    """Angle [rad] of the tool about the path's free axis over the fraction; None for no turning."""
     free_start: bool = False
+    """Whether the tool may be turned about the free axis at the start, too."""
     free_end: bool = False
-    # the part of the shape that the course follows, from one fraction to another one, in this
-    # direction
+    """Whether the tool may be turned about the free axis at the goal, too."""
     first: float = 0.0
+    """Fraction of the shape at which the course begins."""
     last: float = 1.0
+    """Fraction of the shape at which the course ends; below `first` if it runs backwards."""
 
     @classmethod
     def of(
         cls, path: ToolPath, start: Array | ConeOrientedPose, goal: Array | ConeOrientedPose
     ) -> ToolCourse:
-        """The course of a path, or a section of it, from a `start` to a `goal`.
+        """Course of a path, or of its section.
 
-        Both are poses (4, 4). Or the rotation about the path's free axis is free there: then the
-        tool turns as little as may be to the pose after the start, and from the one before the
-        goal.
+        Args:
+            path: tool path.
+            start: pose (4, 4), or a pose with a free rotation about the path's free axis; the tool
+                then turns as little as possible to the next pose.
+            goal: pose (4, 4), or a pose with a free rotation; the tool then turns as little as
+                possible from the previous pose.
 
-        Raises InvalidProblem; see `shape_of`. The ramps of a path must leave something between
-        them.
+        Raises:
+            InvalidProblem: the shape is invalid, see `shape_of`, or the ramps leave nothing between
+                them.
         """
         if path.section is not None:
             start, goal = path.section.start.T, path.section.goal.T
@@ -77,7 +93,7 @@ class ToolCourse:
             path, shape_of(path, np.array(poses)), free_start=free_start, free_end=free_end
         )
         if path.least_speed is not None:
-            course = course._by_distance()
+            course = course._spaced_by_distance()
         if path.section is not None:
             course = course.part(path.section.first, path.section.last)
         if path.least_speed is not None:
@@ -85,63 +101,65 @@ class ToolCourse:
         return course
 
     def part(self, first: float, last: float) -> ToolCourse:
-        """The course from one fraction of the whole way to another one."""
+        """Course from one fraction of the whole path to another."""
         return replace(self, first=first, last=last)
 
     @property
     def free_sides(self) -> list[Side]:
-        """The ends at which the tool may be turned about the path's free axis."""
+        """Ends at which the tool may be turned about the path's free axis."""
         free: dict[Side, bool] = {"start": self.free_start, "goal": self.free_end}
         return [side for side, is_free in free.items() if is_free]
 
     @property
     def length(self) -> float:
-        """Length of the way [m]; a radian of turning counts as TURNING."""
+        """Length [m], with `meters_per_radian` of rotation."""
         return abs(self.last - self.first) * float(self.shape.pieces[-1])
 
     def measured(self, count: int, step: float) -> tuple[Array, Array]:
-        """Fractions (k,) of the way, as of `grid`, and how far the TCP has moved until there (k,)
-        [m], turns left out."""
+        """Fractions (k,) as of `grid`, and the distance (k,) [m] of the TCP up to each, without
+        rotations.
+        """
         at = self.grid(count, step)
         moved = np.linalg.norm(np.diff(self.poses(at)[:, :3, 3], axis=0), axis=1)
         return at, np.concatenate([[0.0], np.cumsum(moved)])
 
-    def _by_distance(self) -> ToolCourse:
-        """The same course, whose fractions are those of the distance that the TCP moves: at an even
-        speed they rise evenly."""
-        at, gone = self.measured(COMPARED, STEP)
-        # where the tool turns in place, the fractions have to rise, too
-        rising = gone + TURNS * gone[-1] * at
+    def _spaced_by_distance(self) -> ToolCourse:
+        """The same course, with fractions proportional to the distance that the TCP moves."""
+        at, moved = self.measured(SETTINGS.compared_poses, SETTINGS.compared_distance)
+        # Fractions must increase while the tool turns in place, too.
+        rising = moved + SETTINGS.turning_weight * moved[-1] * at
         if not rising[-1] > 0:
             return self
         return replace(self, by_distance=(at * self.length, rising / rising[-1]))
 
     def _check_ramps(self) -> None:
-        length = float(self.measured(COMPARED, STEP)[1][-1])
+        length = float(self.measured(SETTINGS.compared_poses, SETTINGS.compared_distance)[1][-1])
         if length <= 2 * self.path.ramp:
             raise InvalidProblem(
                 "path.speed.ramp",
                 f"The TCP moves {length:.4g} m along this path: its ramps, {self.path.ramp:g} m at "
-                "either end, leave "
-                "nothing between them for path.speed.min.",
+                "either end, leave nothing between them for path.speed.min.",
             )
 
     def has_shape_of(self, other: ToolCourse) -> bool:
-        """Whether the pieces of both courses are as long, and they follow the same part of them."""
+        """Whether both courses follow the same part of pieces of the same lengths."""
         own, others = self.shape.pieces, other.shape.pieces
-        same = len(own) == len(others) and np.abs(own - others).max() <= SAME_FRACTION * own[-1]
+        same = (
+            len(own) == len(others)
+            and np.abs(own - others).max() <= SETTINGS.same_fraction * own[-1]
+        )
         section = (self.first, self.last) == (other.first, other.last)
         return bool(same and section and self.by_distance is None and other.by_distance is None)
 
     def poses(self, fraction: Array) -> Array:
-        """T_base_tcp (k, 4, 4) at fractions (k,) of the way."""
+        """TCP poses T_base_tcp (k, 4, 4) at fractions (k,)."""
         fraction = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0)
         at, whole = self.first + fraction * (self.last - self.first), float(self.shape.pieces[-1])
-        way = at * whole
+        distance = at * whole
         if self.by_distance is not None:
-            ways, fractions = self.by_distance
-            way = np.clip(CubicSpline(fractions, ways)(at), 0.0, whole)
-        T = self.shape.poses(way)
+            distances, fractions = self.by_distance
+            distance = np.clip(CubicSpline(fractions, distances)(at), 0.0, whole)
+        T = self.shape.poses(distance)
         return T if self.turning is None else self.turned(T, self.turning(fraction))
 
     def turned(self, T: Array, angle: Array) -> Array:
@@ -152,37 +170,43 @@ class ToolCourse:
         return T
 
     def angle_at_start(self, T: Array) -> float:
-        """The angle [rad] about the path's free axis by which a pose T (4, 4) at a free start is
-        turned.
+        """Angle [rad] about the path's free axis from the first pose to a pose T (4, 4) at a free
+        start.
         """
         turned = self.poses(np.zeros(1))[0, :3, :3].T @ T[:3, :3]
         return float(Rotation.from_matrix(turned).as_rotvec() @ np.array(self.path.about))
 
     def deviation(self, T: Array) -> tuple[Array, Array]:
-        """How far poses T (k, 4, 4) of a motion and the course are from each other: at most so many
-        metres and radians.
-
-        Where the tool may turn about an axis, the radians are those between the directions of this
-        axis.
+        """Upper bounds of the deviation between a motion and the course.
 
         Each pose is compared with one of the course, in the order of both. A piece of the course of
         length s, whose ends are c apart, is at most (s² - c²)^½ / 2 from the straight line between
-        them, if both are gone through evenly: so much is added for the piece between two compared
-        poses, so that none of it can be left out. Infinite for all poses (k,) if the motion does
-        not end where the course does.
+        them if both are traversed evenly. This distance is added for the piece between two compared
+        poses, so that no part of the course can be omitted. If the tool may turn about an axis,
+        angles are between the directions of this axis.
+
+        Args:
+            T: TCP poses of the motion, shape (k, 4, 4).
+
+        Returns:
+            Distances (k,) [m] and angles (k,) [rad]; infinite if the motion does not end at the end
+            of the course.
         """
-        at = self.grid(COMPARED, STEP)
+        at = self.grid(SETTINGS.compared_poses, SETTINGS.compared_distance)
         known = self._embedded(self.poses(at))
-        reach = self.path.position_tolerance + TURNING * self.path.rotation_tolerance
+        reach = (
+            self.path.position_tolerance
+            + TOOL_PATH.meters_per_radian * self.path.rotation_tolerance
+        )
         best, left_out, rest = matched(at, known, self._embedded(T), reach)
         position, rotation = self._apart(T, self.poses(best))
-        position, rotation = position + left_out, rotation + left_out / TURNING
+        position, rotation = position + left_out, rotation + left_out / TOOL_PATH.meters_per_radian
         if rest > reach:
             return np.full_like(position, np.inf), np.full_like(rotation, np.inf)
         return position, rotation
 
     def ratios(self, T: Array, wanted: Array) -> Array:
-        """How far poses T (k, 4, 4) are from poses that are `wanted` (k, 4, 4), over the path's
+        """Deviations (k,) of poses T (k, 4, 4) from wanted poses (k, 4, 4), relative to the path's
         tolerances.
         """
         position, rotation = self._apart(T, wanted)
@@ -191,13 +215,17 @@ class ToolCourse:
         )
 
     def grid(self, count: int, step: float = np.inf) -> Array:
-        """Fractions of the way: each piece of the shape divided into `count` and more parts, none
-        longer than a `step` [m]."""
+        """Fractions that divide each piece of the shape.
+
+        Args:
+            count: smallest number of parts of each piece.
+            step: largest length of a part [m].
+        """
         knots = self.shape.pieces
-        knots = knots[np.append(True, np.diff(knots) > SAME_POSE)]
+        knots = knots[np.append(True, np.diff(knots) > TOOL_PATH.same_pose)]
         at = knots / knots[-1] if self.by_distance is None else np.interp(knots, *self.by_distance)
         inside = np.sort((at - self.first) / (self.last - self.first))
-        inside = inside[(inside > SAME_FRACTION) & (inside < 1 - SAME_FRACTION)]
+        inside = inside[(inside > SETTINGS.same_fraction) & (inside < 1 - SETTINGS.same_fraction)]
         pieces = [
             np.linspace(
                 a, b, max(count, int(np.ceil((b - a) * self.length / step))), endpoint=False
@@ -220,13 +248,27 @@ class ToolCourse:
         )
 
     def _embedded(self, T: Array) -> Array:
-        """Poses as points (k, d), whose distances are those of the positions [m], and TURNING times
-        those of rotations, or of the directions of an axis about which the tool may turn."""
+        """Poses as points (k, d), with distances close to those of the positions plus
+        `meters_per_radian` times those of the rotations.
+
+        If the tool may turn about an axis, the direction of the axis takes the place of the
+        rotation.
+        """
         if self.path.about is not None:
-            return np.hstack([T[:, :3, 3], TURNING * T[:, :3, :3] @ np.array(self.path.about)])
-        return np.hstack([T[:, :3, 3], TURNING / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9)])
+            return np.hstack(
+                [
+                    T[:, :3, 3],
+                    TOOL_PATH.meters_per_radian * T[:, :3, :3] @ np.array(self.path.about),
+                ]
+            )
+        return np.hstack(
+            [
+                T[:, :3, 3],
+                TOOL_PATH.meters_per_radian / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9),
+            ]
+        )
 
 
 def _turned_least(end: ConeOrientedPose, R: Array) -> Array:
-    """The pose (4, 4) at an end whose orientation is nearest to R (3, 3)."""
+    """Pose (4, 4) at an end with the allowed orientation nearest to R (3, 3)."""
     return end.with_orientation(nearest_orientation(end, R)).T

@@ -1,35 +1,61 @@
-"""The angle at which the tool ends where its path leaves it free: angles all around, then near the
-best of these.
-"""
+"""Search for the angle of the tool at an end of its path with a free angle."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-# angles [rad] that are tried at first, and the step between them
-STEP = np.pi / 4
-ALL_AROUND = tuple(STEP * k for k in (-3, -2, -1, 1, 2, 3, 4))
-# near the best one: a step [rad] that tells nothing, and most angles that are tried
-NEAR, MOST = 0.02, 8
-# cost of an angle without a motion, as a multiple of the least one at first
-FAR = 10.0
+
+@dataclass(frozen=True)
+class EndAngleSettings:
+    """Settings of the search for the angle of least cost."""
+
+    steps_per_turn: int = 8
+    """Evenly spaced angles of a full turn at which the cost is evaluated first."""
+
+    tolerance: float = 0.02
+    """Absolute tolerance of the angle in the line search [rad]."""
+
+    line_search_iterations: int = 8
+    """Largest number of iterations of the line search around the best of the first angles."""
+
+    missing_cost: float = 10.0
+    """Cost of an angle without a motion in the line search, as a multiple of the least cost."""
+
+    @property
+    def step(self) -> float:
+        """Distance between the first angles [rad]."""
+        return 2 * np.pi / self.steps_per_turn
 
 
-def try_angles(cost: Callable[[float], float], known: float) -> None:
-    """Ask for the `cost` [J] of angles [rad] until no other seems to be less; inf: none. It is
-    `known` at zero.
+END_ANGLE = EndAngleSettings()
+
+
+def try_angles(
+    cost: Callable[[float], float], known: float, settings: EndAngleSettings = END_ANGLE
+) -> None:
+    """Evaluate the cost of angles: evenly spaced ones, then by line search around the best.
+
+    The caller keeps the motions found by `cost`.
+
+    Args:
+        cost: cost of an angle [rad] relative to the present one [J]; infinite without a motion.
+        known: cost of the angle 0 [J].
+        settings: settings of the search.
     """
-    found = {0.0: known} | {angle: cost(angle) for angle in ALL_AROUND}
+    half = settings.steps_per_turn // 2
+    angles = (settings.step * k for k in range(1 - half, half + 1) if k)
+    found = {0.0: known} | {angle: cost(angle) for angle in angles}
     middle = min(found, key=lambda angle: found[angle])
     if not np.isfinite(found[middle]):
         return
-    most = found[middle] + FAR * abs(found[middle])
+    most = found[middle] + settings.missing_cost * abs(found[middle])
     minimize_scalar(
         lambda angle: min(cost(float(angle)), most),
-        bounds=(middle - STEP, middle + STEP),
+        bounds=(middle - settings.step, middle + settings.step),
         method="bounded",
-        options={"xatol": NEAR, "maxiter": MOST},
+        options={"xatol": settings.tolerance, "maxiter": settings.line_search_iterations},
     )

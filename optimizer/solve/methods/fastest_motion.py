@@ -1,11 +1,11 @@
-"""The fastest motion between two configurations: several starts of the minimum-time problem.
+"""Fastest motion between two configurations, by several starts of the minimum-time problem.
 
 From a single start the minimum-time problem may end in a local optimum that takes several times as
-long as the fastest motion, or in none at all. Several starts are tried therefore, in the order of
-their effort, until one of them meets the lower bound on the duration: the method's own; Ruckig's
-motion, and toppra's along the straight line; motions that are known; and a continuation from a slow
-motion to faster ones, at rising prices of time. Every motion that is found on the way counts, if it
-is confirmed, so that the result is never slower than any of them.
+long as the fastest motion, or find no motion. Therefore several starts are tried, in the order of
+their effort, until a motion meets the lower bound on the duration: the start of the method;
+Ruckig's motion, and toppra's along the straight line; known motions; and a continuation from a slow
+motion at rising prices of time. Every motion found on the way counts, if it is confirmed, so that
+the result is at least as fast.
 """
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, least_time_scale, sampled
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.time_scaling import TimeScaling
 from joulepath.optimizer.solve.methods.uniform_scaling import UniformScale
 
@@ -34,11 +36,11 @@ Attempt = Callable[[], SolveResult]
 
 @dataclass(frozen=True)
 class FastestSettings:
-    """How thoroughly the fastest motion is looked for."""
+    """Settings of the search for the fastest motion."""
 
     proven: float = 1e-3
-    """Relative excess over the lower bound up to which a motion counts as the fastest one. Splines
-    with knots at the switches of jerk come within 0.03 % of the bound; one solve more would gain no
+    """Relative excess over the lower bound up to which a motion counts as the fastest. Splines with
+    knots at the switches of jerk come within 0.03 % of the bound; a further solve would gain no
     more than this."""
 
     prices: tuple[float, ...] = (100.0, 1000.0)
@@ -46,35 +48,39 @@ class FastestSettings:
     UR5e's motions take some 3 % more time than the fastest ones, from any initial guess."""
 
     jerks: tuple[float, ...] = (1.0, 1e-2, 1e-4)
-    """Shares of the jerk limits with which Ruckig's motion is tried in turn. Where a motion takes
+    """Shares of the jerk limits with which Ruckig's motion is tried in turn. If a motion takes
     minutes and a phase of constant jerk some milliseconds, rounding takes its jerk far beyond the
-    limit; with less jerk, phases are longer.
-    """
+    limit; with less jerk, phases are longer."""
 
     jump: float = 2e-3
-    """Time [s] in which acceleration reaches its limit where no limit on jerk is in force: no
-    spline has an acceleration that jumps, and the certificate looks once a millisecond."""
+    """Time in which acceleration reaches its limit without a limit on jerk [s]: the acceleration of
+    a spline cannot jump, and the certificate samples once a millisecond."""
 
     gain: float = 1e-3
-    """Relative decrease of the duration below which no further solve from the fastest motion
-    follows.
-    """
+    """Relative decrease of the duration below which solves from the fastest motion end."""
 
     most_repeated: int = 4
-    """Solves from the fastest motion at most, each from the result of the one before."""
+    """Largest number of solves from the fastest motion, each from the result before."""
 
     most_thorough: int = 6
-    """Candidates of a problem that are solved from every start, those of the fastest motions
-    first."""
+    """Largest number of candidates of a problem that are solved from every start."""
 
 
 class FastestMotion(ABC):
-    """The search for the fastest motion from q_start to q_goal (nq,) [rad], whatever durations the
-    problem allows.
+    """Search for the fastest motion of a candidate, for any duration.
 
-    `best` is the fastest motion that is confirmed so far, None if there is none. `known` are
-    motions between the same ends. With `wanted` [s] the search ends with the first motion that
-    takes no longer, and not before. `cut_short`: the deadline ended the search.
+    Args:
+        prepared: the problem.
+        q_start: start configuration, shape (nq,) [rad].
+        q_goal: goal configuration, shape (nq,) [rad].
+        known: motions between these configurations.
+        settings: settings of the search; None for the defaults.
+        wanted: duration at which the search ends [s]; None for the lower bound.
+
+    Attributes:
+        bound: lower bound on the duration [s].
+        best: fastest confirmed motion so far; None without a motion.
+        cut_short: whether the deadline ended the search.
     """
 
     def __init__(
@@ -91,7 +97,7 @@ class FastestMotion(ABC):
         self.settings = settings or FastestSettings()
         limits = prepared.problem.arm.active_limits
         self.bound = max(
-            float(shortest_duration(q_goal - q_start, limits)), prepared.least_time, LEAST_DURATION
+            float(shortest_duration(q_goal - q_start, limits)), prepared.least_time, DURATIONS.least
         )
         self.best: Spline | None = None
         self.cut_short = False
@@ -103,36 +109,37 @@ class FastestMotion(ABC):
 
     @abstractmethod
     def solver(self, interval: DurationInterval) -> Method:
-        """The solver of the problem's method, in an interval of durations."""
+        """The method of the problem, in an interval of durations."""
 
     @abstractmethod
     def confirms(self, spline: Spline) -> bool:
-        """Whether the certificate confirms a motion. Ends by DeadlinePassed."""
+        """Whether the certificate confirms a motion. Raises DeadlinePassed."""
 
     @property
     def duration(self) -> float:
-        """Duration [s] of the fastest motion found; infinite if there is none."""
+        """Duration [s] of the fastest motion found; infinite without a motion."""
         return np.inf if self.best is None else self.best.duration
 
     @property
     def is_proven(self) -> bool:
-        """Whether no motion between these ends is faster, but for the setting `proven`."""
+        """Whether no motion is faster by more than the share `proven`."""
         return self.duration <= self.bound * (1 + self.settings.proven)
 
     def run(self) -> Spline | None:
-        """The fastest motion found; None if there is none."""
+        """Search for the fastest motion; None without a motion."""
         self.look_quickly()
         self.look_thoroughly()
         return self.best
 
     def look_quickly(self) -> None:
-        """Try the method's own start; Ruckig's motion, as a guess and as it is, slowed until it
-        keeps the torque limits; and the motions that are known."""
+        """Try the start of the method, Ruckig's motion, and known motions.
+
+        Ruckig's motion is tried as a guess, and as it is, slowed until it keeps the torque limits.
+        """
         self._try_all(self._quick())
 
     def look_thoroughly(self) -> None:
-        """Try the other starts, and solve again from the fastest motion as long as that gains
-        time."""
+        """Try the other starts, and solve from the fastest motion while this gains time."""
         if self._solver.takes_guesses and not (self.is_proven or self._is_done):
             self._try_all(self._thorough())
 
@@ -149,7 +156,7 @@ class FastestMotion(ABC):
         self.cut_short |= self.deadline.passed
 
     def take_note(self, result: SolveResult) -> None:
-        """Take the motion of a result if it is the fastest one, and confirmed."""
+        """Keep the motion of a result if it is faster than the best, and confirmed."""
         self.cut_short |= result.cut_short or result.status is SolveStatus.OUT_OF_TIME
         if (
             result.spline is not None
@@ -164,23 +171,23 @@ class FastestMotion(ABC):
 
     @cached_property
     def _solver(self) -> Method:
-        """A solver that minimises the duration."""
+        """The method of the problem, minimising the duration."""
         return self.solver(fastest(self.prepared))
 
     @property
     def _is_free(self) -> bool:
-        """Whether a motion may take any way between its ends."""
+        """Whether motions are free between their ends, without tool path and passes."""
         return self.prepared.problem.tool_path is None and not self.prepared.problem.passes
 
     def _quick(self) -> Iterator[Attempt]:
         yield self.solver(fastest(self.prepared)).solve
         if self._takes_ruckig and not self.is_proven:
-            # optimised, it needs less energy than as it is
+            # optimised, the motion costs less energy
             yield self._from(self._ruckig)
         if self._is_free and "ruckig" in self._solver.accepted_baselines:
             yield self._scaled_ruckig
         for spline in self.known:
-            yield partial(SolveResult, SolveStatus.SOLVED, "a known motion", spline=spline)
+            yield partial(SolveResult, SolveStatus.SOLVED, SolveReason.KNOWN_MOTION, spline=spline)
 
     def _thorough(self) -> Iterator[Attempt]:
         for spline in (*self._on_line(), *self.known):
@@ -197,24 +204,20 @@ class FastestMotion(ABC):
                 return
 
     def _from(self, spline: Spline, fine: bool = True) -> Attempt:
-        """A solve for the least time from a motion."""
+        """A minimum-time solve from a motion."""
         return partial(self.solver(fastest(self.prepared)).solve_from, *sampled(spline), fine=fine)
 
     def _scaled_ruckig(self) -> SolveResult:
-        """Ruckig's motion, slowed until it keeps the torque limits; it does not move around
-        obstacles.
-        """
+        """Ruckig's motion, slowed until it keeps the torque limits, unless it collides."""
         given = self._ruckig
         hit = self.prepared.surroundings.worst_violation(given)
         if hit is not None:
-            return SolveResult(SolveStatus.FAILED, hit.message, collision=hit)
+            return SolveResult(SolveStatus.FAILED, SolveReason.COLLISION, collision=hit)
         return UniformScale(self._solver, given).solve()
 
     @cached_property
     def _ruckig(self) -> Spline:
-        """Ruckig's motion; with less jerk where its phases are too short for a spline within the
-        limits.
-        """
+        """Ruckig's motion, with less jerk if its phases are too short for a spline."""
         limits, found = self.prepared.problem.arm.active_limits, dict[float, Spline]()
         most = np.where(np.isinf(limits.j_max), limits.a_max / self.settings.jump, limits.j_max)
         for share in self.settings.jerks:
@@ -229,13 +232,15 @@ class FastestMotion(ABC):
 
     @property
     def _takes_ruckig(self) -> bool:
-        """Whether the method takes Ruckig's motion as an initial guess."""
+        """Whether Ruckig's motion is an initial guess of the method."""
         return self._is_free and "ruckig" in self._solver.guess_baselines
 
     def _on_line(self) -> Iterator[Spline]:
-        """The fastest motion along the straight line, from toppra's; none if the line collides."""
+        """The fastest motion along the straight line from toppra's, unless the line collides."""
         line = TimeScaling(
-            self.prepared, self.q_start, self.q_goal, self.deadline, fastest(self.prepared)
+            SolveContext(
+                self.prepared, self.q_start, self.q_goal, self.deadline, fastest(self.prepared)
+            )
         )
         if not self._takes_ruckig or line.collides:
             return
@@ -246,13 +251,13 @@ class FastestMotion(ABC):
             yield result.spline
 
     def _continued(self) -> Iterator[Attempt]:
-        """Solves at rising prices of time, each from the motion of the one before, and one for the
-        least time.
-        """
+        """Solve at rising prices of time, each from the motion before, then for minimum time."""
         spline: Spline | None = None
         for price in self.settings.prices:
             p = self.prepared.parameters(electrical=1.0, time=price)
-            solver = self.solver(DurationInterval(p, LEAST_DURATION, LONGEST_DURATION, price=price))
+            solver = self.solver(
+                DurationInterval(p, DURATIONS.least, DURATIONS.longest, price=price)
+            )
             result = (
                 solver.solve()
                 if spline is None

@@ -1,7 +1,6 @@
-"""A straight line in joint space and the limits of an arm along it, in the form that toppra takes.
+"""A straight line in joint space, and the limits of an arm along the line, as types of toppra.
 
-Speeds and accelerations are in proportion to those of the line's fraction s: their limits bound
-ds/dt and d²s/dt².
+Joint speeds and accelerations are proportional to ds/dt and d²s/dt² of the fraction s of the line.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ class StraightLine(AbstractGeometricPath):  # type: ignore[misc]
         return len(self.q_start)
 
     def __call__(self, path_positions: Array, order: int = 0) -> Array:
-        """Positions (k, nq) at fractions (k,), or their derivative of an order by s."""
+        """Positions (k, nq) [rad] at fractions (k,), or a derivative of an order by s."""
         s = np.asarray(path_positions)[..., None]
         if order == 0:
             return np.asarray(self.q_start + s * self.displacement)
@@ -40,9 +39,9 @@ class StraightLine(AbstractGeometricPath):  # type: ignore[misc]
 
 
 class LineLimits(LinearConstraint):  # type: ignore[misc]
-    """The limits of a problem's arm on speed, acceleration and torque, along a straight line.
+    """Limits of an arm on speed, acceleration and torque along a straight line.
 
-    The limit of a motor's torque is relaxed by the greatest help of friction.
+    The torque limit of a motor is relaxed by the largest assistance of friction.
     """
 
     def __init__(self, prepared: PreparedProblem) -> None:
@@ -53,9 +52,14 @@ class LineLimits(LinearConstraint):  # type: ignore[misc]
     def compute_constraint_params(
         self, path: StraightLine, gridpoints: Array, *_: Any
     ) -> tuple[Array, ...]:
-        """a, b, c (k, nq), F, g, and bounds (k, 2) of u = d²s/dt² and x = (ds/dt)².
+        """Parameters of toppra's constraint F (a u + b x + c) ≤ g on the smooth part of the torque.
 
-        F (a u + b x + c) ≤ g bounds the smooth part of the torque.
+        Args:
+            path: the straight line.
+            gridpoints: fractions of the line, shape (k,).
+
+        Returns:
+            a, b, c (k, nq), F, g, and bounds (k, 2) of u = d²s/dt² and x = (ds/dt)².
         """
         arm, count = self.prepared.arm, len(gridpoints)
         rates = Coordinates.straight_line(

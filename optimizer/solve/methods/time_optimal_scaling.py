@@ -1,10 +1,11 @@
 """The time-optimal scaling of the straight line in joint space, by toppra (Pham, Pham 2018).
 
 toppra limits speed, acceleration and torque, but not jerk. Its duration is therefore a lower bound
-for every motion along the line. Its scaling says whether there is such a motion, and serves as
-initial guess.
+for every motion along the line. Its scaling decides whether there is a motion, and is the initial
+guess.
 
-toppra is imported where it is called: it imports matplotlib, and only this method needs it.
+toppra is imported by the function that calls it: it imports matplotlib, and only one method needs
+it.
 """
 
 from __future__ import annotations
@@ -21,26 +22,24 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
 GRID = np.linspace(0.0, 1.0, 31)
-# fraction of toppra's duration that counts as a lower bound: its constraints hold at the grid
-# points only
-TRUST = 0.98
+# share of toppra's duration that is taken as a lower bound: its constraints hold at the grid alone
+BOUND_SHARE = 0.98
 
 
 @dataclass(frozen=True)
 class TimeOptimalScaling:
-    """Fractions of the line GRID (31,) reached at `times` (31,) [s], from rest to rest."""
+    """Time scaling of the straight line, from rest to rest."""
 
     times: Array
+    """Times at which the fractions GRID of the line are reached, shape (31,) [s]."""
 
     @property
     def duration_bound(self) -> float:
         """Lower bound on the duration of every motion along the line [s]."""
-        return TRUST * float(self.times[-1])
+        return BOUND_SHARE * float(self.times[-1])
 
     def fractions(self, knots: Array) -> Array:
-        """Control values (n,) of a spline over clamped knots of [0, 1] that follows the scaling
-        from rest to rest.
-        """
+        """Control values (n,) of a spline over clamped knots of [0, 1] along the scaling."""
         values = np.interp(greville(knots) * self.times[-1], self.times, GRID)
         values[:3], values[-3:] = 0.0, 1.0
         return np.asarray(values)
@@ -49,12 +48,20 @@ class TimeOptimalScaling:
 def time_optimal_on_line(
     prepared: PreparedProblem, q_start: Array, q_goal: Array
 ) -> TimeOptimalScaling | None:
-    """The time-optimal scaling under speed, acceleration and torque limits; None if there is none.
+    """Time-optimal scaling under limits on speed, acceleration and torque.
 
-    The limit of a motor's torque is relaxed by the greatest help of friction, so that the duration
-    stays a lower bound.
+    The torque limit of a motor is relaxed by the largest assistance of friction, so that the
+    duration is a lower bound.
+
+    Args:
+        prepared: the problem.
+        q_start: start configuration, shape (nq,) [rad].
+        q_goal: goal configuration, shape (nq,) [rad].
+
+    Returns:
+        The scaling; None if the torque limits allow none.
     """
-    from toppra.algorithm import TOPPRA  # see the top of this file
+    from toppra.algorithm import TOPPRA
 
     from joulepath.optimizer.solve.methods.line_in_toppra import LineLimits, StraightLine
 

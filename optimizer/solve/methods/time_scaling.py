@@ -17,21 +17,22 @@ from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.around_obstacles import along_path, around_obstacles
-from joulepath.optimizer.solve.methods.free_spline import COARSE, EXACT, FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
-from joulepath.optimizer.solve.methods.sqp_method import Guess
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from joulepath.optimizer.solve.methods.time_optimal_scaling import time_optimal_on_line
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
-from joulepath.optimizer.solve.nlp.sqp import PROGRESS
+from joulepath.optimizer.solve.nlp.sqp_state import SQP
 
 
 class TimeScaling(FreeSpline):
     """Solves a candidate along its straight line, or along planned paths if the line collides."""
 
-    # only baselines along the straight line are initial guesses
     guess_baselines: ClassVar[tuple[BaselineName, ...]] = ("trapezoid", "quintic")
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic",)
+    free_control_points: ClassVar[bool] = False
 
     @cached_property
     def _collision(self) -> Clearance | None:
@@ -46,37 +47,40 @@ class TimeScaling(FreeSpline):
         return self._collision is not None
 
     def solve(self) -> SolveResult:
-        """From toppra's time-optimal scaling; along planned paths if the straight line collides."""
+        """Solve from toppra's time-optimal scaling, or along planned paths after a collision."""
         if self._collision is not None:
-            return around_obstacles(self, "the straight line", self._collision, self._retimed)
+            return around_obstacles(
+                self, SolveReason.STRAIGHT_LINE_COLLIDES, self._collision, self._retimed
+            )
         scaling = time_optimal_on_line(self.prepared, self.q_start, self.q_goal)
         if scaling is None:
-            reason = "the straight line needs more torque than the joints have"
-            return SolveResult(SolveStatus.INFEASIBLE, reason)
+            return SolveResult(SolveStatus.INFEASIBLE, SolveReason.STRAIGHT_LINE_NEEDS_TORQUE)
         if scaling.duration_bound > self.t_max:
-            reason = f"the straight line takes at least {scaling.duration_bound:.4f} s"
-            return SolveResult(SolveStatus.INFEASIBLE, reason)
+            return SolveResult(
+                SolveStatus.INFEASIBLE,
+                SolveReason.STRAIGHT_LINE_TAKES_LONGER,
+                figures=(scaling.duration_bound,),
+            )
         self.t_min = max(self.t_min, scaling.duration_bound)
         line = self.coordinates
-        space = self.graded(
-            float(seven_segment.shortest_duration(line.goal - line.start, line.limits)), EXACT
-        )
+        shortest = float(seven_segment.shortest_duration(line.goal - line.start, line.limits))
+        space = self.spaces.at_switches(shortest, SPLINE_SPACES.exact_multiplicity)
         # toppra's acceleration jumps: a fit with few control points smooths it before it is refined
-        coarse = bspline.uniform(COARSE).knots
+        coarse = bspline.uniform(SPLINE_SPACES.coarse_points).knots
         points = bspline.refit(scaling.fractions(coarse)[:, None], coarse, space.knots)
         return self.improve(Guess(space, points, self.t_min))
 
     def _solve_in(
-        self, space: Basis, q: Array, t: Array, progress: float = PROGRESS
+        self, space: Basis, q: Array, t: Array, progress: float = SQP.progress
     ) -> SolveResult:
-        """From samples q (k, nq) at times t (k,): on the straight line, or along the samples if the
-        line collides.
-        """
+        """Solve on the straight line, or along samples q (k, nq) [rad] if the line collides."""
         if self._collision is None:
             return super()._solve_in(space, q, t, progress)
         if not self.prepared.surroundings.is_collision_free(q):
             return SolveResult(
-                SolveStatus.FAILED, f"on the straight line, {self._collision.message}"
+                SolveStatus.FAILED,
+                SolveReason.STRAIGHT_LINE_COLLIDES,
+                collision=self._collision,
             )
         return along_path(self, q, self._retimed)
 

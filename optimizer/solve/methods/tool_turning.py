@@ -1,15 +1,14 @@
-"""The turning of a tool about the free axis of its path: the one of least cost for a time law, and
-then a better one.
+"""Turning of a tool about the free axis of its path: the angle along the path of least cost.
 
-First dynamic programming over the sheet of configurations, in which a step costs what the arm draws
-at an even speed. Then the values of a smooth turning are optimised for the cost of the whole motion
-with this time law (L-BFGS).
+First, dynamic programming over a surface of IK solutions, in which a step costs the power drawn at
+constant speed. Then the values of a smooth turning are optimised for the cost of the whole motion
+with a given time law (L-BFGS).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -26,14 +25,14 @@ from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.kinematics.tool_path.course_tracing import (
     Trace,
     chain_of,
-    joint_path,
     traces,
     turned_start,
     within,
 )
-from joulepath.optimizer.kinematics.tool_path.turning_sheet import (
-    REACHED,
-    TurningSheet,
+from joulepath.optimizer.kinematics.tool_path.joint_path import joint_path
+from joulepath.optimizer.kinematics.tool_path.turning_grid import (
+    TURNING_GRID,
+    TurningGrid,
     turning_of,
     turning_through,
     values_of,
@@ -43,28 +42,64 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import Side
 
-# values of a smooth turning between and at the ends, and instants at which its cost is measured (an
-# odd number)
-KNOTS, INSTANTS = 10, 81
-# points of the sheet along the way, and more of them for each bend
-FIRST_STEPS, BEND_STEPS = 17, 6
-# step [rad] of a difference quotient, iterations, and the share by which the cost must fall in each
-STEP, ITERATIONS, PROGRESS = 1e-5, 25, 1e-4
-# value of an excess of a limit, as a multiple of the first cost: what exceeds one by a tenth costs
-# a tenth more
-EXCESS = 10.0
-# rad: where a turning leads, and where it is to lead
-SAME = 1e-6
+
+@dataclass(frozen=True)
+class ToolTurningSettings:
+    """Settings of the search for a turning."""
+
+    knots: int = 10
+    """Values of a smooth turning, including its ends."""
+
+    instants: int = 81
+    """Instants at which the cost of a turning is evaluated; odd, for Simpson's rule."""
+
+    grid_steps: int = 17
+    """Points of the dynamic programming along the path."""
+
+    grid_steps_per_bend: int = 6
+    """Further points per bend of the path."""
+
+    difference: float = 1e-5
+    """Step of the difference quotients [rad]."""
+
+    max_iterations: int = 25
+    """Largest number of iterations of L-BFGS."""
+
+    progress: float = 1e-4
+    """Relative decrease of the cost in an iteration below which L-BFGS ends."""
+
+    excess_cost: float = 10.0
+    """Relative increase of the power for a limit exceeded by 100 %."""
+
+    same_configuration: float = 1e-6
+    """Distance up to which a turning ends in the goal configuration [rad]."""
+
+    newton_steps: int = 20
+    """Largest number of Newton steps of the inverse kinematics at an instant."""
+
+    missing_cost: float = 1e3
+    """Relative cost of a turning that the arm cannot follow."""
+
+
+TOOL_TURNING = ToolTurningSettings()
 
 
 def turned_paths(
     prepared: PreparedProblem, q_start: Array, q_goal: Array, t: Array, s: Array
 ) -> Iterator[tuple[Trace, Spline]]:
-    """Traces and joint paths of turnings from q_start to q_goal (nq,) [rad] that should need less;
-    the better one last.
+    """Paths with turnings of the tool that are expected to cost less, the better one last.
 
-    If an end of the course is free, they begin or end at any angle there. `s` (k,) are the
-    fractions of the course at times t (k,) [s] of a motion.
+    At a free end of the course, the turnings may have any angle.
+
+    Args:
+        prepared: the problem.
+        q_start: start configuration, shape (nq,) [rad].
+        q_goal: goal configuration, shape (nq,) [rad].
+        t: times of a motion, shape (k,) [s].
+        s: fractions of the course at these times, shape (k,).
+
+    Yields:
+        Trace and joint path of a turning.
     """
     law, known = _TimeLaw(prepared, q_start, s, t), _known(prepared, q_start)
     wanted, coarse = None if law.course.free_end else q_goal, law.coarse()
@@ -75,8 +110,16 @@ def turned_paths(
 
 
 class TurnedAtEnd:
-    """Paths from q_start to q_goal (nq,) [rad] that have another angle of the tool at the `side` of
-    a course that is free: the tool turns evenly from or to it, beside what it turns now."""
+    """Paths with another angle of the tool at a free end of the course.
+
+    The angle changes linearly along the path, in addition to the present turning.
+
+    Args:
+        prepared: the problem.
+        q_start: start configuration, shape (nq,) [rad].
+        q_goal: goal configuration, shape (nq,) [rad].
+        side: the free end.
+    """
 
     def __init__(
         self, prepared: PreparedProblem, q_start: Array, q_goal: Array, side: Side
@@ -87,9 +130,7 @@ class TurnedAtEnd:
         self.q_goal, self.side = None if prepared.course.free_end else q_goal, side
 
     def by(self, angle: float) -> tuple[Trace, Spline] | None:
-        """The trace and the joint path at an angle [rad] to the present one; None if the arm cannot
-        follow them.
-        """
+        """Trace and joint path at an angle [rad] to the present one; None if infeasible."""
         x = self.known.x
         angles = self.known(x) + angle * (x if self.side == "goal" else 1 - x)
         turning = turning_of(values_of(angles, *self.free), *self.free)
@@ -97,20 +138,29 @@ class TurnedAtEnd:
 
 
 def _known(prepared: PreparedProblem, q_start: Array) -> CubicSpline:
-    """The turning with which the course is followed from q_start (nq,) [rad]."""
+    """The present turning along the course from q_start (nq,) [rad]."""
     assert prepared.course is not None
     free = prepared.course.free_end, prepared.course.free_start
-    return prepared.traces[q_start.tobytes()].turning or turning_of(
-        np.zeros(KNOTS - 2 + sum(free)), *free
-    )
+    known = prepared.followed.known_trace(q_start)
+    assert known is not None
+    return known.turning or turning_of(np.zeros(TOOL_TURNING.knots - 2 + sum(free)), *free)
 
 
 def _followed(
     prepared: PreparedProblem, q_start: Array, q_goal: Array | None, turning: CubicSpline
 ) -> tuple[Trace, Spline] | None:
-    """The trace and the joint path of a turning from q_start to q_goal (nq,) [rad]; None if it
-    leads elsewhere, or the arm cannot follow it. Without q_goal it may lead anywhere. From a free
-    start, it begins where the tool is turned to from q_start."""
+    """Trace and joint path of a turning.
+
+    Args:
+        prepared: the problem.
+        q_start: start configuration, shape (nq,) [rad]; from a free start, the tool first turns
+            there.
+        q_goal: goal configuration, shape (nq,) [rad]; None for any.
+        turning: angle of the tool along the course.
+
+    Returns:
+        Trace and path; None if the arm cannot follow the turning, or ends elsewhere.
+    """
     assert prepared.course is not None
     course, limits = replace(prepared.course, turning=turning), prepared.arm.active_limits
     first = _first_of(prepared, q_start, turning)
@@ -118,7 +168,9 @@ def _followed(
         return None
     (trace,) = traces(prepared.arm, course, first[None])
     trace = replace(trace, turning=turning)
-    leads_there = q_goal is None or np.abs(trace.q[-1] - q_goal).max() < SAME
+    leads_there = (
+        q_goal is None or np.abs(trace.q[-1] - q_goal).max() < TOOL_TURNING.same_configuration
+    )
     if (
         trace.obstacle is not None
         or not leads_there
@@ -130,9 +182,7 @@ def _followed(
 
 
 def _first_of(prepared: PreparedProblem, q_start: Array, turning: CubicSpline) -> Array | None:
-    """The configuration (nq,) [rad] in which a turning begins, near q_start (nq,); None if there is
-    none.
-    """
+    """First configuration (nq,) [rad] of a turning, near q_start (nq,); None if unreachable."""
     assert prepared.course is not None
     if not prepared.course.free_start:
         return q_start
@@ -141,22 +191,20 @@ def _first_of(prepared: PreparedProblem, q_start: Array, turning: CubicSpline) -
 
 
 class _TimeLaw:
-    """A course that is gone through in a time law: fractions s (k,) of it at times t (k,) [s]."""
+    """A course with a time law: fractions s (k,) of the course at times t (k,) [s]."""
 
     def __init__(self, prepared: PreparedProblem, q_start: Array, s: Array, t: Array) -> None:
         assert prepared.course is not None
         self.prepared, self.course, self.q_start = prepared, prepared.course, q_start
         self.chain = chain_of(prepared.arm.robot)
         self.s, self.t = s, t
-        self.times = np.linspace(0.0, t[-1], INSTANTS)
+        self.times = np.linspace(0.0, t[-1], TOOL_TURNING.instants)
         self.at = np.interp(self.times, t, s)
         self.weights = simpson_weights(self.times)
         self.poses = self.course.poses(self.at)
 
     def coarse(self) -> CubicSpline | None:
-        """The turning of least cost by dynamic programming; None if there is none but the one
-        without a turn.
-        """
+        """Turning of least cost by dynamic programming; None if no other turning is better."""
         free = self.course.free_end, self.course.free_start
         most = min(
             float(
@@ -164,25 +212,27 @@ class _TimeLaw:
             ),
             np.pi,
         )
-        steps = FIRST_STEPS + BEND_STEPS * self.course.shape.bends
+        settings = TOOL_TURNING
+        steps = settings.grid_steps + settings.grid_steps_per_bend * self.course.shape.bends
         turned = float(_known(self.prepared, self.q_start)(0.0))
-        sheet = TurningSheet.of(
+        grid = TurningGrid.of(
             self.prepared.arm, self.chain, self.course, self.q_start, steps, most, turned
         )
-        sheet = sheet.without(self._excluded)
-        lengths = np.diff(np.interp(sheet.at, self.s, self.t))
+        grid = grid.without(self._excluded)
+        lengths = np.diff(np.interp(grid.at, self.s, self.t))
 
         def cost(first: Array, second: Array, k: npt.NDArray[np.intp]) -> Array:
             v = (second - first) / np.maximum(lengths[k], 1e-9)[:, None]
             return lengths[k] * self._drawn((first + second) / 2, v, np.zeros_like(v))
 
-        chosen = sheet.least(cost, *free)
+        chosen = grid.least(cost, *free)
         if chosen is None or (not self.course.free_start and (chosen == chosen[0]).all()):
             return None
-        return turning_through(sheet.at, sheet.angles[chosen], KNOTS, *free)
+        return turning_through(grid.at, grid.angles[chosen], settings.knots, *free)
 
     def refined(self, turning: CubicSpline) -> CubicSpline:
-        """The turning near another one that needs the least with this time law."""
+        """Locally optimal turning for this time law, from another turning."""
+        settings = TOOL_TURNING
         free = self.course.free_end, self.course.free_start
         values, near = values_of(turning(turning.x), *free), self._first(turning)
         q = None if near is None else self._configurations(values[None], near)[0]
@@ -193,26 +243,25 @@ class _TimeLaw:
 
         def cost(x: Array) -> tuple[float, Array]:
             checkpoint()
-            tried = self._configurations(np.vstack([x, x + STEP * np.eye(len(x))]), best[0])
+            beside = x + settings.difference * np.eye(len(x))
+            tried = self._configurations(np.vstack([x, beside]), best[0])
             if not np.isfinite(tried).all():
-                return 1e3, np.zeros(len(x))
+                return settings.missing_cost, np.zeros(len(x))
             values = self._costs(tried) / first
             best[0] = tried[0]
-            return float(values[0]), (values[1:] - values[0]) / STEP
+            return float(values[0]), (values[1:] - values[0]) / settings.difference
 
         found = minimize(
             cost,
             values,
             jac=True,
             method="L-BFGS-B",
-            options={"maxiter": ITERATIONS, "ftol": PROGRESS},
+            options={"maxiter": settings.max_iterations, "ftol": settings.progress},
         )
         return turning_of(np.asarray(found.x, dtype=float), *free)
 
     def _first(self, turning: CubicSpline) -> Array | None:
-        """Configurations (INSTANTS, nq) [rad] of a turning, followed from its start; None without a
-        start.
-        """
+        """Configurations (instants, nq) [rad] of a turning; None if its start is unreachable."""
         first = _first_of(self.prepared, self.q_start, turning)
         if first is None:
             return None
@@ -220,8 +269,14 @@ class _TimeLaw:
         return np.stack([np.interp(self.at, trace.at, q) for q in trace.q.T], axis=1)
 
     def _configurations(self, values: Array, near: Array) -> Array:
-        """Configurations (n, INSTANTS, nq) [rad] of turnings by their values (n, k), near others;
-        NaN where none is.
+        """Configurations of turnings by inverse kinematics.
+
+        Args:
+            values: values of the turnings, shape (n, k).
+            near: configurations to start from, shape (instants, nq) [rad].
+
+        Returns:
+            Configurations, shape (n, instants, nq) [rad]; NaN if unreachable.
         """
         count, nq = len(values), near.shape[1]
         free = self.course.free_end, self.course.free_start
@@ -230,26 +285,26 @@ class _TimeLaw:
             self.course.turned(np.tile(self.poses, (count, 1, 1)), angles),
             self.prepared.arm.T_flange_tcp,
         )
-        q, missed = newton.solved(self.chain, np.tile(near, (count, 1)), T, steps=20)
-        q[missed > REACHED] = np.nan
-        return q.reshape(count, INSTANTS, nq)
+        guess = np.tile(near, (count, 1))
+        q, missed = newton.solved(self.chain, guess, T, steps=TOOL_TURNING.newton_steps)
+        q[missed > TURNING_GRID.reached] = np.nan
+        return q.reshape(count, TOOL_TURNING.instants, nq)
 
     def _costs(self, q: Array) -> Array:
-        """Cost (n,) [J] of motions q (n, INSTANTS, nq) [rad] with this time law."""
+        """Costs (n,) [J] of motions q (n, instants, nq) [rad] with this time law."""
         spline = CubicSpline(self.times, q, axis=1, bc_type="clamped")
         v, a = (spline(self.times, d).reshape(-1, q.shape[2]) for d in (1, 2))
         drawn = self._drawn(q.reshape(v.shape), v, a, soft=True)
-        return np.asarray(drawn.reshape(len(q), INSTANTS) @ self.weights)
+        return np.asarray(drawn.reshape(len(q), TOOL_TURNING.instants) @ self.weights)
 
     def _drawn(self, q: Array, v: Array, a: Array, soft: bool = False) -> Array:
-        """Cost (n,) [W] at states (n, nq); what exceeds a limit costs more if `soft`, else
-        infinitely much.
+        """Power (n,) [W] at states (n, nq).
+
+        A state beyond a limit has a higher power if `soft`, else an infinite power.
         """
-        arm, limits, tau = (
-            self.prepared.arm,
-            self.prepared.arm.active_limits,
-            self.prepared.torques(q, v, a),
-        )
+        arm = self.prepared.arm
+        limits = self.prepared.arm.active_limits
+        tau = self.prepared.torques(q, v, a)
         if self.prepared.problem.objective == "mechanical":
             cost = np.abs(tau * v).sum(axis=1)
         else:
@@ -260,13 +315,13 @@ class _TimeLaw:
             ratios += [np.abs(a) / limits.a_max]
         over = np.maximum(np.hstack(ratios).max(axis=1) - 1, 0.0)
         return (
-            np.asarray(cost + EXCESS * np.abs(cost) * over)
+            np.asarray(cost + TOOL_TURNING.excess_cost * np.abs(cost) * over)
             if soft
             else np.where(over > 0, np.inf, cost)
         )
 
     def _excluded(self, q: Array) -> Mask:
-        """Which configurations (n, nq) are outside of the joints' range, or collide."""
+        """Mask (n,) of configurations (n, nq) beyond their position limits, or colliding."""
         limits, arm = self.prepared.arm.active_limits, self.prepared.arm
         outside = ((q < limits.q_min) | (q > limits.q_max)).any(axis=1)
         if not (arm.collisions and len(self.prepared.surroundings.model.pairs)):

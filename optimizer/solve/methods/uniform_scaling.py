@@ -1,10 +1,10 @@
-"""`uniform_scaling`: the time-optimal motion with time scaled by the one factor of least energy.
+"""`uniform_scaling`: the time-optimal motion, with time scaled by the factor of least energy.
 
 D. Meike, M. Pellicciari, G. Berselli, "Energy efficient use of multirobot production lines in the
 automotive industry: detailed system modeling and optimization", IEEE Trans. Autom. Sci. Eng. 11,
-2014: one factor per motion scales the time of the controller's motion. Here this is the
-time-optimal jerk-limited motion of all joints together. If that collides, it is the time-optimal
-motion along smooth planned paths.
+2014: one factor per motion scales the time of the controller's motion. Here the controller's motion
+is the time-optimal jerk-limited motion of all joints together, or, after a collision, the
+time-optimal motion along smooth planned paths.
 """
 
 from __future__ import annotations
@@ -24,41 +24,62 @@ from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.around_obstacles import around_obstacles
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
-from joulepath.optimizer.solve.methods.method import (
-    CONVERGED,
-    DEADLINE_PASSED,
-    Method,
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
+from joulepath.optimizer.solve.methods.solve_result import (
+    SolveReason,
     SolveResult,
     SolveStatus,
+    with_effort,
 )
-from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
-from joulepath.optimizer.solve.methods.sqp_method import with_effort
 
-# ratio of successive factors, and the number of successive factors without a decrease that ends the
-# search
-RATIO, PATIENCE = 1.12, 8
-# relative tolerance of the best factor
-FACTOR_TOLERANCE = 1e-5
-# the limits on rates and torque are used up to these ratios, because of rounding; torque is bounded
-# between samples where it comes to this ratio of its limit at one: peaks between them are some
-# thousandths above
-RATES_USED, TORQUE_USED, BOUNDED = 1 - 1e-9, 1 - 1e-4, 0.97
+
+@dataclass(frozen=True)
+class UniformScalingSettings:
+    """Settings of the search for the time scale of least cost."""
+
+    ratio: float = 1.12
+    """Ratio of successive factors."""
+
+    patience: int = 8
+    """Successive factors without a decrease of the cost after which the search ends."""
+
+    tolerance: float = 1e-5
+    """Relative tolerance of the best factor."""
+
+    rates_used: float = 1 - 1e-9
+    """Share of the limits on rates that is used, because of rounding."""
+
+    torque_used: float = 1 - 1e-4
+    """Share of the limits on torque and path constraints that is used."""
+
+    bounded_above: float = 0.97
+    """Ratio of torque to its limit at a sample above which torque is bounded between samples: peaks
+    there are a few thousandths higher."""
+
+
+UNIFORM_SCALING = UniformScalingSettings()
 
 
 @dataclass(frozen=True)
 class _Samples:
-    """The given motion on the certificate's grid: q [rad], v [rad/s], a [rad/s²], torques [N·m],
-    (k, nq) each.
-
-    Rigid-body torque is the `static` torque plus the part `moving`, quadratic in speed, which a
-    factor k divides by k².
-    """
+    """A motion on the grid of the certificate, shape (k, nq) each."""
 
     q: Array
+    """Joint positions [rad]."""
+
     v: Array
+    """Joint speeds [rad/s]."""
+
     a: Array
+    """Joint accelerations [rad/s²]."""
+
     static: Array
+    """Torques at rest [N·m]."""
+
     moving: Array
+    """Rigid-body torques less the static torques, quadratic in speed [N·m]. A time scale k divides
+    them by k²."""
 
 
 class UniformScaling(Method):
@@ -67,15 +88,13 @@ class UniformScaling(Method):
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("ruckig", "ruckig_slowed")
 
     def solve(self) -> SolveResult:
-        """The factor of least cost within the limits and the allowed durations; on planned paths
-        after a collision.
-        """
+        """Solve for the factor of least cost, along planned paths after a collision."""
         given = time_optimal_spline(
             self.prepared.problem.arm.active_limits, self.q_start, self.q_goal
         )
         collision = self.prepared.surroundings.worst_violation(given)
         if collision is not None:
-            return around_obstacles(self, "the time-optimal motion", collision, self._along)
+            return around_obstacles(self, SolveReason.TIME_OPTIMAL_COLLIDES, collision, self._along)
         return UniformScale(self, given).solve()
 
     def _along(self, path: Spline) -> SolveResult:
@@ -87,19 +106,19 @@ class UniformScaling(Method):
 
 
 class UniformScale:
-    """The factor on the time of a `given` motion, and the number of energies evaluated."""
+    """Search for the factor on the time of a `given` motion.
+
+    Attributes:
+        evaluations: number of costs evaluated.
+    """
 
     def __init__(self, method: Method, given: Spline) -> None:
-        self.prepared, self.deadline, self._cost_of = (
-            method.prepared,
-            method.deadline,
-            method.cost_of,
-        )
-        self.t_min, self.t_max, self._fastest = (
-            method.t_min,
-            method.t_max,
-            method.interval.minimum_time,
-        )
+        self.prepared = method.prepared
+        self.deadline = method.deadline
+        self._cost_of = method.cost_of
+        self.t_min = method.t_min
+        self.t_max = method.t_max
+        self._fastest = method.interval.minimum_time
         self.given, self.evaluations = given, 0
         q, v, a = sample(given, grid(given.duration))
         still = np.zeros_like(q)
@@ -107,38 +126,39 @@ class UniformScale:
         self._samples = _Samples(q, v, a, static, self.prepared.torques(q, v, a) - static)
 
     def solve(self) -> SolveResult:
-        """The factor of least cost within the limits and the allowed durations."""
-        length = self.given.duration
+        """Solve for the factor of least cost within limits and allowed durations."""
+        settings, length = UNIFORM_SCALING, self.given.duration
         needed = least_time_scale(
-            self.given, self.prepared.problem.arm.active_limits.rates * RATES_USED
+            self.given, self.prepared.problem.arm.active_limits.rates * settings.rates_used
         )
         least, most = max(needed, self.t_min / length), self.t_max / length
         if least > most:
-            reason = (
-                f"the time-optimal motion takes at least {least * length:.4f} s within the limits"
+            return SolveResult(
+                SolveStatus.INFEASIBLE,
+                SolveReason.TIME_OPTIMAL_TAKES_LONGER,
+                figures=(least * length,),
             )
-            return SolveResult(SolveStatus.INFEASIBLE, reason)
         factors, costs = [least], [self._cost(least)]
         while factors[-1] < most and (
-            np.isinf(costs).all() or len(costs) - int(np.argmin(costs)) <= PATIENCE
+            np.isinf(costs).all() or len(costs) - int(np.argmin(costs)) <= settings.patience
         ):
             if self.deadline.passed:
-                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, self.evaluations)
-            factors.append(min(factors[-1] * RATIO, most))
+                return SolveResult(
+                    SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED, self.evaluations
+                )
+            factors.append(min(factors[-1] * settings.ratio, most))
             costs.append(self._cost(factors[-1]))
         best = int(np.argmin(costs))
         if np.isinf(costs[best]):
             return SolveResult(
-                SolveStatus.FAILED, "found no time scale within the limits", self.evaluations
+                SolveStatus.FAILED, SolveReason.NO_TIME_SCALE_WITHIN_LIMITS, self.evaluations
             )
-        factor, low, high = (
-            factors[best],
-            factors[max(best - 1, 0)],
-            factors[min(best + 1, len(factors) - 1)],
-        )
+        factor = factors[best]
+        low = factors[max(best - 1, 0)]
+        high = factors[min(best + 1, len(factors) - 1)]
         if self._fastest:
-            # the least factor within the limits
-            while factor - low > FACTOR_TOLERANCE * factor:
+            # bisection for the smallest feasible factor
+            while factor - low > settings.tolerance * factor:
                 middle = (low + factor) / 2
                 low, factor = (middle, factor) if np.isinf(self._cost(middle)) else (low, middle)
         elif high > low:
@@ -146,12 +166,12 @@ class UniformScale:
                 self._cost,
                 bounds=(low, high),
                 method="bounded",
-                options={"xatol": FACTOR_TOLERANCE * factor},
+                options={"xatol": settings.tolerance * factor},
             )
             if found.fun < costs[best]:
                 factor = float(found.x)
         return SolveResult(
-            SolveStatus.SOLVED, CONVERGED, self.evaluations, 1, self._retimed(factor)
+            SolveStatus.SOLVED, SolveReason.CONVERGED, self.evaluations, 1, self._retimed(factor)
         )
 
     def _retimed(self, factor: float) -> Spline:
@@ -159,23 +179,24 @@ class UniformScale:
         return lasting(self.given, min(max(self.given.duration * factor, self.t_min), self.t_max))
 
     def _cost(self, factor: float) -> float:
-        """The cost [J], or the duration [s] for minimum time; infinite if torque or a path
-        constraint is exceeded.
-        """
+        """Cost of a factor; infinite if torque or a path constraint exceeds its limit."""
         self.evaluations += 1
+        allowed = UNIFORM_SCALING.torque_used
         given, v = self._samples, self._samples.v / factor
         tau = given.static + given.moving / factor**2
         tau = limited_torque(self.prepared.arm, tau, v, given.a / factor**2)
         limit = self.prepared.problem.arm.active_limits.tau_max
         used = float((np.abs(tau) / limit).max())
-        if used > TORQUE_USED:
+        if used > allowed:
             return np.inf
         if (
             self.prepared.path is not None
-            and (self.prepared.path.ratios(given.q, v) > TORQUE_USED).any()
+            and (self.prepared.path.ratios(given.q, v) > allowed).any()
         ):
             return np.inf
         spline = self._retimed(factor)
-        if used > BOUNDED and (torque_peaks(self.prepared, spline) > limit * TORQUE_USED).any():
-            return np.inf
+        if used > UNIFORM_SCALING.bounded_above:
+            peaks = torque_peaks(self.prepared, spline)
+            if (peaks > limit * allowed).any():
+                return np.inf
         return self._cost_of(spline)

@@ -1,5 +1,4 @@
-"""Constraints along the motion (tool cone, TCP and elbow speed, clearance) as rows of an NLP, with
-their Hessian.
+"""Path constraints (tool cone, TCP and elbow speed, clearance) as rows of an NLP.
 
 Each constraint is a ratio value / limit of the joint positions q and speeds v. The NLP bounds every
 ratio at the path points of its basis.
@@ -17,29 +16,39 @@ from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios, Pa
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 
 Index = npt.NDArray[np.intp]
-# step of q [rad] and v [rad/s] for finite differences of the ratios' gradients
+# step of q [rad] and v [rad/s] in finite differences of gradients
 DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True)
 class PathConstraintValues:
-    """State and ratios at the M path points: q [rad] and v [rad/s] (M, nq), ratios (M, c) with
-    gradients.
-    """
+    """States and ratios at the M path points."""
 
     q: Array
+    """Joint positions, shape (M, nq) [rad]."""
+
     v: Array
+    """Joint speeds, shape (M, nq) [rad/s]."""
+
     ratios: ConstraintRatios
+    """Ratios (M, c) with gradients by q and v."""
 
 
 @dataclass(frozen=True)
 class NearPathConstraints:
-    """Constraints near their bounds: path point and column (rows,), ratio and slack (rows,)."""
+    """Path constraints near their bounds."""
 
     points: Index
+    """Path points, shape (rows,)."""
+
     columns: Index
+    """Columns of the constraints, shape (rows,)."""
+
     ratio: Array
+    """Ratios, shape (rows,)."""
+
     slack: Array
+    """Distances to the bounds, shape (rows,)."""
 
     def __getitem__(self, chosen: Index) -> NearPathConstraints:
         return NearPathConstraints(
@@ -54,19 +63,22 @@ _NONE_NEAR = NearPathConstraints(
 
 @dataclass(frozen=True)
 class PathConstraintRows:
-    """Path constraints of one NLP as functions of its decision variables: free control points s (m,
-    r), duration T.
-
-    `at_path` (2, M, n) and `at_path_free` (2, M, m) hold the basis functions and their first
-    derivatives at the path points, for all control points and for the free ones. `bounds` (c,)
-    bounds the ratios.
-    """
+    """Path constraints as functions of free control points s (m, r) and duration T."""
 
     constraints: PathConstraints | None
+    """The constraints; None without constraints."""
+
     bounds: Array
+    """Bounds of the ratios, shape (c,)."""
+
     coordinates: Coordinates
+    """Coordinates of the spline."""
+
     at_path: Array
+    """Basis functions and first derivatives at the path points, shape (2, M, n)."""
+
     at_path_free: Array
+    """The same for the free control points, shape (2, M, m)."""
 
     @property
     def nq(self) -> int:
@@ -90,7 +102,7 @@ class PathConstraintRows:
         return PathConstraintValues(q, v, self.constraints.linearised(q, v))
 
     def near(self, values: PathConstraintValues, near: float) -> NearPathConstraints:
-        """The constraints whose ratio exceeds `near` times its bound."""
+        """Constraints with a ratio above `near` times the bound."""
         if self.constraints is None:
             return _NONE_NEAR
         ratio = values.ratios.value
@@ -99,7 +111,7 @@ class PathConstraintRows:
         return NearPathConstraints(k, c, found, self.bounds[c] - found)
 
     def gradients(self, values: PathConstraintValues, T: float, of: NearPathConstraints) -> Array:
-        """Gradients (rows, n) by (s, T) of some constraints."""
+        """Gradients (rows, n) of constraints by (s, T)."""
         k, c = of.points, of.columns
         at, rising = self.at_path_free[:, k, :, None]
         P, result = self.coordinates.directions, np.zeros((len(k), self.n))
@@ -114,9 +126,7 @@ class PathConstraintRows:
     def changes(
         self, values: PathConstraintValues, T: float, of: NearPathConstraints, ds: Array, dT: float
     ) -> Array:
-        """Changes (rows,) of some ratios to first order: their gradients times a step ds (m, r), dT
-        [s].
-        """
+        """Changes (rows,) of ratios to first order, for a step ds (m, r) and dT [s]."""
         k, c = of.points, of.columns
         dq, rising = self.at_path_free @ ds @ self.coordinates.directions.T
         change = np.einsum("rj,rj->r", values.ratios.by_q[k, c], dq[k])
@@ -126,15 +136,13 @@ class PathConstraintRows:
         return np.asarray(change)
 
     def hessian(self, values: PathConstraintValues, T: float, weights: Array) -> Array:
-        """Hessian (n, n) of Σ weights · ratios, weights (M, c), by finite differences of the
-        ratios' gradients.
-        """
+        """Hessian (n, n) of Σ weights · ratios, weights (M, c), by differences of gradients."""
         k = np.flatnonzero(weights.any(axis=1))
         if self.constraints is None or not len(k):
             return np.zeros((self.n, self.n))
         nq, v, w = self.nq, values.v[k], weights[k]
         y = np.hstack([values.q[k], v])
-        # what hangs on positions alone needs no steps in speed
+        # constraints on positions alone need no steps in speed
         steps = DIFFERENCE * np.eye(2 * nq if self.constraints.limit_speeds else nq, 2 * nq)
         stepped = np.concatenate([y[None], y + steps[:, None]]).reshape(-1, 2 * nq)
         ratios = self.constraints.linearised(
@@ -151,7 +159,7 @@ class PathConstraintRows:
         )
         bent = np.zeros((len(k), 2 * nq, 2 * nq))
         bent[:, : len(steps)] = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
-        # differences are symmetric but for their error; what factorises a Hessian reads half of it
+        # a factorisation reads half of the Hessian, whose differences are not quite symmetric
         bent = (bent + bent.transpose(0, 2, 1)) / 2
         Y = np.concatenate(self._state_gradients(v, T, k), axis=1)
         hessian: Array = Y.reshape(-1, self.n).T @ (bent @ Y).reshape(-1, self.n)
@@ -164,9 +172,7 @@ class PathConstraintRows:
         return hessian
 
     def _state_gradients(self, v: Array, T: float, k: Index) -> tuple[Array, Array]:
-        """Gradients of q and v, (rows, nq, n) each, at the path points k (rows,), where the speed
-        is v (rows, nq).
-        """
+        """Gradients of q and v (rows, nq, n) at path points k, with joint speeds v (rows, nq)."""
         at, rising = self.at_path_free[:, k]
         P, shape = self.coordinates.directions, (len(k), self.nq, self.n - 1)
         Q = np.einsum("km,jr->kjmr", at, P).reshape(shape)

@@ -1,6 +1,4 @@
-"""Hessians by the free control points of B-splines: blocks of pairs that move the same span, and
-bands of these.
-"""
+"""Hessians by the free control points of B-splines, as blocks of pairs and as bands."""
 
 from __future__ import annotations
 
@@ -16,18 +14,21 @@ from joulepath.optimizer.solve.nlp.active_path_constraints import Index
 
 @dataclass(frozen=True)
 class ControlPointPairs:
-    """The pairs i ≤ j of m free control points (m, r) that move the same span.
+    """Pairs i ≤ j of free control points that move a common span.
 
-    Variables are ordered row by row. A Hessian has a block (r, r) per pair, and its lower band (m
-    r, band + 1) has the columns as rows.
+    Variables are ordered row by row. A Hessian has a block (r, r) per pair. Its lower band (m r,
+    band + 1) has the columns as rows.
     """
 
     m: int
+    """Number of free control points."""
+
     r: int
+    """Number of coordinates."""
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
-        """i and j of every pair."""
+        """Indices i and j of all pairs."""
         apart = np.subtract.outer(np.arange(self.m), np.arange(self.m))
         i, j = np.nonzero((apart <= 0) & (apart >= -DEGREE))
         return i, j
@@ -43,16 +44,12 @@ class ControlPointPairs:
         return min((DEGREE + 1) * self.r, self.m * self.r) - 1
 
     def products(self, rows: Array) -> Array:
-        """Products (pairs, k) of the entries of rows (k, m): what the square of a row adds to the
-        blocks.
-        """
+        """Products (pairs, k) of the entries of rows (k, m): the blocks of squared rows."""
         i, j = self.pairs
         return np.ascontiguousarray((rows[:, i] * rows[:, j]).T)
 
     def node_products(self, rows: Array) -> Array:
-        """Products (pairs, 9 N) of the rows (3 N, m) of q, v, a at each node: of every two of these
-        three.
-        """
+        """Products (pairs, 9 N) of the rows (3 N, m) of q, v and a, two by two at every node."""
         i, j = self.pairs
         three = rows.reshape(-1, 3, self.m)
         return np.ascontiguousarray(
@@ -69,9 +66,7 @@ class ControlPointPairs:
 
     @cached_property
     def _band_places(self) -> tuple[Index, Index]:
-        """The entries of the pairs' blocks that are on or below the diagonal, and where they are in
-        the band.
-        """
+        """Entries of the blocks on or below the diagonal, and their places in the band."""
         (i, j), joints = self.pairs, np.arange(self.r)
         rows, columns = np.broadcast_arrays(
             j[:, None, None] * self.r + joints, i[:, None, None] * self.r + joints[:, None]

@@ -1,5 +1,4 @@
-"""Hessians made positive definite, and quadratics of banded ones: negative eigenvalues change
-sign."""
+"""Hessians made positive definite, and quadratics of banded Hessians."""
 
 from __future__ import annotations
 
@@ -11,31 +10,47 @@ from scipy.linalg.lapack import dpbtrf, dpbtrs, dpotrf, dpotrs, dsyevr
 
 from joulepath.models.robot import Array
 
-# smallest eigenvalue, relative to a bound on the largest or to 1
-EIGENVALUE_FLOOR = 1e-7
-# variables up to which eigenvalues are found again for each Hessian
-MOST_AGAIN = 60
+
+@dataclass(frozen=True)
+class ConvexitySettings:
+    """How Hessians are made positive definite."""
+
+    eigenvalue_floor: float = 1e-7
+    """Smallest eigenvalue, relative to the larger of 1 and a bound on all eigenvalues."""
+
+    reuse_above: int = 60
+    """Number of variables above which the correction of the last Hessian is tried first: finding
+    eigenvalues takes several times as long as a factorisation."""
+
+
+CONVEXITY = ConvexitySettings()
 
 
 @dataclass(frozen=True, eq=False)
 class ConvexQuadratic:
-    """A positive definite matrix (n, n): its lower band (n, width), column by column, or its upper
-    triangle.
-    """
+    """A positive definite matrix H (n, n)."""
 
     matrix: Array
+    """Lower band (n, width) with the columns of H as rows if `banded`, else the upper triangle."""
+
     banded: bool
 
     def least(self, gradient: Array, added: tuple[Array, Array] | None = None) -> Array:
-        """The least (n,) of ½ xᵀ H x + gradientᵀ x. `added` to H is a matrix as a band and as an
-        upper triangle.
+        """Minimiser of ½ xᵀ H x + gradientᵀ x.
+
+        Args:
+            gradient: the gradient, shape (n,).
+            added: matrix added to H, as a band and as an upper triangle; None for zero.
+
+        Returns:
+            The minimiser, shape (n,).
         """
         matrix = self.matrix if added is None else self.matrix + added[0 if self.banded else 1]
         if self.banded:
             return np.asarray(dpbtrs(dpbtrf(matrix.T, lower=1)[0], -gradient, lower=1)[0])
         return np.asarray(dpotrs(dpotrf(matrix.T, lower=1)[0], -gradient, lower=1)[0])
 
-    def bend(self, x: Array) -> float:
+    def curvature(self, x: Array) -> float:
         """xᵀ H x."""
         if self.banded:
             return float(x @ dsbmv(self.matrix.shape[1] - 1, 1.0, self.matrix.T, x, lower=1))
@@ -43,51 +58,54 @@ class ConvexQuadratic:
 
 
 class Convexity:
-    """Makes the Hessians along the way of one motion positive definite.
+    """Makes the successive Hessians of one solve positive definite.
 
-    What the last one lacked for it is tried again first: to find eigenvalues takes several times as
-    long as to factorise.
+    The correction of the last Hessian is tried first.
     """
 
     def __init__(self) -> None:
-        self._lacking: Array | None = None
+        self._correction: Array | None = None
 
     def of(self, band: Array) -> ConvexQuadratic:
-        """The quadratic of a Hessian by its lower band (n, width), column by column."""
+        """The quadratic of a Hessian, by its lower band (n, width) with the columns as rows."""
         if not dpbtrf(band.T, lower=1)[1]:
             return ConvexQuadratic(band, banded=True)
         H = _upper(band)
-        if self._lacking is not None:
-            again = H + self._lacking
+        if self._correction is not None:
+            again = H + self._correction
             if not dpotrf(again.T, lower=1)[1]:
                 return ConvexQuadratic(again, banded=False)
-        # a bound on all eigenvalues
+        # bound on all eigenvalues
         most = float(np.abs(H).sum(axis=1).max() + np.abs(H).sum(axis=0).max())
-        lacking = what_lacks(H, most)
-        if len(H) > MOST_AGAIN:
-            self._lacking = lacking
-        return ConvexQuadratic(H + lacking, banded=False)
+        correction = definite_correction(H, most)
+        if len(H) > CONVEXITY.reuse_above:
+            self._correction = correction
+        return ConvexQuadratic(H + correction, banded=False)
 
 
-def what_lacks(H: Array, most: float) -> Array:
-    """The matrix (n, n) that makes a symmetric one, by its upper triangle H (n, n), positive
-    definite: negative eigenvalues change sign, and small ones grow to EIGENVALUE_FLOOR. `most` is a
-    bound on the size of all.
+def definite_correction(H: Array, most: float) -> Array:
+    """Matrix to add to a symmetric matrix so that the sum is positive definite.
 
-    Those that change are few: finding them takes half the time of finding all.
+    Negative eigenvalues change sign, and small eigenvalues grow to `eigenvalue_floor`. Few
+    eigenvalues change: finding these takes half the time of finding all.
+
+    Args:
+        H: upper triangle of the matrix, shape (n, n).
+        most: bound on the absolute values of all eigenvalues.
+
+    Returns:
+        The matrix to add, shape (n, n).
     """
-    floor = EIGENVALUE_FLOOR * max(1.0, most)
+    floor = CONVEXITY.eigenvalue_floor * max(1.0, most)
     values, vectors, count, _, _ = dsyevr(H.T, range="V", vl=-2 * most, vu=floor, lower=1)
     low, vectors = values[:count], vectors[:, :count]
     return np.asarray((vectors * (np.maximum(np.abs(low), floor) - low)) @ vectors.T)
 
 
 def _upper(band: Array) -> Array:
-    """The upper triangle (n, n) of a symmetric matrix by its lower band (n, width), whose columns
-    are the rows here.
-    """
+    """Upper triangle (n, n) of a symmetric matrix, from its lower band (n, width)."""
     n, width = band.shape
     H = np.zeros((n, n + 1))
-    # the diagonal of the matrix is the first column here
+    # the first column of the band is the diagonal of the matrix
     H[:, :width] = band
     return H.ravel()[: n * n].reshape(n, n)

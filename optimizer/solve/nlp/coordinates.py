@@ -8,34 +8,38 @@ import numpy as np
 
 from joulepath.models.robot import Array, Limits
 
-# least displacement of a joint [rad] by which its limits are divided on a straight line
+# smallest displacement of a joint by which its limits are divided on a straight line [rad]
 LEAST_DISPLACEMENT = 1e-12
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Coordinates s (r,) of a spline from `start` to `goal` (r,): q = origin (nq,) + directions
-    (nq, r) · s.
-
-    `limits` are those of s, (r,) each, except `tau_max` (nq,) [N·m], which stays per joint.
-    """
+    """Coordinates s (r,) of a spline, with q = origin + directions · s."""
 
     origin: Array
+    """Configuration at s = 0, shape (nq,) [rad]."""
+
     directions: Array
+    """Derivatives of q by s, shape (nq, r)."""
+
     start: Array
+    """Start of the spline, shape (r,)."""
+
     goal: Array
+    """Goal of the spline, shape (r,)."""
+
     limits: Limits
+    """Limits of s, shape (r,), with `tau_max` per joint, shape (nq,) [N·m]."""
 
     @staticmethod
     def joints(q_start: Array, q_goal: Array, limits: Limits) -> Coordinates:
-        """Every joint has a spline of its own."""
+        """Coordinates of a spline per joint."""
         nq = len(q_start)
         return Coordinates(np.zeros(nq), np.eye(nq), q_start, q_goal, limits)
 
     @staticmethod
     def straight_line(q_start: Array, q_goal: Array, limits: Limits) -> Coordinates:
-        """All joints share one time scaling s ∈ [0, 1] along the straight line from start to
-        goal."""
+        """Coordinate s ∈ [0, 1] along the straight line, shared by all joints."""
         displacement = q_goal - q_start
         length = np.maximum(np.abs(displacement), LEAST_DISPLACEMENT)
         zero, one = np.zeros(1), np.ones(1)
@@ -59,14 +63,16 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class GoalConstraints:
-    """Linear constraints on the displacement of the goal: lower ≤ rows · (goal - coordinates.goal)
-    ≤ upper.
-
-    rows (c, r), lower and upper (c,); equal bounds make an equation. `radius` bounds the
-    displacement of every coordinate (trust region).
-    """
+    """Linear constraints lower ≤ rows · (goal - coordinates.goal) ≤ upper on the goal."""
 
     rows: Array
+    """Gradients, shape (c, r)."""
+
     lower: Array
+    """Lower bounds, shape (c,); equal bounds make an equation."""
+
     upper: Array
+    """Upper bounds, shape (c,)."""
+
     radius: float
+    """Largest displacement of every coordinate (trust region)."""

@@ -1,15 +1,14 @@
-"""One motion of least mechanical work, with sharp corners, within its limits: a primal-dual
-interior-point method.
+"""Motion of least mechanical work with narrow corners: a primal-dual interior-point method.
 
-The work ∫ Σ |p_j| dt, p_j = tau_j v_j, has corners, and limits hold a motion at many points. The
-SQP takes QPs of many rows, on a dense Hessian, at every step. Here both become smooth: |p| is
+The work ∫ Σ |p_j| dt, p_j = tau_j v_j, has corners, and limits are active at many points. The SQP
+would need QPs of many rows, with a dense Hessian, in every step. Here both become smooth: |p| is
 sqrt(p² + width²), and a limit |ratio| ≤ bound has slacks t ≥ 0 with prices λ: λ t = barrier. Width
 and barrier fall from step to step. Every limit concerns one span: the Hessian stays banded, and a
-step takes a factorisation of the band.
+step takes one factorisation of the band.
 
-With narrow corners, Newton's method on the smooth cost takes short steps. So the slope u = p /
-sqrt(p² + width²) is a variable of its own, as a price is: u sqrt(p² + width²) = p is linearised in
-u and p (T. F. Chan, G. H. Golub, P. Mulet, "A nonlinear primal-dual method for total
+With narrow corners, Newton's method on the smooth cost takes short steps. Therefore the slope u =
+p / sqrt(p² + width²) is a variable, as a price is: u sqrt(p² + width²) = p is linearised in u and
+p (T. F. Chan, G. H. Golub, P. Mulet, "A nonlinear primal-dual method for total
 variation-based image restoration", SIAM J. Sci. Comput. 20, 1999). Slacks and prices: J. Nocedal,
 S. J. Wright, "Numerical Optimization", 2006, chapter 19.
 """
@@ -24,104 +23,93 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.solve.nlp.convex_quadratic import Convexity
+from joulepath.optimizer.solve.nlp.interior_state import Interior, InteriorNodes, InteriorStep
 from joulepath.optimizer.solve.nlp.limited_motions import LimitedMotions
 
-# first and last barrier, as ratios of the first cost, and the factors by which width and barrier
-# fall
-BARRIERS, NARROWER, LOWER = (1e-4, 3e-7), 0.6, 0.3
-# least slacks at the start, and the share of the way to zero that a step may take a slack, a price
-# or a slope
-LEAST_SLACK, TO_BOUNDARY = 0.01, 0.995
-# share of a torque limit up to which the torques' own curvature, and friction's slope, are left out
-NEAR_TORQUE = 0.5
-# width and barrier fall after a step of at least this length; the last step is at least as long as
-# the second number
-LONG_STEP, LAST_STEP = 0.3, 0.9
-MAX_ITERATIONS, BACKTRACKS = 80, 8
-# part of the promised decrease that a step must reach, and rounding
-ARMIJO, ROUNDING = 1e-4, 1e-9
-# price of a residual in the merit function, as a multiple of the price of its limit
-RESIDUAL_PRICE = 2.0
-# prices stay within this factor of barrier / slack
-CENTRAL = 1e6
-# steps within which a motion must lose the relative decrease `progress`, if it is within its limits
-PATIENCE = 3
-# a motion is given up if even this multiple of the decrease that its step promises leaves it above
-# what it must be
-MOST_DECREASE = 3.0
-# excess of a ratio over its bound that is none
-EXCESS = 2e-5
-
 
 @dataclass(frozen=True)
-class Interior:
-    """An iterate: free control points (m, r), slacks and prices (2, K) [J] of the limits below and
-    above their bounds, slopes (N, r) of the corners, limited torques (N, r) [N·m], barrier [J] and
-    width [W].
+class InteriorPointSettings:
+    """Settings of the interior-point method."""
 
-    `work` [J] is the smooth work, `scale` [J] that of the first iterate, `excess` the greatest
-    excess of a ratio over its bound. `stationarity` is as of the SQP's `Result`. `converged`: a
-    further step promises too little, and the motion is within its limits. `costlier`: it was given
-    up.
-    """
+    first_barrier: float = 1e-4
+    """Barrier of the first iterate, relative to its cost."""
 
-    free: Array
-    slack: Array
-    price: Array
-    slope: Array
-    limited: Array
-    barrier: float
-    width: float
-    work: float
-    scale: float
-    excess: float = np.inf
-    stationarity: float = np.inf
-    iterations: int = 0
-    converged: bool = False
-    costlier: bool = False
+    last_barrier: float = 3e-7
+    """Smallest barrier, relative to the cost of the first iterate."""
+
+    width_decay: float = 0.6
+    """Factor of the width of the corners after a long step."""
+
+    barrier_decay: float = 0.3
+    """Factor of the barrier after a long step."""
+
+    least_slack: float = 0.01
+    """Smallest slack of the first iterate."""
+
+    to_boundary: float = 0.995
+    """Share of the way to zero that a step may take a slack, a price or a slope."""
+
+    near_torque: float = 0.5
+    """Ratio to the torque limit up to which the curvature of torques and the slope of friction are
+    neglected."""
+
+    long_step: float = 0.3
+    """Length of a step above which width and barrier fall."""
+
+    last_step: float = 0.9
+    """Length above which a step may be the last."""
+
+    max_iterations: int = 80
+    """Largest number of steps."""
+
+    max_backtracks: int = 8
+    """Largest number of trial points of a line search."""
+
+    armijo: float = 1e-4
+    """Share of the promised decrease that a step must reach."""
+
+    merit_rounding: float = 1e-9
+    """Relative rounding error of the merit function."""
+
+    residual_price: float = 2.0
+    """Price of a residual in the merit function, as a multiple of the price of its limit."""
+
+    centrality: float = 1e6
+    """Largest ratio, in either direction, of a price to barrier / slack."""
+
+    patience: int = 3
+    """Steps within which the work of a feasible motion must fall by the relative decrease asked
+    for."""
+
+    optimism: float = 3.0
+    """Multiple of the promised decrease that a step is trusted to reach: a motion is given up if
+    even this leaves it too costly."""
+
+    feasible: float = 2e-5
+    """Largest excess of a ratio over its bound in a feasible motion."""
 
 
-@dataclass(frozen=True)
-class _Nodes:
-    """At the nodes of an iterate: powers (N, r) [W] and their smooth absolute values, powers'
-    Jacobian (N, r, 3 r), that of the limited torques (N, r, 3 r), and the Hessian (N, 3 r, 3 r) of
-    Σ weight u p + pull · limited torque."""
-
-    power: Array
-    smooth: Array
-    jacobian: Array
-    torque_jacobian: Array
-    hessian: Array
-    ratio: Array
-
-
-@dataclass(frozen=True)
-class _Step:
-    """A step: of free control points (m, r), slacks and prices (2, K), slopes (N, r), the iterate's
-    residuals (2, K), the cost's slope along it [J], and the largest component of the Lagrangian's
-    gradient after it [J/rad]."""
-
-    free: Array
-    slack: Array
-    price: Array
-    slope: Array
-    residual: Array
-    descent: float
-    gradient: float
+INTERIOR_POINT = InteriorPointSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class InteriorPoint(LimitedMotions):
-    """The program of motions of duration T [s] in one spline space. `parameters` are the kernel's,
-    packed, of the work with corners of a width [W]; `plain` those whose limited torque is that of
-    rigid bodies and rotors."""
+    """The program of motions of duration T [s] in one spline space."""
 
     parameters: Callable[[float], Array]
+    """Packed parameters of the kernel for corners of a width [W]."""
+
     plain: Array
+    """Packed parameters with which the limited torque is that of rigid bodies and rotors alone."""
 
     def first(self, ends: Array, free: Array, width: float, bounds: Array) -> Interior:
-        """The iterate at free control points (m, r) [rad] of a motion between `ends` (2, r), for
-        `bounds` (K,).
+        """The first iterate.
+
+        Args:
+            ends: start and goal, shape (2, r) [rad].
+            free: free control points, shape (m, r) [rad].
+            width: width of the corners [W].
+            bounds: bounds of the ratios, shape (K,).
         """
         y = self._states(self.points(ends, free))
         power = self.kernel.value(y, self.plain)[1] * self._speeds(y)
@@ -129,8 +117,8 @@ class InteriorPoint(LimitedMotions):
         work, limited = float(self._weights @ cost), limited.copy()
         scale = max(work, 1e-9)
         ratio = self._ratio(ends, free, limited)
-        slack = np.maximum(bounds - np.stack([ratio, -ratio]), LEAST_SLACK)
-        barrier = BARRIERS[0] * scale
+        slack = np.maximum(bounds - np.stack([ratio, -ratio]), INTERIOR_POINT.least_slack)
+        barrier = INTERIOR_POINT.first_barrier * scale
         slope = power / np.hypot(power, width)
         return Interior(free, slack, barrier / slack, slope, limited, barrier, width, work, scale)
 
@@ -143,13 +131,22 @@ class InteriorPoint(LimitedMotions):
         progress: float,
         below: float = np.inf,
     ) -> Interior:
-        """The motion of least work with corners of width `last` [W], from an iterate.
+        """Minimise the work from an iterate, with corners that narrow from step to step.
 
-        It goes on until a step promises less than the relative decrease `progress`, and is given up
-        if its smooth work is not expected to come below `below` [J].
+        Args:
+            ends: start and goal, shape (2, r) [rad].
+            at: the iterate.
+            last: last width of the corners [W].
+            bounds: bounds of the ratios, shape (K,).
+            progress: relative decrease of the work that a further step must promise.
+            below: the motion is given up if its smoothed work is not expected to come below [J].
+
+        Returns:
+            The last iterate.
         """
+        settings = INTERIOR_POINT
         convexity, found, lost = Convexity(), at, [np.inf]
-        for made in range(1, MAX_ITERATIONS + 1):
+        for made in range(1, settings.max_iterations + 1):
             checkpoint()
             nodes = self._nodes(ends, found)
             residual = np.stack([nodes.ratio, -nodes.ratio]) - bounds + found.slack
@@ -157,31 +154,34 @@ class InteriorPoint(LimitedMotions):
             smooth = float((self._weights[:, None] * nodes.smooth).sum())
             if found.width <= last:
                 lost.append(smooth)
-            lowest = found.width <= last and found.barrier <= BARRIERS[1] * found.scale
-            if found.width <= last and smooth + MOST_DECREASE * min(step.descent, 0.0) > below:
+            least_barrier = settings.last_barrier * found.scale
+            lowest = found.width <= last and found.barrier <= least_barrier
+            expected = smooth + settings.optimism * min(step.descent, 0.0)
+            if found.width <= last and expected > below:
                 return replace(found, costlier=True)
             found, length = self._moved(ends, found, step, nodes, bounds, last)
             stationarity = step.gradient / found.scale
             found = replace(
                 found, work=smooth, stationarity=stationarity, iterations=at.iterations + made
             )
-            little = -step.descent < progress * found.scale and length > LAST_STEP
-            little |= lost[-1 - PATIENCE :][0] - lost[-1] < progress * found.scale
-            if not length or (lowest and little and found.excess <= EXCESS):
-                return replace(found, converged=lowest and found.excess <= EXCESS)
+            little = -step.descent < progress * found.scale and length > settings.last_step
+            little |= lost[-1 - settings.patience :][0] - lost[-1] < progress * found.scale
+            feasible = found.excess <= settings.feasible
+            if not length or (lowest and little and feasible):
+                return replace(found, converged=lowest and feasible)
         return found
 
-    def _nodes(self, ends: Array, at: Interior) -> _Nodes:
+    def _nodes(self, ends: Array, at: Interior) -> InteriorNodes:
         y, r = self._states(self.points(ends, at.free)), self._r
         v, joints, count = self._speeds(y), np.arange(r), len(y)
         pull, none, limited_J = self._weights[:, None] * at.slope, np.zeros(count), None
-        if (np.abs(at.limited) > NEAR_TORQUE * self.limits.tau_max).any():
+        if (np.abs(at.limited) > INTERIOR_POINT.near_torque * self.limits.tau_max).any():
             price = self._torque_part(at.price[0] - at.price[1]) / self.limits.tau_max
             near = self.kernel.node(y, price, none, self.parameters(at.width))
             limited_J, bent = near[3].copy(), near[4].copy()
         _, tau, _, J, hessian = self.kernel.node(y, pull * v, none, self.plain)
         if limited_J is None:
-            # far from the limits, what friction adds to their change matters little
+            # far from the limits, friction hardly matters for the change of torques
             limited_J = J
         else:
             hessian = hessian + bent
@@ -193,15 +193,16 @@ class InteriorPoint(LimitedMotions):
         jacobian[:, joints, r + joints] += tau
         power = tau * v
         ratio = self._ratio(ends, at.free, at.limited)
-        return _Nodes(power, np.hypot(power, at.width), jacobian, limited_J, hessian, ratio)
+        return InteriorNodes(power, np.hypot(power, at.width), jacobian, limited_J, hessian, ratio)
 
-    def _step(self, at: Interior, nodes: _Nodes, residual: Array, convexity: Convexity) -> _Step:
-        """The Newton step of all conditions: what it does to slacks and prices is eliminated
-        first."""
+    def _step(
+        self, at: Interior, nodes: InteriorNodes, residual: Array, convexity: Convexity
+    ) -> InteriorStep:
+        """Newton step of all conditions, with slacks and prices eliminated first."""
         target = (at.barrier + at.price * residual) / at.slack
         bend = (at.price / at.slack).sum(axis=0)
         unit = nodes.power / nodes.smooth
-        # the curvature of the corner, if its slope keeps up
+        # curvature of the corner for the present slope
         corner = self._weights[:, None] / nodes.smooth * np.maximum(1 - at.slope * unit, 0.0)
         torque_bend = self._torque_part(bend) / self.limits.tau_max**2
         hessian = (
@@ -227,20 +228,36 @@ class InteriorPoint(LimitedMotions):
         after = at.price + price
         left = np.abs(cost + self._pulled(nodes, after[0] - after[1])).max()
         descent = float((cost * free).sum()) - at.barrier * float((slack / at.slack).sum())
-        return _Step(free, slack, price, slope, residual, descent, float(left))
+        return InteriorStep(free, slack, price, slope, residual, descent, float(left))
 
     def _moved(
-        self, ends: Array, at: Interior, step: _Step, nodes: _Nodes, bounds: Array, last: float
+        self,
+        ends: Array,
+        at: Interior,
+        step: InteriorStep,
+        nodes: InteriorNodes,
+        bounds: Array,
+        last: float,
     ) -> tuple[Interior, float]:
-        """The next iterate, and the length of the step: as far as slacks stay positive, halved
-        until the merit function falls; 0 if it does not. Prices and slopes go as far as they stay
-        within their bounds.
+        """Make a step, halved until the merit function falls.
 
         The merit function is the cost with the barriers of the slacks, and a price on every
-        residual. Where a limit is further away than its slack says, the slack is that.
+        residual. A slack grows to the distance of its limit if that is larger.
+
+        Args:
+            ends: start and goal, shape (2, r) [rad].
+            at: the iterate.
+            step: the Newton step.
+            nodes: values at the nodes of the iterate.
+            bounds: bounds of the ratios, shape (K,).
+            last: last width of the corners [W].
+
+        Returns:
+            The next iterate, and the length of the step; 0 if the merit function does not fall.
         """
+        settings = INTERIOR_POINT
         parameters = self.parameters(at.width)
-        weight = RESIDUAL_PRICE * np.maximum(at.price, at.price + step.price)
+        weight = settings.residual_price * np.maximum(at.price, at.price + step.price)
         wrong = float((weight * np.abs(step.residual)).sum())
         before = (
             float((self._weights[:, None] * nodes.smooth).sum())
@@ -249,7 +266,7 @@ class InteriorPoint(LimitedMotions):
         )
         descent = min(step.descent - wrong, 0.0)
         length = _most(at.slack, step.slack)
-        for _ in range(BACKTRACKS):
+        for _ in range(settings.max_backtracks):
             free, slack = at.free + length * step.free, at.slack + length * step.slack
             cost, limited = self.kernel.value(self._states(self.points(ends, free)), parameters)
             ratio = self._ratio(ends, free, limited)
@@ -257,7 +274,8 @@ class InteriorPoint(LimitedMotions):
             slack = np.maximum(slack, room)
             merit = float(self._weights @ cost) - at.barrier * float(np.log(slack).sum())
             merit += float((weight * (slack - room)).sum())
-            if merit <= before + ARMIJO * length * descent + ROUNDING * abs(before):
+            allowed = before + settings.armijo * length * descent
+            if merit <= allowed + settings.merit_rounding * abs(before):
                 return self._with_prices(
                     replace(
                         at,
@@ -273,26 +291,26 @@ class InteriorPoint(LimitedMotions):
             length /= 2
         return self._with_prices(at, step, 0.0, last), 0.0
 
-    def _with_prices(self, at: Interior, step: _Step, length: float, last: float) -> Interior:
-        """The iterate with the prices and slopes of a step of some length, and with what falls
-        after a long one.
-        """
+    def _with_prices(
+        self, at: Interior, step: InteriorStep, length: float, last: float
+    ) -> Interior:
+        """The iterate with new prices and slopes; width and barrier fall after a long step."""
+        settings = INTERIOR_POINT
         central = at.barrier / at.slack
         price = np.maximum(at.price + _most(at.price, step.price) * step.price, 0.0)
         up = _most(1 - at.slope, -step.slope), _most(1 + at.slope, step.slope)
-        falls = length > LONG_STEP
+        falls = length > settings.long_step
+        barrier, width = settings.barrier_decay * at.barrier, settings.width_decay * at.width
         return replace(
             at,
-            price=np.clip(price, central / CENTRAL, central * CENTRAL),
+            price=np.clip(price, central / settings.centrality, central * settings.centrality),
             slope=np.clip(at.slope + min(up) * step.slope, -1.0, 1.0),
-            width=max(last, NARROWER * at.width) if falls else at.width,
-            barrier=max(BARRIERS[1] * at.scale, LOWER * at.barrier) if falls else at.barrier,
+            width=max(last, width) if falls else at.width,
+            barrier=max(settings.last_barrier * at.scale, barrier) if falls else at.barrier,
         )
 
     def _blocks(self, hessian: Array, bend: Array) -> Array:
-        """The blocks of pairs of a Hessian at the nodes (N, 3 r, 3 r), with the curvatures (K,) of
-        the barriers.
-        """
+        """Blocks of pairs, from a Hessian (N, 3 r, 3 r) at nodes and barrier curvatures (K,)."""
         r, joints, pairs = self._r, np.arange(self._r), self._pairs
         by_three = hessian.reshape(-1, 3, r, 3, r).transpose(0, 1, 3, 2, 4).reshape(-1, r * r)
         blocks = np.asarray(self._node_products @ by_three).reshape(-1, r, r)
@@ -302,35 +320,16 @@ class InteriorPoint(LimitedMotions):
         blocks[pairs.own[:, None], joints, joints] += self._place_part(bend) / self._half**2
         return blocks
 
-    def _pulled(self, nodes: _Nodes, weight: Array) -> Array:
+    def _pulled(self, nodes: InteriorNodes, weight: Array) -> Array:
         """The gradient (m, r) of Σ weight · ratio, weight (K,)."""
         by_torque = self._torque_part(weight) / self.limits.tau_max
         torques = self._D.T @ (by_torque[:, None] @ nodes.torque_jacobian).reshape(-1, self._r)
         rates = self._R.T @ (self._rate_part(weight) / self._rate_limits)
         return np.asarray(torques + rates + self._place_part(weight) / self._half)
 
-    def _change(self, free: Array, torque: Array) -> Array:
-        """Changes (K,) of the ratios with those of the control points (m, r) and of the limited
-        torques (N, r).
-        """
-        rates, places = self._R @ free / self._rate_limits, free / self._half
-        return np.concatenate(
-            [rates.ravel(), places.ravel(), (torque / self.limits.tau_max).ravel()]
-        )
-
-    def _ratio(self, ends: Array, free: Array, limited: Array) -> Array:
-        """Rates, places and limited torques (N, r) over their limits, (K,); places from the middle
-        of their range.
-        """
-        rates = self._at_rates @ self.points(ends, free) / self._rate_limits
-        places = (free - (self.limits.q_max + self.limits.q_min) / 2) / self._half
-        return np.concatenate(
-            [rates.ravel(), places.ravel(), (limited / self.limits.tau_max).ravel()]
-        )
-
 
 def _most(value: Array, change: Array) -> float:
-    """The length ≤ 1 of a change by which positive values stay positive."""
+    """Length ≤ 1 of a change after which positive values are positive."""
     falling = change < 0
     shares = -value[falling] / change[falling]
-    return min(1.0, TO_BOUNDARY * float(np.min(shares, initial=np.inf)))
+    return min(1.0, INTERIOR_POINT.to_boundary * float(np.min(shares, initial=np.inf)))

@@ -1,23 +1,25 @@
-"""The limits of motions of one duration as bounds on ratios: what an interior-point method works
-with.
-"""
+"""Limits of motions of one duration as bounds on ratios, for an interior-point method."""
 
 from __future__ import annotations
 
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.solve.nlp.timed_motions import TimedMotions
 
-# points per span at which speed, acceleration and jerk are limited
-RATE_POINTS = (2, 4, 12)
-
 
 class LimitedMotions(TimedMotions):
-    """`TimedMotions` with K limits, all on the size of a ratio: of the rates at points of every
-    span, of the control points' places in their ranges, and of the limited torques at the nodes."""
+    """`TimedMotions` with K limits on absolute values of ratios.
+
+    The ratios are, in this order, those of the rates at points of every span, of the control points
+    within their ranges, and of the limited torques at the nodes.
+    """
+
+    rate_points: ClassVar[tuple[int, int, int]] = (2, 4, 12)
+    """Points per span at which speed, acceleration and jerk are limited."""
 
     def unbounded(self) -> Array:
         """Bounds (K,) of 1 on all ratios, for `tightened`."""
@@ -26,12 +28,19 @@ class LimitedMotions(TimedMotions):
         )
 
     def tightened(self, bounds: Array, spans: Array, torque: Array) -> Array:
-        """Bounds (K,) tightened by factors ≤ 1 of the rates per span (3, S, r), and of the torques
-        (r,).
+        """Tighten bounds.
+
+        Args:
+            bounds: bounds of the ratios, shape (K,).
+            spans: factors ≤ 1 of the rates of every span, shape (3, S, r).
+            torque: factors ≤ 1 of the torques, shape (r,).
+
+        Returns:
+            The tightened bounds, shape (K,).
         """
         factors = []
-        for factor, count in zip(spans, RATE_POINTS, strict=True):
-            # the first point of a span is the last of the one before
+        for factor, count in zip(spans, self.rate_points, strict=True):
+            # the first point of a span is the last point of the span before
             first = np.minimum(factor, np.concatenate([factor[:1], factor[:-1]]))
             each = np.repeat(factor[:, None], count, axis=1)
             each[:, 0] = first
@@ -39,6 +48,24 @@ class LimitedMotions(TimedMotions):
         rates = np.concatenate(factors).ravel()
         torques = np.tile(torque, len(self.basis.nodes))
         return np.asarray(bounds * np.concatenate([rates, np.ones(self._m * self._r), torques]))
+
+    def _change(self, free: Array, torque: Array) -> Array:
+        """Changes (K,) of the ratios, for changes of control points (m, r) and torques (N, r)."""
+        rates, places = self._R @ free / self._rate_limits, free / self._half
+        return np.concatenate(
+            [rates.ravel(), places.ravel(), (torque / self.limits.tau_max).ravel()]
+        )
+
+    def _ratio(self, ends: Array, free: Array, limited: Array) -> Array:
+        """Ratios (K,) of rates, positions and limited torques (N, r) to their limits.
+
+        The ratio of a position is that of its distance from the middle of the range.
+        """
+        rates = self._at_rates @ self.points(ends, free) / self._rate_limits
+        places = (free - (self.limits.q_max + self.limits.q_min) / 2) / self._half
+        return np.concatenate(
+            [rates.ravel(), places.ravel(), (limited / self.limits.tau_max).ravel()]
+        )
 
     def _speeds(self, y: Array) -> Array:
         return y[:, self._r : 2 * self._r]
@@ -59,10 +86,10 @@ class LimitedMotions(TimedMotions):
 
     @cached_property
     def _rate_places(self) -> list[Array]:
-        """Where speed, acceleration and jerk are limited: RATE_POINTS per span, and the end."""
+        """Points of speed, acceleration and jerk limits: some per span, and the end."""
         edges = np.unique(self.basis.knots)
         spans = edges[:-1, None], np.diff(edges)[:, None]
         return [
             np.append((spans[0] + spans[1] * (np.arange(count) / count)).ravel(), 1.0)
-            for count in RATE_POINTS
+            for count in self.rate_points
         ]

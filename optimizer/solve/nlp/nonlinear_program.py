@@ -1,5 +1,4 @@
-"""The NLP of one candidate: a B-spline between two configurations, its cost, limits and their
-derivatives.
+"""The NLP of one candidate: a B-spline between two configurations, its cost and its limits.
 
 Decision variables are the free control points s (m, r) and the duration T. The spline runs in
 coordinates s ∈ R^r with q = origin + directions · s: the joints themselves (r = nq) for a B-spline
@@ -22,12 +21,13 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE
 from joulepath.optimizer.dynamics.kernel import Kernel
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.solve.nlp.active_path_constraints import Index, PathConstraintRows
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints
 from joulepath.optimizer.solve.nlp.goal_holding import GoalHolding
+from joulepath.optimizer.solve.nlp.node_hessian import NodeStates, Overlaps
 
 # an NLP counts as feasible if no constraint exceeds its limit by more than this ratio
 FEASIBILITY = 1e-4
@@ -35,48 +35,72 @@ FEASIBILITY = 1e-4
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Value and derivatives of an NLP at one point x = (free control points row by row, T).
-
-    `cost` [J], `gradient` (n,), `hessian` (n, n) of cost + multiplier · tau, `tau` (N, nq) [N·m]
-    the limited torque, and the factors of single torques' gradients: `jacobian` (N, nq, 3, r) =
-    ∂tau/∂(s, v, a), `rate` (N, 3, r) = ∂(s, v, a)/∂T.
-    """
+    """Value and derivatives of an NLP at one point x = (free control points row by row, T)."""
 
     cost: float
+    """Cost [J]."""
+
     gradient: Array
+    """Gradient of the cost, shape (n,)."""
+
     hessian: Array
+    """Hessian of cost + multiplier · tau, shape (n, n)."""
+
     tau: Array
+    """Limited torques, shape (N, nq) [N·m]."""
+
     jacobian: Array
+    """∂tau/∂(s, v, a), shape (N, nq, 3, r)."""
+
     rate: Array
+    """∂(s, v, a)/∂T, shape (N, 3, r)."""
 
 
 @dataclass(frozen=True)
 class NonlinearProgram:
-    """The NLP of one candidate.
-
-    `p` is the packed parameter vector of the kernel. The duration lies in [t_min, t_max] [s]; equal
-    bounds fix it. `constant` [J] is a part of the cost that no variable changes: it keeps relative
-    changes of the cost in proportion. With `goal_constraints` or a `goal_curve` the goal is a
-    decision variable too: the last row of the free control points; `goal_holding` is what waiting
-    there draws. With a `start_curve` the start is one, too: the first row. Every ratio of `path` is
-    bounded by `path_bounds` (c,), 1 or a little less. The spline passes through the configurations
-    `passes` (k, r), in their order, at times that are free.
-    """
+    """The NLP of one candidate."""
 
     kernel: Kernel
+    """Dynamics and cost at a node."""
+
     basis: Basis
+    """Spline space."""
+
     p: Array
+    """Packed parameters of the kernel."""
+
     coordinates: Coordinates
+    """Coordinates of the spline."""
+
     t_min: float
+    """Smallest duration [s]."""
+
     t_max: float
+    """Largest duration [s]; equal to `t_min` for a fixed duration."""
+
     constant: float = 0.0
+    """Constant part of the cost, which keeps its relative changes in proportion [J]."""
+
     goal_constraints: GoalConstraints | None = None
+    """Constraints of a free goal, which is the last row of the free control points."""
+
     start_curve: HeldPose | None = None
+    """Curve along which the start slides: the first row of the free control points."""
+
     goal_curve: HeldPose | None = None
+    """Curve along which the goal slides: the last row of the free control points."""
+
     goal_holding: GoalHolding | None = None
+    """Energy of waiting at a goal that is a decision variable."""
+
     path: PathConstraints | None = None
+    """Path constraints, as ratios."""
+
     path_bounds: Array = field(default_factory=lambda: np.zeros(0))
+    """Bounds of these ratios, 1 or slightly less, shape (c,)."""
+
     passes: Array | None = None
+    """Configurations that the spline passes through in order, at free times, shape (k, r)."""
 
     @cached_property
     def r(self) -> int:
@@ -90,7 +114,7 @@ class NonlinearProgram:
 
     @cached_property
     def free_count(self) -> int:
-        """Number of free control points, with the ends that are decision variables."""
+        """Number of free control points, including ends that are decision variables."""
         return self.basis.n - 2 * self.basis.resting + self.free_start + self.free_goal
 
     @property
@@ -104,8 +128,8 @@ class NonlinearProgram:
         return self.goal_constraints is not None or self.goal_curve is not None
 
     @property
-    def held(self) -> bool:
-        """Whether every iterate is put on passes, or its ends on their curves."""
+    def has_equations(self) -> bool:
+        """Whether every iterate meets equations of passes or of sliding ends."""
         return not (self.passes is None and self.start_curve is None and self.goal_curve is None)
 
     @cached_property
@@ -118,7 +142,7 @@ class NonlinearProgram:
         return self.path is not None and CLEARANCE in self.path.names
 
     def points(self, free: Array) -> Array:
-        """All control points (n, r) for the free ones (m, r)."""
+        """All control points (n, r), from the free ones (m, r)."""
         start, goal = self._ends
         resting = self.basis.resting
         if self.free_start:
@@ -129,12 +153,12 @@ class NonlinearProgram:
 
     @cached_property
     def _ends(self) -> tuple[Array, Array]:
-        """The control points at rest at the start and at the goal of the coordinates."""
+        """Resting control points at the start and at the goal of the coordinates."""
         ends = np.ones((self.basis.resting, 1))
         return ends * self.coordinates.start, ends * self.coordinates.goal
 
     def free_columns(self, matrix: Array) -> Array:
-        """The columns (…, m) of a basis matrix (…, n) that multiply the free control points."""
+        """Columns (…, m) of a basis matrix (…, n) of the free control points."""
         inner = matrix[..., self.basis.free]
         parts, resting = [inner], self.basis.resting
         if self.free_start:
@@ -144,18 +168,16 @@ class NonlinearProgram:
         return np.ascontiguousarray(np.concatenate(parts, axis=-1))
 
     def free_points(self, points: Array) -> Array:
-        """The free control points (m, r) of all of them (n, r)."""
+        """Free control points (m, r), from all control points (n, r)."""
         first = self.basis.resting - self.free_start
         return points[first : len(points) - self.basis.resting + self.free_goal]
 
     def joint_points(self, free: Array) -> Array:
-        """Control points of q, (n, nq) [rad], in the spline's space, for the free ones (m, r)."""
+        """Control points (n, nq) [rad] of q, from the free control points (m, r)."""
         return self.coordinates.to_joints(self.points(free))
 
     def _states(self, free: Array, T: float) -> tuple[Array, Array]:
-        """s, v, a in the spline's coordinates (N, 3, r), and q, v, a of the joints as the kernel's
-        y (N, 3 nq).
-        """
+        """s, v, a in the spline's coordinates (N, 3, r), and q, v, a of the joints (N, 3 nq)."""
         z = self.basis.at_nodes @ self.points(free)
         z[1] /= T
         z[2] /= T * T
@@ -176,9 +198,7 @@ class NonlinearProgram:
         return total, tau
 
     def derivatives(self, free: Array, T: float, multiplier: Array) -> Linearisation:
-        """Cost and torques with derivatives; `multiplier` (N, nq) weighs the torques in the
-        Hessian.
-        """
+        """Cost and torques with derivatives; the Hessian has torques times multipliers (N, nq)."""
         z, y = self._states(free, T)
         count, nq, r = len(y), self.kernel.nq, self.r
         w = self.basis.weights
@@ -205,7 +225,7 @@ class NonlinearProgram:
         line = Linearisation(
             cost=self.constant + T * total,
             gradient=np.append(gradient_s.ravel(), total + T * slope),
-            hessian=_Nodes(T, z, D, rate, lagrangian, H, scale).hessian(
+            hessian=NodeStates(T, z, D, rate, lagrangian, H, scale).hessian(
                 self._overlaps, gradient_s, slope
             ),
             tau=tau,
@@ -219,9 +239,7 @@ class NonlinearProgram:
         )
 
     def _held(self, line: Linearisation, goal: Array, T: float) -> Linearisation:
-        """The linearisation with what holding the arm at the goal (r,) draws: of the last row, and
-        the duration.
-        """
+        """The linearisation, with the energy of holding the arm at the goal (r,)."""
         assert self.goal_holding is not None
         cost, first, second = self.goal_holding.derivatives(goal, T)
         gradient, hessian, own = line.gradient.copy(), line.hessian.copy(), slice(-len(first), None)
@@ -231,12 +249,12 @@ class NonlinearProgram:
 
     @cached_property
     def _nodes_free(self) -> Array:
-        """Basis and derivatives of the free control points at the nodes, (N, 3, m)."""
+        """Basis functions of the free control points and derivatives at the nodes, (N, 3, m)."""
         return np.ascontiguousarray(self.free_columns(self.basis.at_nodes).transpose(1, 0, 2))
 
     @cached_property
-    def _overlaps(self) -> _Overlaps:
-        return _Overlaps.of(self._nodes_free)
+    def _overlaps(self) -> Overlaps:
+        return Overlaps.of(self._nodes_free)
 
     def torque_rows(self, line: Linearisation, T: float, k: Index, j: Index) -> Array:
         """Gradients (rows, n) of the torques of joints j at nodes k with respect to x."""
@@ -259,78 +277,3 @@ class NonlinearProgram:
         return PathConstraintRows(
             self.path, self.path_bounds, self.coordinates, at_path, at_path_free
         )
-
-
-@dataclass(frozen=True)
-class _Overlaps:
-    """Pairs i ≤ j of free control points that move the same nodes: a control point moves few of
-    them.
-
-    `products` (pairs, 9 N) are those of basis functions and their derivatives at each node, D_kdi ·
-    D_kej in order of k, d, e.
-    """
-
-    i: Index
-    j: Index
-    products: Array
-
-    @classmethod
-    def of(cls, D: Array) -> _Overlaps:
-        """From D (N, 3, m): basis functions and derivatives of the control points at the nodes."""
-        reached = np.abs(D).max(axis=1) > 0
-        i, j = np.nonzero(np.triu(reached.T @ reached))
-        products = D[:, :, None, i] * D[:, None, :, j]
-        return cls(i, j, np.ascontiguousarray(products.reshape(-1, len(i)).T))
-
-    def sum(self, H: Array, m: int) -> Array:
-        """Σ_k D_kᵀ H_k D_k as (m r, m r), for symmetric H (N, 3, r, 3, r)."""
-        r = H.shape[2]
-        blocks = (self.products @ H.transpose(0, 1, 3, 2, 4).reshape(-1, r * r)).reshape(-1, r, r)
-        total = np.zeros((m, r, m, r))
-        total[self.i, :, self.j] = blocks
-        total[self.j, :, self.i] = blocks.transpose(0, 2, 1)
-        return total.reshape(m * r, m * r)
-
-
-@dataclass(frozen=True)
-class _Nodes:
-    """States z = (s, v, a) (N, 3, r) at the nodes, and derivatives there.
-
-    D (N, 3, m) is ∂z/∂s, with `scale` (3,) the powers of T in it, and `rate` (N, 3, r) is ∂z/∂T;
-    `lagrangian` (N, 3, r) and H (N, 3, r, 3, r) are the first and second derivatives of the
-    Lagrangian by z.
-    """
-
-    T: float
-    z: Array
-    D: Array
-    rate: Array
-    lagrangian: Array
-    H: Array
-    scale: Array
-
-    def hessian(self, overlaps: _Overlaps, gradient_s: Array, slope: float) -> Array:
-        """Hessian (m r + 1, m r + 1) of the Lagrangian by (s, T).
-
-        `gradient_s` (m, r) is the cost's gradient by s, `slope` is Σ_k w_k ∂ℓ_k/∂T.
-        """
-        T, rate = self.T, self.rate
-        (count, _, m), r = self.D.shape, self.z.shape[2]
-        flat = self.D.reshape(count * 3, m)
-        H_ss = overlaps.sum(self.H * np.outer(self.scale, self.scale)[:, None, :, None], m)
-        H_rate = (self.H.reshape(count, 3 * r, 3 * r) @ rate.reshape(count, 3 * r, 1)).reshape(
-            count, 3, r
-        )
-        D_rate = self.D * np.array([0.0, -1.0 / T, -2.0 / T])[:, None]
-        H_sT = (
-            flat.T @ H_rate.reshape(count * 3, r)
-            + D_rate.reshape(count * 3, m).T @ self.lagrangian.reshape(count * 3, r)
-            + gradient_s / T
-        )
-        curvature = self.z * np.array([0.0, 2.0 / (T * T), 6.0 / (T * T)])[:, None]
-        H_TT = 2 * slope + (rate * H_rate).sum() + (self.lagrangian * curvature).sum()
-        hessian = np.empty((m * r + 1, m * r + 1))
-        hessian[:-1, :-1] = H_ss
-        hessian[:-1, -1] = hessian[-1, :-1] = H_sT.ravel()
-        hessian[-1, -1] = H_TT
-        return hessian

@@ -1,11 +1,9 @@
-"""Configurations that a spline passes through, at times that are free: equations of an NLP, met by
-every iterate.
+"""Passes of a spline through configurations, at free times: equations met by every iterate.
 
-At a pass k the spline s(τ) goes through s_k at some τ_k. Along the curve the pass may slide, across
-it the curve is held: to first order, the steps of the control points that keep the pass are those
-whose displacement of s(τ_k) is along the tangent there. They form the null space in which the QP is
-solved. After each step the curve is put back on its passes exactly, by the least change of the
-control points.
+At a pass k the spline s(τ) goes through s_k at some τ_k. To first order, a step of the control
+points keeps the pass if it displaces s(τ_k) along the tangent only. These steps form the null space
+in which the QP is solved. After a step the curve is put back on its passes exactly, by the least
+change of the control points.
 """
 
 from __future__ import annotations
@@ -17,54 +15,79 @@ from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.motion.bspline import DEGREE
-from joulepath.optimizer.motion.passing import nearby, pass_times
+from joulepath.optimizer.motion.passing import pass_times, refined_pass_times
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 
-# rad per duration: a curve that is slower at a pass rests there, and has no tangent along which the
-# pass may slide
-RESTING = 1e-2
-# share of the time to its neighbours by which a pass may slide in one step
-SLIDE = 0.4
+
+@dataclass(frozen=True)
+class PassingSettings:
+    """Settings of the passes of an NLP."""
+
+    resting_speed: float = 1e-2
+    """Speed by τ below which the curve rests at a pass: then it has no tangent, and the pass cannot
+    slide [rad per duration]."""
+
+    slide: float = 0.4
+    """Share of the time to its neighbours by which a pass may move in one step."""
+
+    least_gap: float = 1e-3
+    """Least time between passes, relative to the duration."""
+
+
+PASSING = PassingSettings()
 
 
 @dataclass(frozen=True)
 class Passing:
-    """Where a curve passes: times (k,) in (0, 1), the basis functions `at` (k, m) of the free
-    control points there and their `rising` (k, m), and the curve's tangent and bend (k, r) by τ."""
+    """Passes of a curve."""
 
     times: Array
+    """Times of the passes in (0, 1), shape (k,)."""
+
     at: Array
+    """Basis functions of the free control points, shape (k, m)."""
+
     rising: Array
+    """First derivatives of the basis functions by τ, shape (k, m)."""
+
     tangent: Array
+    """First derivatives of the curve by τ, shape (k, r)."""
+
     bend: Array
+    """Second derivatives of the curve by τ, shape (k, r)."""
 
     @property
     def _moving(self) -> Mask:
-        """Whether the curve does not rest at each of the passes (k,)."""
-        return np.asarray(np.linalg.norm(self.tangent, axis=1) > RESTING)
+        """Mask (k,) of the passes at which the curve does not rest."""
+        return np.asarray(np.linalg.norm(self.tangent, axis=1) > PASSING.resting_speed)
 
-    def held(self) -> Array:
-        """Gradients (rows, m r) by the free control points of what a step must not change."""
+    def gradients_across(self) -> Array:
+        """Gradients (rows, m r) by the free control points of displacements across the curve."""
         r, rows = self.tangent.shape[1], list[Array]()
         for at, tangent, moving in zip(self.at, self.tangent, self._moving, strict=True):
-            across = np.eye(r)
+            normals = np.eye(r)
             if moving:
-                across = np.linalg.qr(tangent[:, None], mode="complete")[0][:, 1:].T
-            rows.append(np.einsum("m,ij->imj", at, across).reshape(len(across), -1))
+                normals = np.linalg.qr(tangent[:, None], mode="complete")[0][:, 1:].T
+            rows.append(np.einsum("m,ij->imj", at, normals).reshape(len(normals), -1))
         return np.concatenate(rows)
 
     def null_space(self, n: int) -> Array:
-        """Orthonormal steps (n, count) of the n decision variables that keep the passes to first
-        order.
-        """
-        held = self.held()
-        gradients = np.zeros((n, len(held)))
-        gradients[: held.shape[1]] = held.T
-        return np.linalg.qr(gradients, mode="complete")[0][:, len(held) :]
+        """Orthonormal basis (n, count) of the steps that keep the passes to first order."""
+        across = self.gradients_across()
+        gradients = np.zeros((n, len(across)))
+        gradients[: across.shape[1]] = across.T
+        return np.linalg.qr(gradients, mode="complete")[0][:, len(across) :]
 
     def curvature(self, pull: Array, n: int) -> Array:
-        """Second derivatives (n, n) of the passes, weighed by their multipliers: the forces that
-        balance the gradient `pull` (m, r) of the cost and the limits."""
+        """Hessian of the passes, weighted by their multipliers.
+
+        Args:
+            pull: gradient of cost and limits, which the multipliers balance, shape (m, r).
+            n: number of decision variables.
+
+        Returns:
+            The Hessian, shape (n, n).
+        """
         multiplier = -np.linalg.lstsq(self.at.T, pull, rcond=None)[0]
         result = np.zeros((n, n))
         size = (self.tangent**2).sum(axis=1)
@@ -86,17 +109,23 @@ class Passes:
         self.p, self.configurations = program, configurations
 
     def put(self, free: Array, near: Passing | None = None) -> tuple[Array, Passing]:
-        """The control points (m, r) put on the passes, and where these are.
+        """Put the curve on its passes.
 
-        They are looked for close to where they were in the curve `near`, or everywhere.
+        Args:
+            free: free control points, shape (m, r).
+            near: passes of an iterate nearby, around which passes are searched; None to search
+                everywhere.
+
+        Returns:
+            The free control points, and their passes.
         """
         curve, target = self._curve(free), self.configurations
         if near is None:
             times = pass_times(curve, target)
         else:
             gaps = np.diff(np.concatenate([[0.0], near.times, [1.0]]))
-            times = nearby(curve, target, near.times, SLIDE * float(gaps.min()))
-        # two passes at one time cannot both be kept
+            times = refined_pass_times(curve, target, near.times, PASSING.slide * float(gaps.min()))
+        # two passes at the same time could not both be kept
         times = _apart(times)
         at = self._columns(times, 0)
         missing = target - curve(times)
@@ -112,10 +141,8 @@ class Passes:
 
 
 def _apart(times: Array) -> Array:
-    """The times (k,), each at least a thousandth of the duration after the one before and before
-    the end.
-    """
-    least = 1e-3 * np.arange(1, len(times) + 1)
+    """The times (k,), with the least gap between neighbours, and before the end."""
+    least = PASSING.least_gap * np.arange(1, len(times) + 1)
     return np.asarray(
         np.minimum(np.maximum.accumulate(np.maximum(times, least) - least) + least, 1 - least[::-1])
     )

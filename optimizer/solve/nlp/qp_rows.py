@@ -1,11 +1,13 @@
 """The rows of a QP, and its solution by DAQP (dual active set; Arnström, Bemporad, Axehill 2022).
 
-DAQP gets the QP in variables y with x = W y that make the Hessian the identity. It would factorise
-the Hessian for each QP again, and transform all rows with it, at a tenth of the speed of BLAS.
+DAQP gets the QP in variables y with x = W y, in which the Hessian is the identity. Otherwise DAQP
+would factorise the Hessian in every QP again, and transform all rows with it, at a tenth of the
+speed of BLAS.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import daqp
@@ -15,25 +17,46 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.deadline import watched_time_left
 from joulepath.optimizer.solve.nlp.active_path_constraints import Index
 
-# least time [s] that a QP gets: most take a millisecond
-LEAST_TIME = 0.05
-# iterations of DAQP after which a QP counts as infeasible. Most take some tens; a relaxed one that
-# collides everywhere has thousands of active rows, and each of its last iterations takes
-# milliseconds
-MOST_QP_ITERATIONS = 1200
-# rows that there is room for at first: more than most QPs have
-ROOM = 320
 
-Places = tuple[Index, Index, Index]  # derivative, coordinate, grid point
+@dataclass(frozen=True)
+class QPRowsSettings:
+    """Settings of the solution of QPs by DAQP."""
 
+    least_time: float = 0.05
+    """Time that a QP may always take [s]: most take a millisecond."""
+
+    max_iterations: int = 1200
+    """Iterations of DAQP after which a QP counts as infeasible. Most take some tens; a relaxed QP
+    that collides everywhere has thousands of active rows, and its last iterations take milliseconds
+    each."""
+
+    initial_rows: int = 320
+    """Rows for which memory is allocated at first: more than most QPs have."""
+
+    primal_tolerance: float = 1e-9
+    """Tolerance of the constraints, which are ratios of limits."""
+
+    softness: float = 1e-6
+    """Weight of the violation of a relaxed row, as DAQP's `rho_soft`."""
+
+
+QP_ROWS = QPRowsSettings()
+
+# derivative, coordinate and grid point of limits on rates
+Places = tuple[Index, Index, Index]
+
+# values of DAQP's interface: exit flag, kinds of rows, and no bound
 _DAQP_OPTIMAL = 1
-_ACTIVE, _EQUAL, _SOFT = 1, 5, 8
+_ACTIVE = 1
+_EQUAL = 5
+_SOFT = 8
 _INFINITE = 1e30
 
 
-class Listed:
-    """Rows of one kind, and the place of each, which is so many indices: of a bound, its side and
-    its variable.
+class PlacedRows:
+    """Numbers of the rows of one kind of constraint, with a tuple of indices per row.
+
+    The indices of a bound, for example, are its side and its variable.
     """
 
     def __init__(self, indices: int) -> None:
@@ -41,34 +64,37 @@ class Listed:
         self._parts = [(none,) * (1 + indices)]
 
     def add(self, rows: Index, places: tuple[Index, ...]) -> None:
-        """Add rows at places."""
+        """Add rows with their indices."""
         self._parts.append((rows, *places))
 
     def joined(self) -> tuple[Index, Any]:
-        """All rows (k,), and their places: an array (k,) for each index."""
+        """All row numbers (k,), and an array (k,) for every index."""
         rows, *places = (np.concatenate(each) for each in zip(*self._parts, strict=True))
         return rows, tuple(places)
 
 
 class QPRows:
-    """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
+    """Constraints least ≤ A y ≤ most in whitened variables y; rows are added at the end.
 
-    `hard` rows are never relaxed. `rates` are the rows of limits on rates, by derivative,
-    coordinate and grid point; `bounds` those of bounds, by side and variable; `path` those of path
-    constraints, by point and column. `chosen` (2, 3, r, M) marks the lower and upper limits on
-    rates with a row, `bounded` (2, n) the lower and upper bounds.
+    Attributes:
+        rates: rows of limits on rates, by derivative, coordinate and grid point.
+        bounds: rows of bounds of variables, by side and variable.
+        path: rows of path constraints, by path point and column.
+        chosen: lower and upper limits on rates with a row, shape (2, 3, r, M).
+        bounded: lower and upper bounds with a row, shape (2, n).
     """
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
         self.whitening, (n, size) = whitening, whitening.shape
         self.count = self._transformed = 0
         self.gradients, self._fresh = list[Array](), list[Array]()
-        # of these, the first `count` rows are in use
-        self._A = np.empty((ROOM, size))
-        self._least, self._most = np.empty(ROOM), np.empty(ROOM)
-        self._hard, self._active = np.empty(ROOM, dtype=bool), np.empty(ROOM, dtype=bool)
+        # the first `count` rows are in use
+        rows = QP_ROWS.initial_rows
+        self._A = np.empty((rows, size))
+        self._least, self._most = np.empty(rows), np.empty(rows)
+        self._hard, self._active = np.empty(rows, dtype=bool), np.empty(rows, dtype=bool)
         self.chosen, self.bounded = np.zeros((2, *grid), dtype=bool), np.zeros((2, n), dtype=bool)
-        self.rates, self.bounds, self.path = Listed(3), Listed(2), Listed(2)
+        self.rates, self.bounds, self.path = PlacedRows(3), PlacedRows(2), PlacedRows(2)
         self._identity = np.eye(size)
 
     def add(
@@ -79,28 +105,36 @@ class QPRows:
         hard: bool = False,
         active: Mask | bool = False,
     ) -> Index:
-        """Add rows with gradients (rows, n) by the scaled variables, and return their numbers.
+        """Add rows.
 
-        `active` (rows,) is a guess of those that hold with equality.
+        Args:
+            gradients: gradients by the scaled variables, shape (rows, n).
+            most: upper bounds, shape (rows,).
+            least: lower bounds, shape (rows,).
+            hard: whether the rows are never relaxed.
+            active: guess of the rows that hold with equality, shape (rows,).
+
+        Returns:
+            The numbers of the rows, shape (rows,).
         """
         self.gradients.append(gradients)
         self._fresh.append(gradients)
         first, self.count = self.count, self.count + len(most)
         while self.count > len(self._A):
-            self._make_room()
+            self._double_memory()
         rows = slice(first, self.count)
         self._least[rows], self._most[rows] = least, most
         self._hard[rows], self._active[rows] = hard, active
         return np.arange(first, self.count)
 
-    def _make_room(self) -> None:
-        """Room for twice as many rows."""
+    def _double_memory(self) -> None:
+        """Allocate memory for twice as many rows."""
         for name in ("_A", "_least", "_most", "_hard", "_active"):
             old = getattr(self, name)
             setattr(self, name, np.concatenate([old, np.empty_like(old)]))
 
     def _transform(self) -> None:
-        """Transform the rows added since the last solve: one product for all of them."""
+        """Whiten the rows added since the last solve, in one product."""
         if self.count > self._transformed:
             rows = slice(self._transformed, self.count)
             np.matmul(np.concatenate(self._fresh), self.whitening, out=self._A[rows])
@@ -114,18 +148,18 @@ class QPRows:
         upper: Mask,
         active: Mask | bool = False,
     ) -> None:
-        """Add the rows of places that have none yet for their `upper` or lower limit; see `add`."""
+        """Add `upper` or lower limits on rates at places without such a row; see `add`."""
         self.rates.add(self.add(gradients, most, active=active), places)
         self.chosen[upper.astype(int), *places] = True
 
     def add_path(
         self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask
     ) -> None:
-        """Add the rows of path constraints that have none yet; see `add`."""
+        """Add path constraints without a row yet; see `add`."""
         self.path.add(self.add(gradients, slack, active=active), passed)
 
     def add_bounds(self, bounds: Array, wanted: Mask) -> None:
-        """Add the `wanted` (2, n) lower and upper bounds of variables, if they have no row yet."""
+        """Add the `wanted` (2, n) lower and upper bounds of variables without a row yet."""
         sides = np.nonzero(wanted & ~self.bounded)
         side, variable = sides
         gradients = np.zeros((len(side), len(self.whitening)))
@@ -135,7 +169,15 @@ class QPRows:
         self.bounded[sides] = True
 
     def solve(self, gradient: Array, relax: bool) -> tuple[Array, Array, bool]:
-        """DAQP's y, the multipliers of the rows, and whether it found them."""
+        """Minimise ½ yᵀ y + gradientᵀ y within the rows.
+
+        Args:
+            gradient: gradient in the whitened variables, shape (k,).
+            relax: whether rows that are not hard may be violated, at a penalty.
+
+        Returns:
+            y (k,), the multipliers of the rows (count,), and whether DAQP found a solution.
+        """
         self._transform()
         used = slice(self.count)
         least, most, active = self._least[used], self._most[used], self._active[used]
@@ -153,14 +195,15 @@ class QPRows:
             most,
             least,
             sense,
-            primal_tol=1e-9,
+            primal_tol=QP_ROWS.primal_tolerance,
             eps_prox=0.0,
-            rho_soft=1e-6,
-            iter_limit=MOST_QP_ITERATIONS,
-            time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,  # 0: no limit
+            rho_soft=QP_ROWS.softness,
+            iter_limit=QP_ROWS.max_iterations,
+            # 0 for no limit
+            time_limit=max(left, QP_ROWS.least_time) if np.isfinite(left) else 0.0,
         )
         found = bool(flag >= _DAQP_OPTIMAL)
         if found:
-            # what the next solve starts from
+            # active set from which the next solve starts
             active[:] = info["lam"] > 0
         return y, info["lam"], found

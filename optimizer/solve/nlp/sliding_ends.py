@@ -1,10 +1,9 @@
-"""Ends that may slide along the curves of configurations that hold their poses: kept by every
-iterate of an NLP.
+"""Ends that slide along self-motions of their poses: equations met by every iterate of an NLP.
 
-To first order, the steps that keep the poses move an end along the tangent of its curve. They form
-the null space in which the QP is solved. After each step the ends are put back on their curves
-exactly. What this moves them by, all of the motion follows along the rest-to-rest quintic: an end
-that moved alone would need a jerk beyond the limits.
+To first order, a step keeps a pose if it moves the end along the tangent of its curve. These steps
+form the null space in which the QP is solved. After a step the ends are put back on their curves
+exactly. The whole motion follows the displacement along the rest-to-rest quintic: moving an end
+alone would need a jerk beyond the limits.
 """
 
 from __future__ import annotations
@@ -22,20 +21,24 @@ from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 
 @dataclass(frozen=True)
 class Slide:
-    """Ends on their curves: the row of each among the free control points, its curve's tangent and
-    bend (r,), and the share (m,) of its displacement that every control point follows."""
+    """Ends on their curves, one entry per sliding end."""
 
     rows: tuple[int, ...]
+    """Rows of the ends among the free control points."""
+
     shares: tuple[Array, ...]
+    """Shares (m,) of an end's displacement by which the control points move."""
+
     tangents: tuple[Array, ...]
+    """Unit tangents (r,) of the curves."""
+
     bends: tuple[Callable[[], Array], ...]
+    """Second derivatives (r,) of the curves by their arc length."""
 
     def null_space(self, n: int) -> csr_array:
-        """Orthonormal steps (n, count) of the n decision variables that keep the poses to first
-        order.
+        """Orthonormal basis (n, count) of the steps that keep the poses to first order.
 
-        Each variable has a share in one of the steps: its own, or that along the tangent of its
-        curve.
+        A control point at an end moves along the tangent; any other variable has its own step.
         """
         share, fresh = np.ones(n), np.ones(n, dtype=np.intp)
         for row, tangent in zip(self.rows, self.tangents, strict=True):
@@ -46,8 +49,15 @@ class Slide:
         return csr_array((share, step, np.arange(n + 1)), shape=(n, int(step[-1]) + 1))
 
     def curvature(self, pull: Array, n: int) -> Array:
-        """Second derivatives (n, n) of the poses, weighed by their multipliers: the forces that
-        balance the gradient `pull` (m, r) of the cost and the limits."""
+        """Hessian of the poses, weighted by their multipliers.
+
+        Args:
+            pull: gradient of cost and limits, which the multipliers balance, shape (m, r).
+            n: number of decision variables.
+
+        Returns:
+            The Hessian, shape (n, n).
+        """
         result = np.zeros((n, n))
         for row, share, tangent, bend in zip(
             self.rows, self.shares, self.tangents, self.bends, strict=True
@@ -58,9 +68,7 @@ class Slide:
 
 
 class SlidingEnds:
-    """The ends of an NLP that slide: `start_curve` and `goal_curve` of the program, of which one
-    may be None.
-    """
+    """Sliding ends of an NLP, on its `start_curve` and `goal_curve`; one curve may be None."""
 
     def __init__(self, program: NonlinearProgram) -> None:
         last = program.free_count - 1
@@ -69,10 +77,14 @@ class SlidingEnds:
         self._curves = [(row, share, curve) for row, share, curve in both if curve is not None]
 
     def put(self, free: Array, near: Slide | None = None) -> tuple[Array, Slide] | None:
-        """The free control points (m, r) with the ends put on their curves; None if an end has no
-        place near.
+        """Put the ends on their curves.
 
-        The tangents keep the sense that they have at the ends `near`.
+        Args:
+            free: free control points, shape (m, r).
+            near: ends of an iterate nearby, whose sense of the tangents is kept; None for any.
+
+        Returns:
+            The free control points and their ends; None if a curve has no point nearby.
         """
         tangents, bends = list[Array](), list[Callable[[], Array]]()
         for k, (row, share, curve) in enumerate(self._curves):

@@ -1,6 +1,4 @@
-"""Motions of one duration in a B-spline space: matrices and limits that do not change from step to
-step.
-"""
+"""Motions of one duration in a B-spline space, with matrices shared by all steps."""
 
 from __future__ import annotations
 
@@ -18,8 +16,7 @@ from joulepath.optimizer.solve.nlp.control_point_pairs import ControlPointPairs
 
 @dataclass(frozen=True, eq=False)
 class TimedMotions(ABC):
-    """Motions of duration T [s], at rest at both ends, with m free control points of r = nq joints
-    each.
+    """Motions of duration T [s] with m free control points of r = nq joints, at rest at both ends.
 
     Arrays may have leading dimensions (...), for several motions at once.
     """
@@ -32,13 +29,10 @@ class TimedMotions(ABC):
     @property
     @abstractmethod
     def _rate_places(self) -> list[Array]:
-        """Where in [0, 1] speed, acceleration and jerk are limited: an array for each of the
-        three."""
+        """Points in [0, 1] of the limits on speed, acceleration and jerk, one array for each."""
 
     def points(self, ends: Array, free: Array) -> Array:
-        """All control points (..., n, r) of motions between `ends` (..., 2, r), for the free ones
-        (..., m, r).
-        """
+        """All control points (..., n, r), from ends (..., 2, r) and free ones (..., m, r)."""
         rest = self.basis.resting
         start, goal = (
             np.repeat(end, rest, axis=-2) for end in (ends[..., :1, :], ends[..., 1:, :])
@@ -64,7 +58,7 @@ class TimedMotions(ABC):
 
     @cached_property
     def _at_nodes(self) -> Array:
-        """From control points to q, v, a at the nodes, (3 N, n)."""
+        """Map (3 N, n) from control points to q, v, a at the nodes."""
         by_time = self.basis.at_nodes * (self.T ** -np.arange(3.0))[:, None, None]
         return np.ascontiguousarray(by_time.transpose(1, 0, 2)).reshape(-1, self.basis.n)
 
@@ -74,7 +68,7 @@ class TimedMotions(ABC):
 
     @cached_property
     def _at_rates(self) -> Array:
-        """From control points to the limited first to third derivatives by τ, (k, n)."""
+        """Map (k, n) from control points to the limited derivatives by τ of orders 1 to 3."""
         places = enumerate(self._rate_places, 1)
         return np.concatenate([basis_matrix(self.basis.knots, at, d) for d, at in places])
 

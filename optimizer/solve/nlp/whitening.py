@@ -1,4 +1,4 @@
-"""Variables in which a QP's Hessian, made positive definite, is the identity."""
+"""Whitening: transformation of a QP's variables that makes the Hessian the identity."""
 
 from __future__ import annotations
 
@@ -8,27 +8,32 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dtrtri
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.solve.nlp.convex_quadratic import EIGENVALUE_FLOOR, what_lacks
-
-# variables of a QP beyond which all eigenvalues are found faster than those that change
-MOST_IN_PART = 150
+from joulepath.optimizer.solve.nlp.convex_quadratic import CONVEXITY, definite_correction
 
 
-def whitened(H: Array) -> tuple[Callable[[Array], Array], Array]:
-    """The product with H as a function of a vector (n,), and W (n, n) with Wᵀ H W = 1, for a
-    symmetric H (n, n).
+def whitened(H: Array, full_above: int = 150) -> tuple[Callable[[Array], Array], Array]:
+    """Product with a symmetric matrix H, and a matrix W with Wᵀ H W = 1.
 
-    If H is not positive definite, both are those of H with the absolute values of its eigenvalues,
-    clamped from below.
+    If H is not positive definite, its eigenvalues are replaced by their absolute values, clamped
+    from below.
+
+    Args:
+        H: the matrix, shape (n, n).
+        full_above: number of variables n above which all eigenvalues are found: faster there than
+            the negative and small eigenvalues alone.
+
+    Returns:
+        The product with a vector (n,) as a function, and W (n, n).
     """
-    # H.T: LAPACK takes columns first
+    # LAPACK takes columns first
     L, failed = dpotrf(H.T, lower=1)
-    if failed and len(H) > MOST_IN_PART:
+    if failed and len(H) > full_above:
         values, vectors = np.linalg.eigh(H)
-        kept = np.maximum(np.abs(values), EIGENVALUE_FLOOR * max(1.0, float(np.abs(values).max())))
+        floor = CONVEXITY.eigenvalue_floor * max(1.0, float(np.abs(values).max()))
+        kept = np.maximum(np.abs(values), floor)
         return lambda x: vectors @ (kept * (vectors.T @ x)), vectors / np.sqrt(kept)
     if failed:
-        # with a bound on all eigenvalues
-        H = H + what_lacks(H, float(np.abs(H).sum(axis=0).max()))
+        # the row sums bound all eigenvalues
+        H = H + definite_correction(H, float(np.abs(H).sum(axis=0).max()))
         L, _ = dpotrf(H.T, lower=1)
     return H.dot, np.ascontiguousarray(dtrtri(L, lower=1)[0].T)

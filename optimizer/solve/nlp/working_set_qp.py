@@ -1,112 +1,78 @@
 """The QP of one SQP step, over the constraints near their limits.
 
 Speed, acceleration and jerk are limited at every point of a fine grid. Only their peaks, and the
-anchors of the basis, enter the QP when they come near a limit. If its step breaks a limit at
-another point, or a bound of a variable, this is added and the QP is solved again. Clearances are
-hundreds, and two or three of them hold a motion: they enter likewise.
+anchors of the basis, enter the QP when they come near a limit. If the step of the QP violates a
+limit at another point, or the bound of a variable, this is added and the QP is solved again. There
+are hundreds of clearances, of which two or three are active: they enter likewise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.solve.nlp.active_path_constraints import (
-    Index,
-    NearPathConstraints,
-    PathConstraintValues,
-)
-from joulepath.optimizer.solve.nlp.nonlinear_program import (
-    FEASIBILITY,
-    Linearisation,
-    NonlinearProgram,
+from joulepath.optimizer.solve.nlp.active_path_constraints import Index, NearPathConstraints
+from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from joulepath.optimizer.solve.nlp.qp_data import (
+    QPInputs,
+    QPStep,
+    TorqueRows,
+    peaks,
+    places_of,
+    shortened,
 )
 from joulepath.optimizer.solve.nlp.qp_rows import Places, QPRows
 
-# a rate enters the first QP above this ratio of its limit, and a later one above the second: there,
-# limits that were active in the QP before enter, too. With a fifth fewer rows, steps are as few and
-# as good
-NEAR, NEAR_LATER = 0.6, 0.85
-# torques and path constraints enter any QP above these
-NEAR_TORQUE = 0.5
-NEAR_PATH = 0.5
-# clearances enter above this ratio, or if they were active in the QP before; above NEAR_PATH once a
-# step breaks them
-NEAR_CLEARANCE = 0.9
-# no coordinate of a control point moves further in one step [rad]
-STEP = 1.5
-# solves of a QP, each with the constraints that the step before would break: of the first QPs, and
-# of all that follow. What the last solve breaks enters the QP of the next iterate: more rounds take
-# more time than they save, unless the line search fails
-QP_ROUNDS, MOST_ROUNDS = (3, 3, 3, 2), 10
-# the same for a relaxed QP with clearance constraints: it has many rows, and none of them was
-# active before
-RELAXED_ROUNDS = 2
-# excess over the bound of a variable [rad, or share of the duration] at which it enters the QP
-BOUND_TOLERANCE = 1e-9
-
 
 @dataclass(frozen=True)
-class QPInputs:
-    """What the QP is made of at one iterate.
+class WorkingSetSettings:
+    """Which constraints the QP of a step has, and how often it is solved."""
 
-    `hessian` H times a step (n,) and `gradient` (n,) are in the scaled variables. `whitening` W (n,
-    k): Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their limits
-    `rates` (3, r) on the grid.
-    """
+    near_rate: float = 0.6
+    """Ratio to its limit above which a rate enters the first QP."""
 
-    hessian: Callable[[Array], Array]
-    whitening: Array
-    gradient: Array
-    free: Array
-    T: float
-    line: Linearisation
-    path_values: PathConstraintValues
-    rates: Array
-    ratio: Array
+    near_rate_later: float = 0.85
+    """The same for later QPs, in which the limits active before enter too. With a fifth fewer rows,
+    steps are as few and as good."""
 
+    near_torque: float = 0.5
+    """Ratio to its limit above which a torque enters a QP."""
 
-@dataclass(frozen=True)
-class QPStep:
-    """Solution of a QP: step x (n,) in the scaled variables, and the multipliers ≥ 0 of its
-    constraints.
+    near_path: float = 0.5
+    """Ratio to its bound above which a path constraint enters a QP; a clearance enters once a step
+    violates it."""
 
-    `relaxed`: the QP was infeasible, and x breaks its constraints as little as possible.
-    `kinematic` are the multipliers at `places`, `torque` those at `nodes` (node, joint) of torques
-    with `signs`, `path` those at `passed` (path point, column). `pull` (n,): sum of the
-    constraints' gradients times multipliers; zero if nothing is held.
-    """
+    near_clearance: float = 0.9
+    """Ratio to its bound above which a clearance enters at once, as do clearances active before."""
 
-    x: Array
-    relaxed: bool
-    places: Places
-    kinematic: Array
-    nodes: tuple[Index, Index]
-    signs: Array
-    torque: Array
-    passed: tuple[Index, Index]
-    path: Array
-    pull: Array
+    largest_step: float = 1.5
+    """Largest change of a coordinate of a control point in one step [rad]."""
+
+    rounds: tuple[int, ...] = (3, 3, 3, 2)
+    """Solves of the first QPs, each with the constraints that the step before violates; the last
+    number is that of all further QPs. Constraints violated in the last solve enter the QP of the
+    next iterate: more rounds take more time than they save, unless the line search fails."""
+
+    max_rounds: int = 10
+    """The same after a failed line search, and among obstacles."""
+
+    relaxed_rounds: int = 2
+    """The same for a relaxed QP with clearance constraints: it has many rows, none of which was
+    active before."""
+
+    bound_tolerance: float = 1e-9
+    """Excess over the bound of a variable at which the bound enters the QP [rad, or share of the
+    duration]."""
 
 
-@dataclass(frozen=True)
-class _TorqueRows:
-    """Torques near their limits: node and joint, sign, gradients (rows, n) and slack, as ratios of
-    the limit.
-    """
-
-    nodes: tuple[Index, Index]
-    signs: Array
-    gradients: Array
-    slack: Array
+WORKING_SET = WorkingSetSettings()
 
 
 class WorkingSetQP:
-    """The QPs of one run of the SQP; it keeps the constraints that were active, for the next one.
+    """The QPs of one run of the SQP; the active constraints of one QP enter the next.
 
     Variables x: free control points row by row, then T / time_scale if the duration is free.
     """
@@ -129,10 +95,16 @@ class WorkingSetQP:
         return np.asarray(self.p.limits.rates * (T**self._orders)[:, None])
 
     def solve(self, at: QPInputs, rounds: int, enough: float = -np.inf) -> QPStep | None:
-        """The step; None if even the relaxed QP has no solution.
+        """Solve the QP, adding constraints that its step violates.
 
-        It ends early with a solution that promises a relative decrease of the cost below `enough`:
-        with further constraints, the next one would promise less still.
+        Args:
+            at: the QP at an iterate.
+            rounds: largest number of solves.
+            enough: relative decrease of the cost below which the step is returned at once: with
+                further constraints, it would promise even less.
+
+        Returns:
+            The step; None if even the relaxed QP has no solution.
         """
         torque = self._torque_rows(at)
         rows, bounds = QPRows(at.whitening, at.ratio.shape), np.array(self._bounds(at.free, at.T))
@@ -151,9 +123,9 @@ class WorkingSetQP:
             if not found and relaxed:
                 return None
             if not found:
-                # a relaxed QP without bounds may have a step of any length
+                # without bounds, the step of a relaxed QP may have any length
                 relaxed = True
-                last = attempt + (RELAXED_ROUNDS if self.p.has_clearance else rounds)
+                last = attempt + (WORKING_SET.relaxed_rounds if self.p.has_clearance else rounds)
                 rows.add_bounds(bounds, np.ones_like(rows.bounded))
                 path = self._add_path(rows, at, path, np.ones(len(path.slack), dtype=bool))
                 continue
@@ -163,18 +135,32 @@ class WorkingSetQP:
                 break
             if self._adds_bounds(rows, bounds, x):
                 continue
-            adds_rates, (adds_path, path) = (
-                self._adds_rates(rows, at, x),
-                self._adds_path(rows, at, path, x),
-            )
+            adds_rates = self._adds_rates(rows, at, x)
+            (adds_path, path) = self._adds_path(rows, at, path, x)
             if not (adds_rates or adds_path):
                 break
+        x = shortened(x, bounds, WORKING_SET.bound_tolerance)
+        return self._solution(rows, torque, limited, x, multipliers, relaxed)
+
+    def _solution(
+        self,
+        rows: QPRows,
+        torque: TorqueRows,
+        limited: Index,
+        x: Array,
+        multipliers: Array,
+        relaxed: bool,
+    ) -> QPStep:
+        """The step with its multipliers; active constraints are kept for the next QP."""
         mu = np.maximum(multipliers, 0.0)
-        pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
+        pull = (
+            multipliers @ np.concatenate(rows.gradients)
+            if self.p.has_equations
+            else np.zeros(self.n)
+        )
         (kinematic, places), (bounded, sides), (near, passed) = (
             each.joined() for each in (rows.rates, rows.bounds, rows.path)
         )
-        # what was active is kept for the next QP
         for marks, at_places, numbers in (
             (self._active, places, kinematic),
             (self._bounded, sides, bounded),
@@ -183,7 +169,7 @@ class WorkingSetQP:
             marks[...] = False
             marks[at_places] = mu[numbers] > 0
         return QPStep(
-            _shortened(x, bounds),
+            x,
             relaxed,
             places,
             mu[kinematic],
@@ -196,23 +182,20 @@ class WorkingSetQP:
         )
 
     def _first_path_rows(self, rows: QPRows, at: QPInputs) -> NearPathConstraints:
-        """Adds the path constraints that the QP is first solved with, and returns the others that
-        are near.
-        """
-        near = self.p.path_rows.near(at.path_values, NEAR_PATH)
+        """Add the path constraints of the first solve; returns the others near their bounds."""
+        near = self.p.path_rows.near(at.path_values, WORKING_SET.near_path)
         if not len(near.slack):
             return near
         at_once = np.ones(len(near.slack), dtype=bool)
         if self.p.has_clearance:
-            at_once = (near.ratio > NEAR_CLEARANCE * (near.ratio + near.slack)) | self._passed[
-                near.points, near.columns
-            ]
+            at_once = near.ratio > WORKING_SET.near_clearance * (near.ratio + near.slack)
+            at_once |= self._passed[near.points, near.columns]
         return self._add_path(rows, at, near, at_once)
 
     def _add_path(
         self, rows: QPRows, at: QPInputs, near: NearPathConstraints, wanted: Mask
     ) -> NearPathConstraints:
-        """Adds those of the path constraints that are `wanted`, and returns the others."""
+        """Add the `wanted` path constraints, and return the others."""
         added = near[np.flatnonzero(wanted)]
         passed = added.points, added.columns
         gradients = self._scaled(self.p.path_rows.gradients(at.path_values, at.T, added))
@@ -222,8 +205,10 @@ class WorkingSetQP:
     def _adds_path(
         self, rows: QPRows, at: QPInputs, near: NearPathConstraints, x: Array
     ) -> tuple[bool, NearPathConstraints]:
-        """Whether the step x breaks any of the path constraints without a row, which it then gets;
-        and the others.
+        """Add the path constraints without a row that the step x violates.
+
+        Returns:
+            Whether there are any, and the path constraints still without a row.
         """
         if not len(near.slack):
             return False, near
@@ -236,50 +221,50 @@ class WorkingSetQP:
         return bool(broken.any()), self._add_path(rows, at, near, broken)
 
     def _add_kinematic(self, rows: QPRows, at: QPInputs) -> None:
-        """Adds the limits on rates that the QP is first solved with."""
+        """Add the limits on rates of the first solve."""
         chosen = self._active.copy()
-        near = NEAR_LATER if chosen.any() else NEAR
+        near = WORKING_SET.near_rate_later if chosen.any() else WORKING_SET.near_rate
         chosen[self._worst(at.ratio, np.full(3, near))] = True
-        d, j, grid = _places(chosen)
+        d, j, grid = places_of(chosen)
         places = d, j, grid
         self._add_rates(rows, at, places, at.ratio[places] >= 0, self._active[places])
 
     def _worst(self, ratio: Array, above: Array) -> Places:
-        """The anchors and local peaks at which the size of ratios (3, r, M) exceeds the bound of
-        its derivative (3,).
+        """Anchors and local peaks of ratios above a bound; few coordinates exceed it anywhere.
 
-        Most coordinates stay below it everywhere: only the others are searched.
+        Args:
+            ratio: ratios on the grid, shape (3, r, M).
+            above: bound of each derivative, shape (3,).
         """
         largest = np.maximum(ratio.max(axis=2), -ratio.min(axis=2))
         d, j = np.nonzero(largest > above[:, None])
         size = np.abs(ratio[d, j])
-        k, grid = _places((size > above[d, None]) & (self._anchors[d] | _peaks(size)))
+        k, grid = places_of((size > above[d, None]) & (self._anchors[d] | peaks(size)))
         return d[k], j[k], grid
 
     def _adds_bounds(self, rows: QPRows, bounds: Array, x: Array) -> bool:
-        """Whether the step x breaks a bound without a row: then all get theirs.
+        """Add all bounds if the step x violates one without a row; whether it does.
 
-        A step without bounds may be so long that it breaks every limit.
+        A step without bounds may be so long that it violates every limit.
         """
-        if (
-            rows.bounded.all()
-            or not ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any()
-        ):
+        tolerance = WORKING_SET.bound_tolerance
+        violated = (bounds[0] - x > tolerance) | (x - bounds[1] > tolerance)
+        if rows.bounded.all() or not violated.any():
             return False
         rows.add_bounds(bounds, np.ones_like(rows.bounded))
         return True
 
     def _adds_rates(self, rows: QPRows, at: QPInputs, x: Array) -> bool:
-        """Whether the step x breaks limits on rates without a row: then their peaks get theirs."""
+        """Add the peaks of limits on rates without a row that the step x violates; whether any."""
         change = x[: self.count].reshape(at.free.shape).T / at.rates[:, :, None]
         predicted = change @ self._grid_free.swapaxes(1, 2)
         predicted += at.ratio
-        # the limits of the rates by τ after the step, as ratios of those before it
+        # ratios of the limits by τ after the step to the limits before the step
         limits = np.ones(3)
         if self.free_time:
             limits = np.maximum(1 + self._orders * x[-1] * self.time_scale / at.T, 1e-3)
         places = self._worst(predicted, limits * (1 + FEASIBILITY / 4))
-        # the side is that of the value after the step, not before it
+        # the value after the step has this side, not the value before
         upper = predicted[places] >= 0
         unknown = ~rows.chosen[upper.astype(int), *places]
         fresh: Places = (places[0][unknown], places[1][unknown], places[2][unknown])
@@ -291,7 +276,7 @@ class WorkingSetQP:
     def _add_rates(
         self, rows: QPRows, at: QPInputs, places: Places, upper: Mask, active: Mask | bool = False
     ) -> None:
-        """Adds the `upper` or lower limits on rates at the places; `active` as in `QPRows.add`."""
+        """Add the `upper` or lower limits on rates at places; `active` as of `QPRows.add`."""
         signs = np.where(upper, 1.0, -1.0)
         rows.add_kinematic(
             self._kinematic_rows(at, places, signs),
@@ -313,16 +298,16 @@ class WorkingSetQP:
             A[:, -1] = -(d + 1) / at.T * self.time_scale
         return A
 
-    def _torque_rows(self, at: QPInputs) -> _TorqueRows:
-        """The limited torques above NEAR_TORQUE of their limits."""
+    def _torque_rows(self, at: QPInputs) -> TorqueRows:
+        """The limited torques near their limits."""
         tau_max = self.p.limits.tau_max
         ratio = at.line.tau / tau_max
-        k, j = np.nonzero(np.abs(ratio) > NEAR_TORQUE)
+        k, j = np.nonzero(np.abs(ratio) > WORKING_SET.near_torque)
         signs = np.sign(ratio[k, j])
         if not len(k):
-            return _TorqueRows((k, j), signs, np.zeros((0, self.n)), signs)
+            return TorqueRows((k, j), signs, np.zeros((0, self.n)), signs)
         gradients = self.p.torque_rows(at.line, at.T, k, j) * (signs / tau_max[j])[:, None]
-        return _TorqueRows((k, j), signs, self._scaled(gradients), 1 - np.abs(ratio[k, j]))
+        return TorqueRows((k, j), signs, self._scaled(gradients), 1 - np.abs(ratio[k, j]))
 
     def _scaled(self, gradients: Array) -> Array:
         """Gradients (rows, n) by the scaled variables, for gradients (rows, count + 1) by (s,
@@ -332,12 +317,13 @@ class WorkingSetQP:
         return scaled[:, : self.n]
 
     def _bounds(self, free: Array, T: float) -> tuple[Array, Array]:
-        """Least and greatest change of each variable. Within position limits, control points keep
-        the curve inside.
+        """Smallest and largest change (n,) of every variable.
+
+        Control points within the position limits keep the whole curve inside.
         """
-        p = self.p
-        lower = np.maximum(p.limits.q_min - free, -STEP).ravel()
-        upper = np.minimum(p.limits.q_max - free, STEP).ravel()
+        p, largest = self.p, WORKING_SET.largest_step
+        lower = np.maximum(p.limits.q_min - free, -largest).ravel()
+        upper = np.minimum(p.limits.q_max - free, largest).ravel()
         if p.goal_constraints is not None:
             moved = free[-1] - p.coordinates.goal
             lower[-p.r :] = np.maximum(lower[-p.r :], -p.goal_constraints.radius - moved)
@@ -348,9 +334,7 @@ class WorkingSetQP:
         return lower, upper
 
     def _add_goal(self, rows: QPRows, free: Array) -> None:
-        """Adds the goal constraints as bounds on the change of the goal; no rows if the goal is
-        fixed.
-        """
+        """Add the goal constraints as bounds on the change of the goal, unless it is fixed."""
         constraints = self.p.goal_constraints
         if constraints is None:
             return
@@ -358,28 +342,3 @@ class WorkingSetQP:
         A[:, self.count - self.p.r : self.count] = constraints.rows
         moved = constraints.rows @ (free[-1] - self.p.coordinates.goal)
         rows.add(A, constraints.upper - moved, constraints.lower - moved, hard=True)
-
-
-def _shortened(x: Array, bounds: Array) -> Array:
-    """The step, as far as the bounds (2, n) let it go: rounds may end before every bound has its
-    row.
-    """
-    most = np.where(x > 0, bounds[1], bounds[0])
-    beyond = np.abs(x) > np.abs(most) + BOUND_TOLERANCE
-    return np.asarray(x * np.min(np.abs(most[beyond] / x[beyond]), initial=1.0))
-
-
-def _peaks(size: Array) -> Mask:
-    """Marks the local maxima of size (k, M) ≥ 0 along the grid."""
-    high = np.ones(size.shape, dtype=bool)
-    rising = size[:, 1:] >= size[:, :-1]
-    high[:, 1:] = rising
-    high[:, :-1] &= ~rising
-    return high
-
-
-def _places(marks: Mask) -> tuple[Index, ...]:
-    """The places of marks; a search in one dimension is several times as fast as `np.nonzero` in
-    two or three.
-    """
-    return np.unravel_index(np.flatnonzero(marks), marks.shape)

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import dask
@@ -21,7 +22,7 @@ from distributed import Scheduler, Worker
 
 from joulepath.app.cluster import link
 from joulepath.app.cluster import machine as app_machine
-from joulepath.app.cluster.link import LOOK, PER_PROCESS, Cluster
+from joulepath.app.cluster.link import LINK, Cluster
 from joulepath.app.cluster.machine import RESOURCES
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
@@ -70,7 +71,7 @@ def with_cluster(
             cluster = Cluster(scheduler.address)
             cluster.start()
             try:
-                await until(lambda: cluster.slots == PER_PROCESS)
+                await until(lambda: cluster.slots == LINK.per_process)
                 await test(cluster, scheduler)
             finally:
                 await cluster.stop()
@@ -138,7 +139,7 @@ def test_what_a_service_leaves_behind_is_stopped(
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
         other = Cluster(scheduler.address)
         other.start()
-        await until(lambda: other.slots == PER_PROCESS)
+        await until(lambda: other.slots == LINK.per_process)
         process = await start(cluster, ProcessId())
         orphan = start(other, hold(tmp_path / "orphan"))
         await until((tmp_path / "orphan" / "started").exists)
@@ -160,7 +161,7 @@ def test_work_of_a_machine_that_stops_is_done_elsewhere(
         running = start(cluster, hold(tmp_path / "runs"))
         await until((tmp_path / "runs" / "started").exists)
         async with machine(scheduler, workers=2):
-            await until(lambda: cluster.slots == 3 * PER_PROCESS)
+            await until(lambda: cluster.slots == 3 * LINK.per_process)
             (tmp_path / "runs" / "started").unlink()
             first = next(address for address, count in cluster.workers.items() if count == 1)
             scheduler.close_worker(first)
@@ -168,7 +169,7 @@ def test_work_of_a_machine_that_stops_is_done_elsewhere(
             (tmp_path / "runs" / "released").touch()
             assert await running != process
             assert not alive(process)
-            await until(lambda: cluster.slots == 2 * PER_PROCESS)
+            await until(lambda: cluster.slots == 2 * LINK.per_process)
 
     with_cluster(test, monkeypatch)
 
@@ -189,7 +190,7 @@ def test_a_scheduler_that_goes_and_comes_back(
         with pytest.raises(ClusterUnavailable):
             assert cluster.workers
         async with Scheduler(host="127.0.0.1", port=port, dashboard=False) as again, machine(again):
-            await until(lambda: cluster.slots == PER_PROCESS)
+            await until(lambda: cluster.slots == LINK.per_process)
             await start(cluster, ProcessId())
 
     with_cluster(test, monkeypatch)
@@ -299,7 +300,7 @@ async def refused_by(cluster: Cluster, caplog: pytest.LogCaptureFixture, reason:
         return [vars(record)["reason"] for record in records if "cannot be used" in record.message]
 
     await until(lambda: bool(told()))
-    await asyncio.sleep(3 * LOOK)
+    await asyncio.sleep(3 * LINK.look)
     (found,) = told()
     assert reason in found
     assert cluster.slots == 0
@@ -356,11 +357,11 @@ def test_a_machine_of_another_version_gets_nothing(
             await until(
                 lambda: any("another version" in record.message for record in caplog.records)
             )
-            assert cluster.slots == PER_PROCESS
+            assert cluster.slots == LINK.per_process
             pids = await asyncio.gather(*(start(cluster, ProcessId()) for _ in range(6)))
             assert len(set(pids)) == 1
             assert other.address not in cluster.workers
-        await asyncio.sleep(3 * LOOK)
+        await asyncio.sleep(3 * LINK.look)
         (record,) = (record for record in caplog.records if "another version" in record.message)
         assert vars(record)["machines"] == [other.address]
 
@@ -372,7 +373,7 @@ def test_a_scheduler_that_hangs_and_goes_on(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Its connections stay open, and say nothing."""
-    monkeypatch.setattr(link, "_PATIENCE", 1.0)
+    monkeypatch.setattr(link, "LINK", replace(link.LINK, patience=1.0))
     monkeypatch.setenv("JOULEPATH_ROBOTS", "")
 
     async def run(process: subprocess.Popen[bytes], address: str) -> None:
@@ -386,7 +387,7 @@ def test_a_scheduler_that_hangs_and_goes_on(
                 preload=["joulepath.app.cluster"],
                 dashboard=False,
             ):
-                await until(lambda: cluster.slots == PER_PROCESS)
+                await until(lambda: cluster.slots == LINK.per_process)
                 running = start(cluster, hold(tmp_path / "runs"))
                 await until((tmp_path / "runs" / "started").exists)
                 process.send_signal(signal.SIGSTOP)
@@ -396,7 +397,7 @@ def test_a_scheduler_that_hangs_and_goes_on(
                 with pytest.raises(ClusterUnavailable):
                     await result_of(cluster.run, ProcessId(), LONG)
                 process.send_signal(signal.SIGCONT)
-                await until(lambda: cluster.slots == PER_PROCESS)
+                await until(lambda: cluster.slots == LINK.per_process)
                 await start(cluster, ProcessId())
         finally:
             await cluster.stop()

@@ -198,7 +198,7 @@ def test_a_service_is_not_ready_while_requests_wait_and_none_runs(tmp_path: Path
         await running
         assert not waiting.done() and not bench.engine.ready
         for _ in range(2):
-            bench.move_clock(pool._CHECK_PERIOD)
+            bench.move_clock(pool.POOL.check_period)
             await asyncio.sleep(0.01)
         assert int((await waiting).document) == bench.engine.worker_pids[0], "the queue is mended"
         assert bench.engine.ready

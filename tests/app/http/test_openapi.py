@@ -74,11 +74,12 @@ def test_every_plain_field_has_an_example(document: dict[str, Any]) -> None:
 
 
 def test_every_number_has_its_unit(document: dict[str, Any]) -> None:
-    # a parameter of a robot has a field with its unit
+    # a parameter of a robot and a figure of a tool have a field with their unit
+    own = ("Parameter.value", "ToolFigure.value")
     missing = [
         name
         for name, schema in properties(document)
-        if is_number(schema) and "x-unit" not in schema and name != "Parameter.value"
+        if is_number(schema) and "x-unit" not in schema and name not in own
     ]
     assert missing == []
 

@@ -25,7 +25,7 @@ from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import JobRequest, now
 from joulepath.app.tasks.job_request import JobRequestTask, JobResult
-from joulepath.optimizer.progress import Tell, nobody
+from joulepath.optimizer.progress import Tell, no_listener
 
 PATIENCE = 60.0
 BODY = packed(b"{}")
@@ -46,7 +46,7 @@ class Work:
         self.stopped: list[int] = []
         self.stoppable: list[bool] = []
         self.errors: list[Exception] = []
-        self.tell: Tell = nobody
+        self.tell: Tell = no_listener
         self.answer: Callable[[JobRequestTask], TaskResult] = lambda task: answer(name)
 
     async def run(self, take: Take) -> None:
@@ -287,7 +287,7 @@ def test_outcomes_outlive_a_database_that_fails(tmp_path: Path) -> None:
         )
         service.work.free.set()
         await until(lambda: len(service.dispatcher._outcomes) == 1)
-        await asyncio.sleep(2 * module.LOOK)
+        await asyncio.sleep(2 * module.DISPATCHER.look)
         store._engine = engine
         await until(lambda: is_done(service, job_id))
         assert (await requests(store, job_id))[0].state == "done"

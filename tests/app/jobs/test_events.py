@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -71,9 +72,9 @@ def test_readers_at_the_same_place_share_one_read(tmp_path: Path) -> None:
 
 
 def test_a_quiet_stream_has_comments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(events, "QUIET", 0.0)
-    monkeypatch.setattr(events, "LOOK", 0.0)
-    monkeypatch.setattr(events, "GATHER", 0.0)
+    monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, quiet=0.0))
+    monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, look=0.0))
+    monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, gather=0.0))
 
     async def test(store: Store) -> None:
         service = Service("only", store)

@@ -21,7 +21,13 @@ from joulepath.app.store import job_events, logs
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import StoredLog, new_id, now
 from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, nobody
+from joulepath.optimizer.progress import (
+    CandidatesFound,
+    CandidateTried,
+    Event,
+    Improved,
+    no_listener,
+)
 from tests.app.jobs.test_dispatcher import Service, is_done, requests, sent, until, with_store
 
 
@@ -105,7 +111,7 @@ def test_nobody_listens_to_short_requests(tmp_path: Path) -> None:
         await sent(service)
         service.dispatcher.start()
         await until(lambda: service.work.begun == [0])
-        assert service.work.tell is nobody
+        assert service.work.tell is no_listener
         await service.dispatcher.stop()
 
     with_store(tmp_path, test)

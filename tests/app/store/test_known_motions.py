@@ -17,7 +17,9 @@ from tests.app.store.test_store import with_store
 CELL, OTHER = "c" * 64, "d" * 64
 
 
-async def keep(store: Store, cell: str, most: int = known_motions.MOST, **motions: bytes) -> None:
+async def keep(
+    store: Store, cell: str, most: int = known_motions.KNOWN_MOTIONS.total, **motions: bytes
+) -> None:
     await store.write(partial(known_motions.keep, cell=cell, motions=motions, most=most))
 
 

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -145,7 +146,7 @@ def test_a_service_waits_while_another_one_migrates(
     """Also for longer than PostgreSQL may take for an ordinary answer: the first request is not
     refused.
     """
-    monkeypatch.setattr(database, "_SERVER_TIMEOUT", 0.5)
+    monkeypatch.setattr(database, "DATABASE", replace(database.DATABASE, server_timeout=0.5))
     with create_database_engine(server.url).begin() as connection:
         connection.execute(text("DROP SCHEMA public CASCADE"))
         connection.execute(text("CREATE SCHEMA public"))
@@ -157,7 +158,7 @@ def test_a_service_waits_while_another_one_migrates(
                 text("SELECT pg_advisory_xact_lock(:key)"), {"key": database._MIGRATION_LOCK}
             )
             locked.set()
-            time.sleep(3 * database._SERVER_TIMEOUT)
+            time.sleep(3 * database.DATABASE.server_timeout)
 
     async def test(store: Store) -> None:
         await store.open()

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 
 from joulepath.models.capsule_cover import not_held
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.own_arm.capsule_around import DIGIT, capsule_around
+from joulepath.models.own_arm.capsule_around import SEARCH, capsule_around
 from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.mesh_files import corners, in_folder, in_zip
@@ -77,7 +77,7 @@ def test_a_capsule_is_found_again(seed: int) -> None:
         [ends[0] + outward, ends[1] + outward, ends[0] + share * (ends[1] - ends[0]) + ring]
     )
     found, reach = capsule_around(points)
-    assert volume(found, reach) < 1.02 * volume(ends, radius) + DIGIT * np.pi * radius
+    assert volume(found, reach) < 1.02 * volume(ends, radius) + SEARCH.digit * np.pi * radius
 
 
 @pytest.mark.parametrize(

@@ -260,6 +260,7 @@ def test_a_motion_of_least_energy() -> None:
         "quintic",
         "ruckig",
         "ruckig_slowed",
+        "straight",
     ]
 
 

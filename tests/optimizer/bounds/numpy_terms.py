@@ -8,12 +8,13 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.cruise import TINY
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.grid_cells import Curvature, GridCells
 from joulepath.optimizer.bounds.grid_points import GridPoints
 from joulepath.optimizer.bounds.least_potential import LeastPotential, _excess, _hold, _weight
-from joulepath.optimizer.bounds.path_curvature import STEP
-from joulepath.optimizer.bounds.speed_conjugate import _BISECTIONS, _TINY, SpeedConjugate
+from joulepath.optimizer.bounds.path_curvature import DIFFERENCE_STEP
+from joulepath.optimizer.bounds.speed_conjugate import BISECTIONS, SpeedConjugate
 from joulepath.optimizer.bounds.time_parts import TimeParts
 from joulepath.optimizer.bounds.weights import Weights
 from joulepath.optimizer.kinematics.vectors import cross
@@ -53,8 +54,8 @@ def grid_points(
 
     torque, slope = map(placed, chain.gravity_torque(q))
     own = joint_inertia(chain, q)
-    beside = joint_inertia(chain, q + STEP * np.repeat(omega, K, axis=0)[flat])
-    M, N = placed(own), placed((beside - own) / STEP)
+    beside = joint_inertia(chain, q + DIFFERENCE_STEP * np.repeat(omega, K, axis=0)[flat])
+    M, N = placed(own), placed((beside - own) / DIFFERENCE_STEP)
     momentum = _sides(
         lambda at: (
             np.einsum("spjk,sk->spj", M[at], omega_rate) + np.einsum("spjk,sk->spj", N[at], x_rate)
@@ -192,7 +193,7 @@ def speed_conjugate(conjugate: SpeedConjugate, weights: Weights) -> tuple[Array,
     parts, duration, terms = conjugate._parts, conjugate.duration, conjugate.terms
     scale = weights.scale
     m_first, m_last = _multiplier(conjugate, weights, 0), _multiplier(conjugate, weights, -1)
-    share = (1 / duration - 1 / duration[-1]) / max(1 / duration[0] - 1 / duration[-1], _TINY)
+    share = (1 / duration - 1 / duration[-1]) / max(1 / duration[0] - 1 / duration[-1], TINY)
     m = m_last + share[:, None] * (m_first - m_last)
     T = duration[:, None, None]
     p = scale * T[..., None] * _ends(parts, conjugate._costate) + m[:, None, None]
@@ -225,7 +226,7 @@ def _multiplier(conjugate: SpeedConjugate, weights: Weights, which: int) -> Arra
     torque = (friction.constant + friction.slope * friction.last)[-1]
     reach = 4 * torque + np.abs(p).max(axis=0) + stiffness.max(axis=0) * friction.last[-1]
     low, high = -reach, reach
-    for _ in range(_BISECTIONS):
+    for _ in range(BISECTIONS):
         m = (low + high) / 2
         v = _height(conjugate, weights, p + m, omega, b, stiffness, conjugate._mean[which])[1]
         short = duration * v.sum(axis=0) < terms.x_rate.sum(axis=0)

@@ -11,17 +11,16 @@ import pytest
 from scipy.integrate import simpson
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.bounds.holding import Cells
 from joulepath.optimizer.bounds.holding_cells import HoldingCells
-from joulepath.optimizer.bounds.lower_bound import NetEnergy
+from joulepath.optimizer.bounds.holding_planes import HoldingTerms
+from joulepath.optimizer.bounds.net_energy import NetEnergy
 from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import peak_rates, sample, spline_of
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.search.baselines import guesses
-from tests.optimizer.moves import limits, problem
-from tests.optimizer.search.test_lower_bound import (
+from tests.optimizer.bounds.test_lower_bound import (
     CONDITIONS,
     QUADRATURE,
     Torques,
@@ -29,6 +28,7 @@ from tests.optimizer.search.test_lower_bound import (
     ends,
     motions,
 )
+from tests.optimizer.moves import limits, problem
 from tests.selection import long_but
 
 MOVES = 6
@@ -93,9 +93,9 @@ def many_motions(
     """Motions within the limits: the fastest, slowed a little and much, and some that leave the
     line by half waves.
     """
-    least = max(float(shortest_duration(goal - start, task.arm.active_limits)), LEAST_DURATION)
+    least = max(float(shortest_duration(goal - start, task.arm.active_limits)), DURATIONS.least)
     for stretch in (1.0, 1.1, 1.5, 4.0):
-        motion = guesses(task, start, goal, max(stretch * least, LEAST_DURATION))["ruckig_slowed"]
+        motion = guesses(task, start, goal, max(stretch * least, DURATIONS.least))["ruckig_slowed"]
         yield motion.t, motion.q, motion.v, motion.a, motion.weights, motion.duration
     space = bspline.uniform(19)
     line = start + np.outer(space.quintic, goal - start)
@@ -109,7 +109,7 @@ def many_motions(
             peaks = peak_rates(spline_of(space, points, 1.0)) / task.arm.active_limits.rates
             duration = max(
                 float((peaks.max(axis=1) ** (1 / np.arange(1, 4))).max()) * (1 + 1e-9),
-                LEAST_DURATION,
+                DURATIONS.least,
             )
             duration *= rng.choice([1.0, 1.5, 4.0])
             t = np.linspace(0, duration, SAMPLES)
@@ -168,14 +168,14 @@ def linear_ratios(
         share = rng.random(2) * 0.05
         edges = np.array([[max(least, duration / (1 + share[0])), duration * (1 + share[1])]])
         eta = rng.random() * net.multiplier(edges[:, 0])[:, None]
-        cells = Cells(holding.bound, line, edges, eta)
+        terms = HoldingTerms(holding.bound, line, edges, eta)
         dry = law.torque(v)
         tau = torques(q, v, a) + dry
         for scale in (0.1, 0.5, 1.0):
             omega = scale * rng.choice([-1, 1], 6) * rng.random(6) * most
             if rng.random() < 0.5:
-                omega = scale * joints * cells.model[0, 0]
-            planes = cells.planes(omega[None, None], side[None], net.deficit)
+                omega = scale * joints * terms.approximate_omega[0, 0]
+            planes = terms.planes(omega[None, None], side[None], net.deficit)
             value = planes.at(
                 np.array([0]), (goal - nearest)[None], np.zeros((1, 6)), np.array([gain])
             )[0]

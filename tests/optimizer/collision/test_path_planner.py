@@ -13,15 +13,9 @@ from scipy.spatial.transform import Rotation
 from joulepath import optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.planner.path_planner import (
-    REGIONS,
-    STEP,
-    PlannedPaths,
-    PlanningEnd,
-    along,
-    interpolation_is_free,
-    plan_paths,
-)
+from joulepath.optimizer.collision.planner.joint_path import interpolation_is_free, path_samples
+from joulepath.optimizer.collision.planner.path_planner import PLANNER, REGIONS, plan_paths
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.exceptions import NoTrajectory
@@ -42,9 +36,11 @@ from joulepath.optimizer.problem.scene import (
 )
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
-from joulepath.optimizer.solve.methods import planned_paths
-from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.planned_paths import FROM_PLANNED_PATH
+from joulepath.optimizer.solve.methods import free_spline, planned_paths
+from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE, FreeSpline
+from joulepath.optimizer.solve.methods.planned_paths import PLANNED_PATHS
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import ROBOT, problem_with
@@ -205,7 +201,10 @@ def test_two_paths_are_distinct() -> None:
     paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     assert len(paths) == 2
     v_max = arm.active_limits.v_max
-    assert np.abs(along(paths[0], 1.0, v_max)[0] - along(paths[1], 1.0, v_max)[0]).max() > 0.3
+    assert (
+        np.abs(path_samples(paths[0], 1.0, v_max)[0] - path_samples(paths[1], 1.0, v_max)[0]).max()
+        > 0.3
+    )
 
 
 def test_a_free_straight_line_is_the_only_path() -> None:
@@ -277,24 +276,28 @@ def test_motions_avoid_the_obstacles(name: str) -> None:
 def test_a_motion_into_a_cage_starts_from_a_planned_path() -> None:
     """The optimiser alone finds no way between the bars."""
     found = optimize(problem(*task("cage")))
-    assert found.candidates[0].reason == f"converged{FROM_PLANNED_PATH}"
+    assert found.candidates[0].reason == f"converged{MotionOrigin.FROM_PLANNED_PATH.value}"
 
 
 @pytest.mark.parametrize(
-    ("best_known", "was_postponed", "planned"),
+    ("incumbent_cost", "was_postponed", "planned"),
     [(np.inf, False, False), (1e6, False, True), (np.inf, True, True)],
 )
 def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is_known(
-    best_known: float, was_postponed: bool, planned: bool, monkeypatch: pytest.MonkeyPatch
+    incumbent_cost: float, was_postponed: bool, planned: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # what got out at great cost is compared with planned paths, too
-    monkeypatch.setattr("joulepath.optimizer.solve.methods.free_spline.WAY_OUT", np.inf)
+    monkeypatch.setattr(free_spline, "FREE_SPLINE", replace(FREE_SPLINE, detour_cost=np.inf))
     arm, q_start, q_goal = task("post")
-    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
-    solver.best_known, solver.was_postponed = best_known, was_postponed
-    found = solver.solve()
+    prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
+    context = replace(
+        SolveContext.of(prepared, q_start, q_goal, NEVER),
+        incumbent_cost=incumbent_cost,
+        was_postponed=was_postponed,
+    )
+    found = FreeSpline(context).solve()
     assert found.spline is not None
-    assert found.reason.endswith(FROM_PLANNED_PATH) == planned
+    assert (found.origin is MotionOrigin.FROM_PLANNED_PATH) == planned
 
 
 def test_a_request_among_obstacles_has_the_same_answer_whatever_time_it_takes() -> None:
@@ -312,7 +315,8 @@ def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked = problem(*walled_in())
-    monkeypatch.setattr(planned_paths, "MOST_STATES", 2_000)
+    limited = replace(PLANNED_PATHS, most_states=2_000)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     with pytest.raises(NoTrajectory) as exhausted:
         optimize(asked, clock=still)
     (candidate,) = exhausted.value.candidates
@@ -330,11 +334,12 @@ def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(
     assert "allow a longer deadline" in str(cut_short.value)
 
 
-@pytest.mark.parametrize("states", long_but((2_000,), (2_000, planned_paths.MOST_STATES)))
+@pytest.mark.parametrize("states", long_but((2_000,), (2_000, PLANNED_PATHS.most_states)))
 def test_a_failed_candidate_names_the_colliding_bodies(
     states: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(planned_paths, "MOST_STATES", states)
+    limited = replace(PLANNED_PATHS, most_states=states)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     with pytest.raises(NoTrajectory) as raised:
         optimize(problem(*walled_in()))
     (candidate,) = raised.value.candidates
@@ -346,8 +351,8 @@ def test_interpolation_between_paths_on_two_sides_of_an_obstacle_collides() -> N
     arm, q_start, q_goal = task("post")
     model, ones = CollisionModel(arm), np.ones(6)
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    around = along(path, 1.0, ones)[0]
-    through = along(np.stack([q_start, q_goal]), 1.0, ones)[0]
+    around = path_samples(path, 1.0, ones)[0]
+    through = path_samples(np.stack([q_start, q_goal]), 1.0, ones)[0]
     assert interpolation_is_free(model, around, around)
     assert not interpolation_is_free(model, around, 2 * through - around)
 
@@ -380,13 +385,13 @@ def test_planned_paths_keep_the_tool_within_its_cone() -> None:
         plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)).paths for a in (arm, held)
     )
     assert within
-    assert widest(within) <= 1 + STEP / cone.half_angle
+    assert widest(within) <= 1 + PLANNER.step / cone.half_angle
     assert widest(free) > 1.2
 
 
 def test_samples_along_a_path_rest_at_its_ends_and_round_its_corners() -> None:
     path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]])
-    q, t = along(path, 3.0, np.array([1.0, 1.0]))
+    q, t = path_samples(path, 3.0, np.array([1.0, 1.0]))
     assert t[0] == 0 and t[-1] == 3
     np.testing.assert_array_equal(q[[0, -1]], path[[0, -1]])
     v = np.gradient(q, t, axis=0)

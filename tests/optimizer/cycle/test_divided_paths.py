@@ -10,8 +10,13 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.divided_paths import PLACES, _cheapest, _costs, with_divided_paths
-from joulepath.optimizer.cycle.strands import Strand, strands_of
+from joulepath.optimizer.cycle.divided_paths import (
+    PLACES,
+    _cheapest_division,
+    _reconfiguration_bounds,
+    with_divided_paths,
+)
+from joulepath.optimizer.cycle.path_segments import PathSegment, path_segments
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -123,15 +128,15 @@ def test_every_part_has_the_lines_of_the_stop_and_the_names_of_its_parts() -> No
 
 def test_it_is_divided_where_the_reconfiguration_has_the_least_bound() -> None:
     course = ToolCourse.of(ToolPath(), down(0.45, -0.1, 0.2).T, BEAD.goal.T)
-    strands = strands_of(NARROW, course, BranchFilter("left", "up"))
+    segments = path_segments(NARROW, course, BranchFilter("left", "up"))
     free = PreparedProblem.of(Problem(arm=NARROW, start=down(0.45, -0.1, 0.2), goal=BEAD.goal))
-    on, cost = _costs(free, [free], strands)
-    for at, strand in zip(on.T, strands, strict=True):
-        T, wanted = pose_of(NARROW, strand.configurations(PLACES[at])), course.poses(PLACES[at])
+    on, cost = _reconfiguration_bounds(free, [free], segments)
+    for at, segment in zip(on.T, segments, strict=True):
+        T, wanted = pose_of(NARROW, segment.configurations(PLACES[at])), course.poses(PLACES[at])
         assert np.abs(T[:, :3, 3] - wanted[:, :3, 3]).max() < 2e-3, (
             "its points are joined by straight lines"
         )
-    places = _cheapest(strands, on, cost)
+    places = _cheapest_division(segments, on, cost)
     assert places is not None and len(places) == 1
     pairs = [(a, b) for a, b in np.ndindex(cost.shape[1:]) if on[0, a] and on[-1, b]]
     by_place = np.array([min(cost[p, a, b] for a, b in pairs) for p in range(len(PLACES))])
@@ -140,19 +145,19 @@ def test_it_is_divided_where_the_reconfiguration_has_the_least_bound() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_parts_are_as_few_and_as_cheap_as_can_be(seed: int) -> None:
-    """Against all ways through drawn strands, by shortest paths one change after the other."""
+    """Against all ways through drawn segments, by shortest paths one change after the other."""
     rng = np.random.default_rng(seed)
     ends = np.sort(rng.integers(0, len(PLACES), (6, 2)), axis=1)
     ends[0, 0], ends[1, 1] = 0, len(PLACES) - 1
-    strands = [Strand(PLACES[[a, b]], np.zeros((2, 6))) for a, b in ends]
-    on = np.stack([each.covers(PLACES) for each in strands], axis=1)
+    segments = [PathSegment(PLACES[[a, b]], np.zeros((2, 6))) for a, b in ends]
+    on = np.stack([each.covers(PLACES) for each in segments], axis=1)
     cost = np.where(
         on[:, :, None] & on[:, None, :] & ~np.eye(6, dtype=bool),
         rng.uniform(1, 2, (len(PLACES), 6, 6)),
         np.inf,
     )
     best, counts = _brute(on, cost)
-    places = _cheapest(strands, on, cost)
+    places = _cheapest_division(segments, on, cost)
     if not np.isfinite(best):
         assert places is None
         return
@@ -161,7 +166,8 @@ def test_the_parts_are_as_few_and_as_cheap_as_can_be(seed: int) -> None:
     edges, totals = [0, *at, len(PLACES) - 1], list[float]()
     for way in product(range(6), repeat=len(at) + 1):
         if all(
-            on[a : b + 1, strand].all() for (a, b), strand in zip(pairwise(edges), way, strict=True)
+            on[a : b + 1, segment].all()
+            for (a, b), segment in zip(pairwise(edges), way, strict=True)
         ):
             totals.append(sum(cost[p, a, b] for p, (a, b) in zip(at, pairwise(way), strict=True)))
     assert min(totals) == pytest.approx(best)

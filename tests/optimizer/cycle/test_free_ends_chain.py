@@ -15,15 +15,15 @@ from scipy.spatial.transform import Rotation
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import LeastBound
-from joulepath.optimizer.cycle import free_orientations
+from joulepath.optimizer.cycle import free_ends_chain, tool_turns
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.free_ends_chain import FreeEndsChain
+from joulepath.optimizer.cycle.free_ends_chain import FREE_ENDS, FreeEndsChain
 from joulepath.optimizer.cycle.single_joint_bound import Boxes, SingleJointBound
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose
-from joulepath.optimizer.kinematics.tool_path.least_time import least_time, least_way
+from joulepath.optimizer.kinematics.tool_path.least_time import least_tcp_distance, least_time
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -70,16 +70,15 @@ def _cycle(seed: int, robot: str = "ur5e") -> Cycle:
 @pytest.fixture(autouse=True)
 def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer angles than a request has: the bound is that of all angles anyway."""
-    monkeypatch.setattr(free_orientations, "ALL_AROUND", (0.0, 2.0, 4.0))
+    settings = replace(tool_turns.TOOL_TURNS, angles=(0.0, 2.0, 4.0))
+    monkeypatch.setattr(tool_turns, "TOOL_TURNS", settings)
 
 
 def _chain(asked: Cycle) -> FreeEndsChain:
     tried = {
-        stop.name: free_orientations._all_around(stop)
-        for stop in asked.stops
-        if any(stop.free_ends)
+        stop.name: tool_turns.turns_all_around(stop) for stop in asked.stops if any(stop.free_ends)
     }
-    first = free_orientations._at(asked, tried, bounded=True)
+    first = tool_turns.with_turns(asked, tried, bounded=True)
     chain = FreeEndsChain.of(first, CycleSearch(first, time.perf_counter).legs)
     assert chain is not None
     return chain
@@ -149,7 +148,8 @@ def test_no_chain_has_less(seed: int, robot: str) -> None:
 def test_fewer_cycles_give_a_weaker_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     asked, bounds = _cycle(0), []
     for cycles in (0, 6):
-        monkeypatch.setattr("joulepath.optimizer.cycle.free_ends_chain.ROUNDS", cycles)
+        settings = replace(FREE_ENDS, most_iterations=cycles)
+        monkeypatch.setattr(free_ends_chain, "FREE_ENDS", settings)
         bounds.append(_chain(asked).least(NEVER))
     assert 0 < bounds[0] < bounds[1]
 
@@ -190,7 +190,7 @@ def test_no_way_within_the_tolerance_is_shorter_than_the_least(shape: str) -> No
     for tolerance in (1e-4, 5e-3):
         path = ToolPath(**kinds[shape], position_tolerance=tolerance)
         course = ToolCourse.of(path, poses[0].T, poses[2].T)
-        least = least_way(course)
+        least = least_tcp_distance(course)
         for _ in range(2):
             at = np.unique(np.concatenate([[0.0, 1.0], rng.random(rng.integers(1, 40))]))
             points = course.poses(at)[:, :3, 3]
@@ -211,7 +211,7 @@ def test_no_way_within_the_tolerance_is_shorter_than_the_least(shape: str) -> No
     arm = Arm(robot=load_robot("ur5e"))
     assert least_time(arm, course) == 0.0
     assert least_time(replace(arm, tcp_speed=0.1), course) == pytest.approx(
-        least_way(course) / 0.1, rel=1e-5
+        least_tcp_distance(course) / 0.1, rel=1e-5
     )
 
 

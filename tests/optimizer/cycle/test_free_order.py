@@ -12,7 +12,7 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.tours import Tours
+from joulepath.optimizer.cycle.held_karp import HeldKarp
 from joulepath.optimizer.exceptions import ContradictoryOrder, DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.cycle import Cycle
@@ -209,12 +209,12 @@ def test_the_least_tour_is_that_of_all_tours(seed: int, closed: bool) -> None:
         if a != b
     }
     earlier: list[set[int]] = [set(), set(), {0}, set()] if seed % 2 else [set()] * 4
-    tours = Tours(ends, earlier, closed)
+    tours = HeldKarp(ends, earlier, closed)
     # costs that change between two questions are the new ones
     for _ in range(2):
         for (a, b), cost in blocks.items():
             if closed or b is not None:
-                tours.put(a, b, cost)
+                tours.set_costs(a, b, cost)
         value, groups, nodes = tours.least()
         assert_least(value, groups, nodes, blocks, earlier, closed)
         blocks |= {(None, 0): blocks[None, 0] * 3, (1, 2): blocks[1, 2] / 2}

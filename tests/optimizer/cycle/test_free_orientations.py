@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle import free_orientations, ways
+from joulepath.optimizer.cycle import free_orientations, stop_layers, tool_turns
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, UnreachablePose
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -70,10 +70,10 @@ def seam(start: Any, goal: Any, **path: Any) -> Cycle:
 @pytest.fixture
 def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer angles than a request has: each of them is a path to be solved."""
-    monkeypatch.setattr(free_orientations, "ALL_AROUND", (0.0, 2.0))
-    monkeypatch.setattr(free_orientations, "SPREAD", 4)
-    monkeypatch.setattr(free_orientations, "STEPS", (0.3,))
-    monkeypatch.setattr(free_orientations, "MORE", (0.3, 0.1))
+    turns = replace(tool_turns.TOOL_TURNS, angles=(0.0, 2.0), orientations=4)
+    monkeypatch.setattr(tool_turns, "TOOL_TURNS", turns)
+    settings = replace(free_orientations.FREE_ORIENTATIONS, steps_on_paths=(0.3,), steps=(0.3, 0.1))
+    monkeypatch.setattr(free_orientations, "FREE_ORIENTATIONS", settings)
 
 
 @pytest.mark.usefixtures("few_angles")
@@ -235,18 +235,20 @@ def test_a_free_stop_has_lines_and_is_passed() -> None:
 def test_the_poses_at_the_end_of_a_line_are_known_where_they_are_one() -> None:
     pose = ConeOrientedPose.about(down((0.5, -0.2, 0.1)), AXIS)
     up, across = np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0])
-    above = ways._shifted(pose, Line(direction=up, distance=0.05), -1.0)
+    above = stop_layers._shifted_pose(pose, Line(direction=up, distance=0.05), -1.0)
     assert (
         above is not None
         and above.position == pytest.approx([0.5, -0.2, 0.15])
         and (above.axis == pose.axis).all()
     )
-    beside = ways._shifted(pose, Line(direction=across, distance=0.05, frame="base"), 1.0)
+    beside = stop_layers._shifted_pose(
+        pose, Line(direction=across, distance=0.05, frame="base"), 1.0
+    )
     assert beside is not None and beside.position == pytest.approx([0.55, -0.2, 0.1])
     # where the direction turns with the tool, the outer end is anywhere on a circle
-    assert ways._shifted(pose, Line(direction=across, distance=0.05), 1.0) is None
+    assert stop_layers._shifted_pose(pose, Line(direction=across, distance=0.05), 1.0) is None
     tilted = replace(pose, half_angle=TILT)
-    assert ways._shifted(tilted, Line(direction=up, distance=0.05), 1.0) is None
+    assert stop_layers._shifted_pose(tilted, Line(direction=up, distance=0.05), 1.0) is None
 
 
 @pytest.mark.usefixtures("few_angles")

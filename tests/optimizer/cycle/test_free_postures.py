@@ -9,8 +9,8 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.held_pose import HELD_POSE, HeldPose
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_path.held_pose import HELD, HeldPose
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import Cycle
@@ -76,7 +76,10 @@ def test_the_pose_is_held_along_the_curve(robot: str) -> None:
         curve = HeldPose.of(asked.arm, each)
         moved = curve.put(each + STEP * curve.tangent(each))
         assert moved is not None and np.abs(moved - each).max() > STEP / 4
-        assert np.abs(tcp_pose(asked.arm, moved) - tcp_pose(asked.arm, each)).max() < 10 * HELD
+        assert (
+            np.abs(tcp_pose(asked.arm, moved) - tcp_pose(asked.arm, each)).max()
+            < 10 * HELD_POSE.tolerance
+        )
 
 
 def test_an_arm_that_is_not_singular_has_no_curve() -> None:

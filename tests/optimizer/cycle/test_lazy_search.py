@@ -66,7 +66,10 @@ class Known(LazySearch):
         return spline(RANGE if self.near[k][s, g] else 0.0)
 
     def chain_tried(self, nodes: list[int]) -> None:
-        assert all(self.legs[k].known(s, g) for k, s, g in self.pairs(nodes)) or self.cut_short
+        assert (
+            all(self.legs[k].is_pair_solved(s, g) for k, s, g in self.pairs(nodes))
+            or self.cut_short
+        )
 
 
 def spline(q: float) -> Spline:
@@ -79,7 +82,7 @@ class Late(Known):
     """A search in which every pair takes longer than its share of the time."""
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        return self.late()
+        return self.out_of_time()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.4])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.cycle.ways import layers_of
+from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.cycle import cycle_search, legs
-from joulepath.optimizer.cycle.cycle_search import MANY_STOPS
+from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -32,7 +32,7 @@ ENOUGH = 0.75
 def long_cycle(deadline: float) -> Cycle:
     """One stop more than a cycle of which it is proven that no chain is better."""
     asked = pick_and_place(
-        1, MANY_STOPS + 1, windings=False, method="time_scaling", deadline=deadline
+        1, CYCLE_SEARCH.many_stops + 1, windings=False, method="time_scaling", deadline=deadline
     )
     only = BranchFilter(elbow="up", wrist="no_flip")
     return replace(asked, stops=[replace(stop, branch=only) for stop in asked.stops])
@@ -71,7 +71,7 @@ def test_a_deadline_gives_the_best_long_cycle_so_far(whole: Whole) -> None:
 def test_the_proof_alone_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = pick_and_place(5, 4, method="time_scaling")
     proven = plan_cycle(asked)
-    monkeypatch.setattr(cycle_search, "MANY_STOPS", 1)
+    monkeypatch.setattr(cycle_search, "CYCLE_SEARCH", replace(CYCLE_SEARCH, many_stops=1))
     found = plan_cycle(asked)
     assert found.energy.electrical.total == proven.energy.electrical.total
     assert found.lower_bound == proven.lower_bound
@@ -82,7 +82,7 @@ def test_the_proof_alone_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_too_many_pairs_of_all_moves_are_refused_before_any_is_bounded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(legs, "MOST_PAIRS_OF_ROUND", 100)
+    monkeypatch.setattr(legs, "LEG", replace(legs.LEG, most_pairs_of_cycle=100))
     with pytest.raises(InvalidProblem, match="fewer stops") as refusal:
         plan_cycle(pick_and_place(1, 3, windings=False))
     assert refusal.value.field == "stops"

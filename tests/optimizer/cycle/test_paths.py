@@ -11,7 +11,7 @@ import pytest
 
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.priced_search import priced_motion
-from joulepath.optimizer.cycle.ways import layers_of
+from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle

@@ -10,7 +10,7 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle import priced_search
 from joulepath.optimizer.cycle.legs import Leg
-from joulepath.optimizer.cycle.priced_search import MoveOfALeg, PricedMotion
+from joulepath.optimizer.cycle.priced_search import PricedMotion, PricedPair
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.motion.time_scalings import quintic_spline
@@ -26,11 +26,11 @@ def motion(duration: float, energy: float) -> PricedMotion:
 
 def move(
     monkeypatch: pytest.MonkeyPatch, known: list[PricedMotion], *solved: PricedMotion | None
-) -> MoveOfALeg:
+) -> PricedPair:
     """A move whose solves have these results, one after the other."""
     results = iter(solved)
     monkeypatch.setattr(priced_search, "priced_motion", lambda *_: next(results))
-    return MoveOfALeg(cast(Leg, None), 0, 0, LONGEST, NEVER, known)
+    return PricedPair(cast(Leg, None), 0, 0, LONGEST, NEVER, known)
 
 
 def test_a_solve_that_ends_in_a_worse_motion_changes_nothing(

@@ -15,10 +15,10 @@ import pytest
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.errors import CycleTooShort
-from joulepath.optimizer.cycle.time_sharing import TimeSharing
-from joulepath.optimizer.cycle.time_sharing import duration_of as duration_of_all
+from joulepath.optimizer.cycle.pair_solver import PairSolver
+from joulepath.optimizer.cycle.stop_layers import layers_of
+from joulepath.optimizer.cycle.time_allocation import TimeAllocation, total_duration
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
-from joulepath.optimizer.cycle.ways import layers_of
 from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
@@ -184,7 +184,7 @@ def test_too_little_time_says_how_much_the_fastest_cycle_takes(factor: float) ->
     with pytest.raises(CycleTooShort) as refusal:
         plan_cycle(in_time(ASKED, factor * free().duration))
     assert refusal.value.shortest == pytest.approx(shortest(), rel=1e-3)
-    assert shortest() < free().duration and refusal.value.dwells == ASKED.dwelling
+    assert shortest() < free().duration and refusal.value.dwells == ASKED.dwell_time
 
 
 @pytest.mark.long
@@ -313,8 +313,8 @@ def test_the_fastest_cycle_is_no_slower_than_ours_at_full_speed() -> None:
     timing = TimedSearch(search, duration_of(LONGER))
     found, ours = timing.fastest_cycle(), timing.fastest(own)
     assert found is not None and ours is not None
-    assert duration_of_all(found[1]) <= duration_of_all(ours) * (1 + CONVERGED)
-    assert shortest() == pytest.approx(duration_of_all(found[1]) + ASKED.dwelling, rel=CONVERGED)
+    assert total_duration(found[1]) <= total_duration(ours) * (1 + CONVERGED)
+    assert shortest() == pytest.approx(total_duration(found[1]) + ASKED.dwell_time, rel=CONVERGED)
 
 
 REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
@@ -337,9 +337,9 @@ def test_time_that_cannot_be_shared_leaves_simpler_cycles(
         raise REFUSALS[problem]
 
     if where == "sharing":
-        monkeypatch.setattr(TimeSharing, "fill", fails)
+        monkeypatch.setattr(TimeAllocation, "allocate", fails)
     else:
-        monkeypatch.setattr(CycleSearch, "solve_in", fails)
+        monkeypatch.setattr(PairSolver, "solve_in", fails)
     for factor, name in ((LONGER, "same_factor"), (SHORTER, "fastest_then_wait")):
         asked = in_time(ASKED, duration_of(factor))
         found = plan_cycle(asked)

@@ -13,8 +13,8 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.evaluate.evaluate import MOST_SEGMENTS, Evaluation, evaluate
-from joulepath.optimizer.evaluate.recording import BLOCK, RecordedRows, Recording, Waypoints
+from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, RecordedRows, Recording, Waypoints
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.motion.time_scalings import quintic
@@ -177,9 +177,9 @@ def test_speeds_that_do_not_fit_show_in_the_balance() -> None:
 
 
 def test_blocks_do_not_show() -> None:
-    t, q = log(2 * BLOCK + 700)
+    t, q = log(2 * MOTION_LIMITS.block_rows + 700)
     whole = evaluate(ARM, Recording([RecordedRows(t, q)]), sample_period=0.05)
-    for size in (50, 977, BLOCK + 3):
+    for size in (50, 977, MOTION_LIMITS.block_rows + 3):
         parts = [RecordedRows(t[k : k + size], q[k : k + size]) for k in range(0, len(t), size)]
         result = evaluate(ARM, Recording(parts), sample_period=0.05)
         # the spline through a block and its neighbouring rows is the spline through all rows,
@@ -200,7 +200,7 @@ def test_the_start_of_time_does_not_matter() -> None:
 def test_memory_does_not_grow_with_the_log() -> None:
     def blocks(count: int) -> Iterator[RecordedRows]:
         for k in range(count):
-            t = (k * BLOCK + np.arange(BLOCK)) * 0.008
+            t = (k * MOTION_LIMITS.block_rows + np.arange(MOTION_LIMITS.block_rows)) * 0.008
             yield RecordedRows(t, START + 0.3 * np.sin(t[:, None] * np.linspace(0.2, 0.7, 6)))
 
     def peak(count: int) -> int:
@@ -242,7 +242,7 @@ def test_without_a_store_there_is_no_charge() -> None:
 
 
 def test_too_many_segments_to_list_are_still_counted() -> None:
-    steps = MOST_SEGMENTS + 5
+    steps = MOTION_LIMITS.max_segments + 5
     q = START + np.linspace(0.0, 1.0, steps + 1)[:, None] * np.ones(6)
     result = evaluate(ARM, Waypoints(q, np.array(1e-3), "linear"))
     assert (result.segment_count, result.segments) == (steps, [])

@@ -13,7 +13,8 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, Out
 from joulepath.optimizer.excitation import excite as module
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
-from joulepath.optimizer.excitation.excite import MOUNTING_PLANE, Excitation, excite
+from joulepath.optimizer.excitation.excitation_result import Excitation
+from joulepath.optimizer.excitation.excite import MOUNTING_PLANE, excite
 from joulepath.optimizer.excitation.fourier import FourierBasis
 from joulepath.optimizer.excitation.information import Information
 from joulepath.optimizer.excitation.torque_columns import TorqueColumns
@@ -32,7 +33,7 @@ FRICTION = ("coulomb", "viscous", "offset", "load")
 def found() -> Excitation:
     """A short search from one start."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MOST_EVALUATIONS", 80)
+        patch.setattr(module, "EXCITATION", module.ExcitationSettings(max_evaluations=80))
         return excite(ExcitationProblem(arm=ARM, starts=1, deadline=np.inf))
 
 
@@ -161,10 +162,12 @@ def test_no_time_is_said() -> None:
 
 def test_an_obstacle_of_the_planes_name_stands_for_it() -> None:
     own = Scene([Obstacle(MOUNTING_PLANE, Sphere(0.05), np.diag([1.0, 1, 1, 1]))])
-    arm = module._standing(ExcitationProblem(arm=Arm(robot=ARM.robot, scene=own)))
+    arm = module._with_mounting_plane(ExcitationProblem(arm=Arm(robot=ARM.robot, scene=own)))
     assert len(arm.scene.obstacles) == 1
-    assert len(module._standing(ExcitationProblem(arm=ARM)).scene.obstacles) == 1
-    assert not module._standing(ExcitationProblem(arm=ARM, mounting_plane=False)).scene.obstacles
+    assert len(module._with_mounting_plane(ExcitationProblem(arm=ARM)).scene.obstacles) == 1
+    assert not module._with_mounting_plane(
+        ExcitationProblem(arm=ARM, mounting_plane=False)
+    ).scene.obstacles
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.export.errors import FormatUnsuitable
-from joulepath.optimizer.export.franka import ROUNDING, FrankaOptions, to_franka
+from joulepath.optimizer.export.franka import FRANKA, FrankaOptions, to_franka
 from tests.optimizer.export.programs import cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import one_move
 
@@ -25,7 +25,10 @@ def test_the_table_is_the_spline_at_every_millisecond(robot: str, seed: int) -> 
     ]
     assert table[:, 0] == pytest.approx(np.arange(len(table)) * 1e-3)
     q, v, _ = program.at(np.minimum(table[:, 0], program.duration))
-    assert np.abs(table[:, 1:8] - q).max() <= ROUNDING and np.abs(table[:, 8:] - v).max() <= 1e-9
+    assert (
+        np.abs(table[:, 1:8] - q).max() <= FRANKA.rounding
+        and np.abs(table[:, 8:] - v).max() <= 1e-9
+    )
     assert 0 <= table[-1, 0] - program.duration < 1e-3
 
 
@@ -38,7 +41,7 @@ def test_the_motion_generator_has_the_same_rows() -> None:
     ]
     assert f"kRows = {len(rows)};" in text and text.count("{") == text.count("}")
     q, _, _ = program.at(np.minimum(np.arange(len(rows)) * 1e-3, program.duration))
-    assert np.abs(np.array(rows) - q).max() <= ROUNDING
+    assert np.abs(np.array(rows) - q).max() <= FRANKA.rounding
     assert "// Not run on hardware" in text
 
 

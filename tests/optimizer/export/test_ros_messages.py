@@ -15,7 +15,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.export import quintic_points as points_module
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Move, Program
-from joulepath.optimizer.export.quintic_points import POSITION_TOLERANCE, VELOCITY_TOLERANCE
+from joulepath.optimizer.export.quintic_points import QUINTICS
 from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2
 from joulepath.optimizer.motion.spline import Spline
 from tests.optimizer.export.programs import cycle_with_payload
@@ -36,7 +36,7 @@ GOAL = {
 
 def check(program: Program, trajectory: dict[str, Any]) -> tuple[float, float]:
     found = deviations(program, followed(trajectory))
-    assert found[0] <= POSITION_TOLERANCE and found[1] <= VELOCITY_TOLERANCE
+    assert found[0] <= QUINTICS.position_tolerance and found[1] <= QUINTICS.velocity_tolerance
     return found
 
 
@@ -82,7 +82,7 @@ def test_a_jump_of_the_acceleration_is_followed_as_closely() -> None:
 
 
 def test_what_no_points_can_follow_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(points_module, "MOST_POINTS", 5)
+    monkeypatch.setattr(points_module, "QUINTICS", points_module.QuinticSettings(max_points=5))
     with pytest.raises(FormatUnsuitable, match="ros2"):
         to_ros2(one_move())
 

@@ -12,7 +12,7 @@ from scipy.interpolate import make_lsq_spline
 from joulepath.models.robot import Array
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.program import Move, Program
-from joulepath.optimizer.export.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
+from joulepath.optimizer.export.urscript import URSCRIPT, UrscriptOptions, to_urscript
 from joulepath.optimizer.motion.spline import retimed
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline
@@ -49,7 +49,7 @@ def test_the_set_points_are_the_spline_at_every_period(
     t, q = points[:, 0] - 0.1, points[:, 1:]  # it sleeps after set_payload
     assert np.allclose(np.diff(t), 1 / rate, rtol=0, atol=1e-12)
     truth = program.moves[0].spline.curve(np.minimum(t, program.duration))
-    assert np.abs(q - truth).max() <= SET_POINT_ERROR
+    assert np.abs(q - truth).max() <= URSCRIPT.set_point_error
     assert t[-1] >= program.duration
 
 
@@ -74,7 +74,7 @@ def test_a_cycle_switches_payload_and_output_where_it_grasps_and_releases() -> N
     for move in program.moves:
         assert (
             np.abs(np.array(served) - move.spline.control_points[-1]).max(axis=1).min()
-            < SET_POINT_ERROR
+            < URSCRIPT.set_point_error
         )
 
 
@@ -148,7 +148,7 @@ def test_splines_of_other_degrees_are_served_too() -> None:
     )
     points = run(program).set_points
     truth = program.moves[0].spline.curve(np.minimum(points[:, 0] - 0.1, program.duration))
-    assert np.abs(points[:, 1:] - truth).max() <= SET_POINT_ERROR
+    assert np.abs(points[:, 1:] - truth).max() <= URSCRIPT.set_point_error
 
 
 def test_a_very_short_motion_is_served() -> None:
@@ -157,7 +157,7 @@ def test_a_very_short_motion_is_served() -> None:
         program.moves[0], spline=retimed(program.moves[0].spline, 1e-4 / program.duration)
     )
     points = run(Program((tiny,)), lookahead_time=0.2).set_points
-    assert np.abs(points[-1, 1:] - tiny.spline.control_points[-1]).max() <= SET_POINT_ERROR
+    assert np.abs(points[-1, 1:] - tiny.spline.control_points[-1]).max() <= URSCRIPT.set_point_error
 
 
 @pytest.mark.parametrize(("robot", "words"), [("fr3", "7 joints"), ("kr10_r1100", "KUKA")])

@@ -97,7 +97,7 @@ def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
 
 
 def test_curves_of_long_logs_are_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(curves_module, "MOST", MOST)
+    monkeypatch.setattr(curves_module, "CURVES", curves_module.CurveSettings(max_rows=MOST))
     truth = truth_of(ROBOT)
     logs = [recorded(ROBOT, truth, moves=4, seed=seed).log() for seed in (0, 1, 2)]
     found = identify(ROBOT, logs[:2], IdentificationOptions(held_out=1.0))

@@ -21,7 +21,7 @@ from joulepath.optimizer.dynamics.link_regressor import (
     rigid_torques,
 )
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
-from joulepath.optimizer.identify.arm.pseudo_inertia import nearness, pseudo_inertias
+from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric, pseudo_inertias
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -80,7 +80,7 @@ def test_real_bodies_have_positive_pseudo_inertias_and_no_others() -> None:
 @pytest.mark.parametrize("name", robot_names())
 def test_nearness_is_a_distance_for_every_robot(name: str) -> None:
     """Also of parameters that no real body has, as the published ones of one link of the Panda."""
-    metric = nearness(body_parameters(load_robot(name).model))
+    metric = distance_metric(body_parameters(load_robot(name).model))
     scale = 1 / np.sqrt(np.diag(metric))
     assert np.linalg.eigvalsh(metric * np.outer(scale, scale))[0] > 0
 
@@ -104,7 +104,7 @@ def test_nearness_does_not_depend_on_the_frame() -> None:
 
     def distance(one: pin.Inertia, two: pin.Inertia) -> float:
         change = two.toDynamicParameters() - one.toDynamicParameters()
-        return float(change @ nearness(one.toDynamicParameters()) @ change)
+        return float(change @ distance_metric(one.toDynamicParameters()) @ change)
 
     # a body that has no extent is given some, in every frame
     assert distance(placement.act(body), placement.act(other)) == pytest.approx(
@@ -117,7 +117,7 @@ def test_the_nearest_real_body_is_found() -> None:
     nearer.
     """
     wrong = pin.Inertia(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06])).toDynamicParameters()
-    metric = nearness(
+    metric = distance_metric(
         pin.Inertia(2.0, np.zeros(3), np.diag([0.03, 0.04, 0.05])).toDynamicParameters()
     )
     found = solve_consistent(metric, metric @ wrong, 1, np.full(10, -np.inf))
@@ -156,7 +156,7 @@ def test_a_refit_finds_links_that_the_robots_own_are_not() -> None:
     ] < 0.2 * before.relative[1]
     assert refitted.physical is not None and refitted.physical.consistent
     assert (refitted.structure.base, refitted.structure.excited) == (40, 40)
-    change = refitted.fitted.arm.bodies
+    change = refitted.fitted.arm.link_change
     assert change is not None
     regressor = rigid_regressor(robot.model, *states(6, 50))
     wrong = body_parameters(robot.model) - body_parameters(real.model)
@@ -172,7 +172,7 @@ def test_a_refit_of_a_right_model_moves_nothing_that_matters() -> None:
         [replace(recorded(robot, truth_of(robot)).log(), power=None)],
         IdentificationOptions(refit=True, held_out=0.0),
     )
-    change = found.fitted.arm.bodies
+    change = found.fitted.arm.link_change
     assert change is not None
     regressor = rigid_regressor(robot.model, *states(6, 50))
     own = regressor @ body_parameters(robot.model)
@@ -196,13 +196,13 @@ def test_identified_figures_become_a_robot() -> None:
     assert made.friction.name == "identified" and made.friction.load is not None
     assert made.friction.coulomb == pytest.approx(truth.coulomb, rel=0.05)
     assert made.electronics.idle_power == pytest.approx(truth.idle_power, rel=0.01)
-    change = found.fitted.arm.bodies
+    change = found.fitted.arm.link_change
     assert change is not None
     assert body_parameters(made.model) == pytest.approx(
         body_parameters(robot.model) + change, abs=1e-6
     )
     known = covariance_of(figures)
-    assert known is not None and known.move_sd == found.spread.move
+    assert known is not None and known.move_sd == found.spread.move_sd
     assert {
         "electronics.idle_power",
         "friction_laws.identified.coulomb.1",
@@ -219,12 +219,12 @@ def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
     log = replace(recorded(real, truth_of(real, 1), moves=12).log(), power=None)
     found = identify(robot, [log], IdentificationOptions(refit=True, held_out=0.0))
     known = covariance_of(found.document("2025-03-14"))
-    assert known is not None and found.fitted.arm.bodies is not None
+    assert known is not None and found.fitted.arm.link_change is not None
     at = [known.names.index(f"inertials.{part}.{joint}") for joint in range(6) for part in LINKS]
     covariance = known.matrix[np.ix_(at, at)]
     regressor = rigid_regressor(robot.model, *states(6, 200))[:, 1:3].reshape(-1, 60)
     wrong = regressor @ (
-        body_parameters(robot.model) + found.fitted.arm.bodies - body_parameters(real.model)
+        body_parameters(robot.model) + found.fitted.arm.link_change - body_parameters(real.model)
     )
     sd = np.sqrt(np.einsum("np,pq,nq->n", regressor, covariance, regressor))
     assert (np.abs(wrong) <= 3 * sd).mean() > 0.95

@@ -88,7 +88,7 @@ def test_what_a_real_log_tells_of_a_figure(place: Path) -> None:
         for name in value[0]
         if name[0] in ("coulomb", "rotor_inertia")
         and not any(
-            dict(zip(each.names, each.why, strict=True))[name] for each in (whole, one, two)
+            dict(zip(each.names, each.reasons, strict=True))[name] for each in (whole, one, two)
         )
     ]
     assert len(told) >= 6

@@ -10,7 +10,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.errors import NotExcited, PayloadUnknown
-from joulepath.optimizer.identify.fits.payload_fit import Carried
+from joulepath.optimizer.identify.fits.payload_fit import IdentifiedPayload
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -35,13 +35,13 @@ def log_of(carried: Payload, seed: int, said: Payload, motions: int = 0) -> Log:
     return replace(log, power=None, payload=said)
 
 
-def found_in(*logs: Log, options: IdentificationOptions = ASKED) -> Carried:
+def found_in(*logs: Log, options: IdentificationOptions = ASKED) -> IdentifiedPayload:
     found = identify(ROBOT, logs, options).payload
     assert found is not None
     return found
 
 
-def check(carried: Carried, mass: float = PAYLOAD.mass) -> None:
+def check(carried: IdentifiedPayload, mass: float = PAYLOAD.mass) -> None:
     sd = np.sqrt(np.diag(carried.covariance))
     assert not carried.why
     assert abs(carried.mass - mass) <= min(0.015 * mass, FAR * sd[0])

@@ -17,7 +17,8 @@ from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.grid import grid_of
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
-from joulepath.optimizer.identify.logs.reading import LogOptions, read_log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import (
     SILENT,
@@ -273,9 +274,13 @@ Case = tuple[bytes, str, int | None, str | None]
 
 
 def broken(recording: Recording) -> dict[str, Case]:
-    """Broken files: what is sent, words of the error, its row and column."""
-    good = csv_of(recording, without="vaP")
-    lines = good.splitlines()
+    """Broken files: content, words of the error, its row and column."""
+    return broken_cells(recording) | broken_tables(recording)
+
+
+def broken_cells(recording: Recording) -> dict[str, Case]:
+    """Files with one broken cell."""
+    lines = csv_of(recording, without="vaP").splitlines()
 
     def with_line(k: int, line: bytes) -> bytes:
         return b"\n".join([*lines[: k - 1], line, *lines[k:]])
@@ -295,6 +300,26 @@ def broken(recording: Recording) -> dict[str, Case]:
             "q1",
         ),
         "word": (with_line(10, b",".join([*cells[:-1], b"rest"])), "i6 in line 10", 10, "i6"),
+        "huge": (
+            with_line(10, b",".join([*cells[:-1], b"1e300"])),
+            "i6 in line 10 is too large",
+            10,
+            "i6",
+        ),
+        "infinite": (
+            with_line(10, b",".join([*cells[:-1], b"1e400"])),
+            "i6 in line 10 is no finite",
+            10,
+            "i6",
+        ),
+    }
+
+
+def broken_tables(recording: Recording) -> dict[str, Case]:
+    """Files with a broken header, or with rows that are no log."""
+    good = csv_of(recording, without="vaP")
+    lines = good.splitlines()
+    return {
         "no time": (b"\n".join(line.partition(b",")[2] for line in lines), "no column `t`", 1, "t"),
         "back": (b"\n".join([*lines[:50], *lines[20:]]), "goes back in line 51", 51, "t"),
         "all at once": (b"\n".join([lines[0], *[lines[1]] * 200]), "repeats itself", None, "t"),
@@ -324,18 +349,6 @@ def broken(recording: Recording) -> dict[str, Case]:
         "no gzip at all": (b"\x1f\x8b" + bytes(100), "broken gzip", None, None),
         "one long line": (b"t," + b"q" * 40_000, "longer than", 1, None),
         "a joint's number": (b"t,q" + b"9" * 6000, "no joint positions", 1, None),
-        "huge": (
-            with_line(10, b",".join([*cells[:-1], b"1e300"])),
-            "i6 in line 10 is too large",
-            10,
-            "i6",
-        ),
-        "infinite": (
-            with_line(10, b",".join([*cells[:-1], b"1e400"])),
-            "i6 in line 10 is no finite",
-            10,
-            "i6",
-        ),
         "mostly cut": (
             b"\n".join([*lines[:50], *(line[:40] for line in lines[50:100])]),
             "columns",
@@ -363,7 +376,7 @@ def test_broken_files_name_the_place(recording: Recording, name: str) -> None:
 def test_bombs_are_defused(recording: Recording) -> None:
     bomb = gzip.compress(csv_of(recording) + b"0," * 6000 + b"\n" + (b"0," * 6000 + b"\n") * 999)
     with pytest.raises(LogTooLarge, match="bytes"):
-        read_log(bomb, ROBOT, LogOptions(most_bytes=4_000_000))
+        read_log(bomb, ROBOT, LogOptions(max_bytes=4_000_000))
     many = b"t,q1,q2,q3,q4,q5,q6\n" + b"0,0,0,0,0,0,0\n" * 1_000_001
     with pytest.raises(LogTooLarge, match="1000000 rows"):
         read_log(gzip.compress(many), ROBOT)

@@ -11,7 +11,12 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.estimates.grouped import Grouped, adjusted, jackknife, left_out
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    jackknife,
+    leave_one_out,
+    residual_replicates,
+)
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.quality.interval import own_variance
 from tests.identification_logs import off_the_model, recorded, truth_of
@@ -33,15 +38,15 @@ def _estimates(seed: int) -> tuple[Array, Array, Array]:
     prior, true = np.eye(3), random.normal(size=3)
     shared = random.normal(size=GROUPS)[group]
     values = columns @ true + shared + random.normal(size=len(group))
-    grouped = Grouped.of(columns, values, np.full(len(group), 0.5), group, GROUPS)
+    grouped = GroupedEquations.of(columns, values, np.full(len(group), 0.5), group, GROUPS)
     precision = grouped.gram.sum(axis=0) + prior
     found, free = np.linalg.solve(precision, grouped.moment.sum(axis=0)), np.ones(3, dtype=bool)
     inverse = np.linalg.inv(precision)
     by_prior = inverse @ prior @ inverse
     return (
         found - true,
-        jackknife(adjusted(grouped, found, free, prior)) + by_prior,
-        jackknife(left_out(grouped, found, free, prior)) + by_prior,
+        jackknife(residual_replicates(grouped, found, free, prior)) + by_prior,
+        jackknife(leave_one_out(grouped, found, free, prior)) + by_prior,
     )
 
 

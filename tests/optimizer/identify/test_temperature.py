@@ -12,7 +12,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.quality.advice import slope as advice_slope
+from joulepath.optimizer.identify.quality.advice import energy_derivative
 from joulepath.optimizer.identify.rows.fit_rows import rows_of
 from tests.identification_logs import recorded, rigid_torques, truth_of
 
@@ -64,7 +64,9 @@ def test_a_known_figure_takes_the_advised_share_of_the_variance_away(seed: int) 
     # the variance of the energy by the arms of the covariance's own errors, before and after the
     # figure is known
     rows = rows_of(ROBOT, [replace(log, effort=None, effort_meaning=None)])
-    gradient = np.array([advice_slope(fitted.fitted.arm, rows, *name) for name in estimate.names])
+    gradient = np.array(
+        [energy_derivative(fitted.fitted.arm, rows, *name) for name in estimate.names]
+    )
     at, covariance = estimate.names.index((advice.figure, advice.joint)), estimate.covariance
     known = covariance - np.outer(covariance[at], covariance[at]) / covariance[at, at]
     left = gradient @ known @ gradient / (gradient @ covariance @ gradient)

@@ -1,4 +1,4 @@
-"""What the tests of inverse kinematics share: the UR5e's flange by Pinocchio, and tolerances."""
+"""Helpers for tests of the UR5e's inverse kinematics: its flange by Pinocchio, and tolerances."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.optimizer.moves import ROBOT
 
 IK = required_inverse_kinematics(ROBOT, "goal")
-MODEL, DATA = ROBOT.model, ROBOT.model.createData()
+MODEL = ROBOT.model
+DATA = ROBOT.model.createData()
 FLANGE = MODEL.getFrameId("flange")
 LIMITS = ROBOT.limits
 
-# what the product promises of an answer's forward kinematics [m, rad] and of a configuration found
-# again [rad]
+# promised accuracy of a solution's forward kinematics [m, rad]
 ACCURACY = 1e-9
+# promised accuracy of a configuration found again [rad]
 FOUND = 1e-6
-# of double precision, and of the part of an angle that a limit may cut off an answer on it [m,
-# turns]
+# rounding in double precision, and the largest part of an angle clipped at a limit [m, turns]
 ROUNDING = 1e-10
 
 EVERYDAY = np.array([0.3, -1.6, 1.9, -1.8, -1.5, 0.2])
@@ -36,7 +36,7 @@ def jacobian(q: Array) -> Array:
 
 
 def errors(T: Array, q: Array) -> tuple[float, float]:
-    """Position [m] and rotation [rad] of the flange at q against T."""
+    """Position error [m] and rotation error [rad] of the flange at q against T."""
     reached = forward(q)
     turn = np.linalg.norm(reached[:3, :3] - T[:3, :3]) / np.sqrt(2)
     return float(np.linalg.norm(reached[:3, 3] - T[:3, 3])), float(turn)

@@ -1,6 +1,4 @@
-"""Six-joint arms of other forms than Universal Robots', and what their inverse kinematics finds of
-a configuration.
-"""
+"""Helpers for tests of six-joint arms of other forms than Universal Robots'."""
 
 from __future__ import annotations
 
@@ -15,16 +13,20 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.ik_solutions import PrincipalSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 
-# m and rad: what an answer may miss its pose by, and a configuration itself; and what two of them
-# differ by at least
-ACCURACY, FOUND, SAME = 1e-9, 1e-6, 1e-6
-KUKA, UR5E = load_robot("kr10_r1100"), load_robot("ur5e")
+# largest pose error of a solution [m, rad]
+ACCURACY = 1e-9
+# largest joint distance of a configuration found again [rad]
+FOUND = 1e-6
+# smallest joint distance of two different solutions [rad]
+SAME = 1e-6
+KUKA = load_robot("kr10_r1100")
+UR5E = load_robot("ur5e")
 
 
 @dataclass(frozen=True)
 class Solved:
-    """The branches of the pose of a configuration, their worst error [m, rad], and how far they are
-    from it [rad].
+    """Branches of the pose of a configuration, their largest pose error [m, rad], and their
+    smallest joint distance [rad] from this configuration.
     """
 
     branches: list[PrincipalSolution]
@@ -34,16 +36,14 @@ class Solved:
 
 
 def flange(robot: Robot, q: Array) -> Array:
-    """T_base_flange (4, 4) by Pinocchio."""
+    """Flange pose T_base_flange (4, 4) by Pinocchio."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, q)
     return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
 
 
 def solved(robot: Robot, q: Array) -> Solved:
-    """What the inverse kinematics finds of the pose of q (6,); a self-motion counts as all its
-    members.
-    """
+    """Solutions of the pose of q (6,); a self-motion counts with all its members."""
     T = pin.SE3(flange(robot, q))
     branches = required_inverse_kinematics(robot, "goal").branches(T.homogeneous)
     errors = [pin.log6(T.actInv(pin.SE3(flange(robot, each.q)))).vector for each in branches]
@@ -68,16 +68,14 @@ def _member(branch: PrincipalSolution, q: Array) -> Array:
 
 
 def inside(robot: Robot, rng: np.random.Generator) -> Array:
-    """A random configuration (6,) within the limits and one turn."""
+    """Random configuration (6,) within the limits and one turn."""
     return rng.uniform(
         np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi)
     )
 
 
 def calibrated(robot: Robot, off: float, seed: int = 0) -> Robot:
-    """The robot with each joint's frame off by up to so many metres and radians along and about
-    each axis.
-    """
+    """Robot with each joint's frame displaced by up to `off` [m, rad] along and about each axis."""
     rng, model = np.random.default_rng(seed), robot.model.copy()
     for j in range(1, 7):
         M = model.jointPlacements[j]

@@ -1,34 +1,35 @@
-"""Newton's method across a curve of configurations, with the second order of the motion, against
-forward kinematics.
-"""
+"""Newton's method across self-motions, with second-order terms, against forward kinematics."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.seven.across_curve import (
-    LEFT,
-    MANY,
-    led,
-    onto,
+    ACROSS,
+    project_across,
+    project_onto_curve,
     second_order,
     step_across,
 )
 from tests.optimizer.chains import serial_chain
 
 CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]
-# steps [rad], and what they leave over their cube [m/rad³]: a length of the arm, times the joints
-# that turn it
-STEPS, THIRD_ORDER = (3e-2, 3e-3, 3e-4), 40.0
-# error [m, rad] of what is on the curve: each of seven joints may be off by some LEFT
-EXACT = 10 * LEFT
-# share of a step, or length, that rounding changes next to a singularity; way ahead [rad]
-ROUNDING, AHEAD = 1e-9, 0.03
+# sizes of joint moves [rad]
+STEPS = (3e-2, 3e-3, 3e-4)
+# third-order remainder over the cube of the move: a length of the arm times the number of joints
+# that turn it [m/rad³]
+THIRD_ORDER = 40.0
+# largest pose error of a point on a curve, with each joint off by some ACROSS.tolerance [m, rad]
+EXACT = 10 * ACROSS.tolerance
+# share of a step, or length, that rounding changes next to a singularity
+ROUNDING = 1e-9
+# displacement along a direction [rad]
+AHEAD = 0.03
 
 
-def test_what_two_orders_leave_goes_with_the_cube_of_the_step() -> None:
+def test_the_remainder_of_two_orders_is_cubic_in_the_step() -> None:
     rng = np.random.default_rng(71)
     for chain in CHAINS:
         q = rng.uniform(-2.0, 2.0, (50, 7))
@@ -44,7 +45,7 @@ def test_what_two_orders_leave_goes_with_the_cube_of_the_step() -> None:
             assert np.abs(left).max() < THIRD_ORDER * step**3
 
 
-def test_what_is_led_onto_the_curve_is_on_it_across_the_given_direction() -> None:
+def test_a_projected_point_is_on_the_curve_across_the_given_direction() -> None:
     rng = np.random.default_rng(72)
     for chain in CHAINS:
         for away in (1e-6, 1e-4, 1e-2):
@@ -52,16 +53,16 @@ def test_what_is_led_onto_the_curve_is_on_it_across_the_given_direction() -> Non
             T, jacobian = chain.flange_and_jacobian(q[None])
             along = np.linalg.svd(jacobian[0])[2][-1] + 0.1 * rng.normal(size=7)
             starts = q + away * rng.uniform(-1.0, 1.0, (20, 7))
-            reached = onto(chain, starts, np.tile(along, (20, 1)), T[0])
-            assert miss(pose_error(chain.flange(reached), T[0])).max() < EXACT
+            reached = project_across(chain, starts, np.tile(along, (20, 1)), T[0])
+            assert twist_size(pose_error(chain.flange(reached), T[0])).max() < EXACT
             assert np.abs((reached - starts) @ along).max() < EXACT
 
 
-def test_many_points_take_the_steps_that_few_do() -> None:
-    """Those of many are solved for by orthogonal rows, those of few by LAPACK."""
+def test_many_points_take_the_same_steps_as_few() -> None:
+    """Many points are solved by orthogonalised rows, few points by LAPACK."""
     rng = np.random.default_rng(73)
     for chain in CHAINS:
-        q = rng.uniform(-2.0, 2.0, (MANY + 10, 7))
+        q = rng.uniform(-2.0, 2.0, (ACROSS.many + 10, 7))
         T, along = chain.flange(q[:1])[0], rng.normal(size=q.shape)
         move, tangent = step_across(chain, q, along, T)
         parts = [
@@ -75,24 +76,30 @@ def test_many_points_take_the_steps_that_few_do() -> None:
 
 
 def test_steps_at_singular_configurations_are_numbers() -> None:
-    """Side by side, and few at a time; of an arm that is straight, or nearly."""
+    """With many and with few points, of a straight arm and of nearly straight ones."""
     rng, chain = np.random.default_rng(76), CHAINS[0]
     for size in (0.0, 1e-9):
-        for n in (3, MANY + 3):
+        for n in (3, ACROSS.many + 3):
             q, along = size * rng.normal(size=(n, 7)), np.eye(7)[rng.integers(0, 7, n)]
             T = chain.flange(q[:1])[0]
-            for found in (*step_across(chain, q, along, T), *led(chain, q, along, np.zeros(n), T)):
+            for found in (
+                *step_across(chain, q, along, T),
+                *project_onto_curve(chain, q, along, np.zeros(n), T),
+            ):
                 assert np.isfinite(found).all()
 
 
-def test_what_is_led_ahead_is_on_the_curve_as_far_ahead_as_asked() -> None:
-    """With short steps, too: what is left of the way is gone later."""
+def test_a_displaced_point_is_on_the_curve_at_the_given_displacement() -> None:
+    """With short steps, too: later steps cover the rest of the displacement."""
     rng, chain = np.random.default_rng(74), CHAINS[0]
     q = rng.uniform(-2.0, 2.0, 7)
     T, jacobian = chain.flange_and_jacobian(q[None])
     along = np.tile(np.linalg.svd(jacobian[0])[2][-1], (20, 1))
     ahead = rng.uniform(-AHEAD, AHEAD, 20)
     for longest in (np.inf, AHEAD / 3):
-        reached, left = led(chain, np.tile(q, (20, 1)), along, ahead, T[0], longest)
-        assert left.max() < LEFT and miss(pose_error(chain.flange(reached), T[0])).max() < EXACT
+        reached, left = project_onto_curve(chain, np.tile(q, (20, 1)), along, ahead, T[0], longest)
+        assert (
+            left.max() < ACROSS.tolerance
+            and twist_size(pose_error(chain.flange(reached), T[0])).max() < EXACT
+        )
         assert np.abs(((reached - q) * along).sum(axis=1) - ahead).max() < EXACT

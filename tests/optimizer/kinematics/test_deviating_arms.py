@@ -1,5 +1,5 @@
-"""Arms whose axes meet, or are parallel, but for little: calibrated arms and descriptions with
-rounded angles.
+"""Arms whose axes meet or are parallel only nearly: calibrated arms, and descriptions with rounded
+angles.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tests.optimizer.kinematics.six_joints import (
 )
 from tests.selection import long_but
 
-# m and rad, of each joint's frame: that of a factory calibration
+# deviation of each joint's frame, as of a factory calibration [m, rad]
 OFF = 1e-4
 
 
@@ -49,7 +49,7 @@ def test_every_configuration_of_a_calibrated_arm_is_found(robot: Robot, count: i
 
 
 def test_rounded_angles_are_no_hindrance() -> None:
-    """Quarter turns written as 1.5708: no axes are parallel any more, and none meet."""
+    """Quarter turns written as 1.5708: the axes are no longer parallel, and none meet."""
     model = KUKA.model.copy()
     for j in range(1, 7):
         M = model.jointPlacements[j]
@@ -65,9 +65,7 @@ def test_rounded_angles_are_no_hindrance() -> None:
 
 @pytest.mark.parametrize("off", [0.0, 1e-4, 1e-3])
 def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: float) -> None:
-    """Where the nominal wrist is aligned: they are somewhere along the curve on which it would
-    turn.
-    """
+    """At poses with an aligned nominal wrist, they lie along the curve of its self-motion."""
     arm, rng = calibrated(KUKA, OFF), np.random.default_rng(23)
     for _ in range(4):
         q = inside(arm, rng)
@@ -78,8 +76,8 @@ def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: fl
 
 
 def skewed() -> Robot:
-    """A spherical wrist on a base whose second axis is not at right angles to the first: its
-    branches have no names.
+    """Spherical wrist on a base with a second axis oblique to the first: its branches have no
+    names.
     """
     model = KUKA.model.copy()
     M = model.jointPlacements[2]
@@ -111,5 +109,5 @@ def test_a_self_motion_of_an_arm_without_names_is_refused() -> None:
         q[4] = 0.0
         with pytest.raises(SingularPose):
             solved(arm, q)
-        # joint positions need no branch
+        # Joint positions need no branch.
         assert str(required_inverse_kinematics(arm, "goal").label(q)) == "branch 1"

@@ -1,5 +1,6 @@
-"""Configurations that reach a pose of free orientation: put on their manifold, and moved over
-it."""
+"""Configurations of a pose with a free orientation: projection onto their manifold, and motion
+along it.
+"""
 
 from __future__ import annotations
 
@@ -16,20 +17,22 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 
-# m, rad: far below what the certificate allows
+# largest pose error, far below the tolerance of the certificate [m, rad]
 REACHED = 1e-9
-# displacement [rad] from the manifold, and how much farther than this Newton's method may end
-ASIDE, FARTHER = 0.03, 4.0
-# least share of configurations, from anywhere, that the way over the manifold leads back onto it
+# displacement from the manifold [rad]
+ASIDE = 0.03
+# largest distance of the projection, relative to the displacement
+FARTHER = 4.0
+# smallest share of arbitrary configurations that the motion leads back onto the manifold
 MOSTLY = 0.9
-# relative: quadratic steps end next to where a sum of distances has its corner
+# relative tolerance of a minimum: quadratic steps end next to a corner of a sum of distances
 FLAT = 0.02
 ROBOTS = ("panda", "xarm7", "gen3", "ur5e")
 
 
 def poses(arm: Arm, q: Array) -> list[ConeOrientedPose]:
-    """Poses that q (nq,) reaches: turned about an axis, within a cone, on the edge of one, of any
-    orientation.
+    """Poses that q (nq,) reaches: turned about an axis, within a cone, on the edge of a cone, of
+    any orientation.
     """
     T, axis = tcp_pose(arm, q), np.array([0.3, -0.2, 1.0])
     pointing = T[:3, :3] @ axis / np.linalg.norm(axis)
@@ -43,10 +46,8 @@ def poses(arm: Arm, q: Array) -> list[ConeOrientedPose]:
     ]
 
 
-def misses(arm: Arm, pose: ConeOrientedPose, q: Array) -> Array:
-    """By how much [m, rad] configurations (n, nq) miss a pose: by the forward kinematics and the
-    arc cosine.
-    """
+def pose_errors(arm: Arm, pose: ConeOrientedPose, q: Array) -> Array:
+    """Pose errors [m, rad] of configurations (n, nq), by forward kinematics and the arc cosine."""
     T = tcp_pose(arm, q)
     cosine = np.einsum("nij,j,i->n", T[:, :3, :3], pose.axis, pose.direction)
     sine = np.linalg.norm(np.cross(T[:, :3, :3] @ pose.axis, pose.direction), axis=1)
@@ -60,21 +61,21 @@ def inner(arm: Arm, rng: np.random.Generator) -> Array:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_what_is_near_the_manifold_is_put_on_it_nearby(name: str) -> None:
-    """Not on another member of the self-motion: a proposal of first order would be lost."""
+def test_configurations_near_the_manifold_are_projected_nearby(name: str) -> None:
+    """A first-order proposal must not be projected onto a distant member of the self-motion."""
     arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(5)
     for q in [inner(arm, rng) for _ in range(5)]:
         for pose in poses(arm, q):
             beside = q + rng.uniform(-ASIDE, ASIDE, (20, len(q)))
             found, reached = GoalManifold.of(arm, pose).put(beside)
             assert reached.mean() > MOSTLY
-            assert misses(arm, pose, found[reached]).max() < REACHED
+            assert pose_errors(arm, pose, found[reached]).max() < REACHED
             assert np.median(np.abs(found - beside).max(axis=1)) < FARTHER * ASIDE
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_what_is_said_to_reach_the_pose_does_within_the_limits(name: str) -> None:
-    """From anywhere, singular configurations and those on limits among them."""
+def test_successful_projections_reach_the_pose_within_the_limits(name: str) -> None:
+    """From arbitrary configurations, including singular ones and those on limits."""
     arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(6)
     limits = arm.active_limits
     anywhere = rng.uniform(limits.q_min, limits.q_max, (40, arm.robot.nq))
@@ -89,12 +90,12 @@ def test_what_is_said_to_reach_the_pose_does_within_the_limits(name: str) -> Non
         ):
             assert np.isfinite(found).all()
             assert (found >= limits.q_min).all() and (found <= limits.q_max).all()
-            assert misses(arm, pose, found[reached]).max(initial=0.0) < REACHED
+            assert pose_errors(arm, pose, found[reached]).max(initial=0.0) < REACHED
 
 
 @pytest.mark.parametrize("name", ["xarm7", "ur5e"])
-def test_the_way_is_shortest_around(name: str) -> None:
-    """No configuration of the manifold beside has a much shorter way."""
+def test_the_distance_is_locally_smallest(name: str) -> None:
+    """No nearby configuration of the manifold is much closer."""
     arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(7)
     weights = arm.friction_law.coulomb
     for pose in poses(arm, inner(arm, rng)):
@@ -110,9 +111,9 @@ def test_the_way_is_shortest_around(name: str) -> None:
             )
 
 
-def test_a_joint_that_may_not_go_on_leaves_the_way_to_the_others() -> None:
-    """A range that ends halfway on a joint's way: it stays on its limit, and the others still come
-    nearer.
+def test_other_joints_take_over_from_a_joint_on_its_limit() -> None:
+    """One joint's range ends halfway: it stays on its limit, and the other joints still
+    approach.
     """
     arm, weights = Arm(robot=load_robot("panda")), np.ones(7)
     q = np.array([0.2, 0.3, -0.1, -1.8, 0.2, 1.9, 0.4])
@@ -130,4 +131,4 @@ def test_a_joint_that_may_not_go_on_leaves_the_way_to_the_others() -> None:
         and found[0, joint] == pytest.approx(ends[side][joint], abs=REACHED)
     )
     assert np.abs(free[0] - to).sum() < np.abs(found[0] - to).sum() < np.abs(q - to).sum()
-    assert misses(arm, pose, found).max() < REACHED
+    assert pose_errors(arm, pose, found).max() < REACHED

@@ -1,5 +1,5 @@
-"""Curves of configurations that hold a pose: what is put on them holds it, within the limits, and
-they bend as told.
+"""Self-motions of a held pose: projected configurations hold it within the limits, and the curves
+bend as computed.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.problem.arm import Arm
 
-# m, rad
+# largest pose error [m, rad]
 HELD = 1e-9
-# relative; of differences with steps of 1e-3
+# relative error of differences with steps of 1e-3
 DIFFERENCES = 1e-2
 
 
 def curve_of(name: str, seed: int) -> tuple[HeldPose, Array]:
-    """The curve through a random configuration in the middle of its joint ranges, and this
+    """Curve through a random configuration in the middle of the joint ranges, and this
     configuration.
     """
     robot = load_robot(name)
@@ -41,7 +41,7 @@ def test_what_is_put_on_the_curve_holds_the_pose(name: str) -> None:
         found = curve.put(away)
         assert found is not None
         assert np.abs(tcp_pose(Arm(robot=load_robot(name)), found) - curve.T).max() < HELD
-        # it goes back across the curve, not along it
+        # The projection returns across the curve, not along it.
         assert np.abs(found - q).max() > 0.5 * np.abs(away - q).max()
 
 

@@ -1,5 +1,5 @@
-"""Inverse kinematics against Pinocchio's forward kinematics, and against solvers that know nothing
-of branches.
+"""Inverse kinematics against Pinocchio's forward kinematics, and against numerical solvers without
+branches.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from tests.optimizer.kinematics.flange import (
 )
 from tests.optimizer.moves import ROBOT
 
-# singular value of the Jacobian (m and rad mixed) that only two singularities at once come below
+# smallest singular value, with metres and radians mixed, below which two singularities coincide
 DOUBLE = 6e-8
 
 angles = st.lists(st.floats(-2 * np.pi, 2 * np.pi), min_size=6, max_size=6).map(np.array)
@@ -55,7 +55,7 @@ def test_configurations_inside_the_limits(count: int) -> None:
         assert (found >= LIMITS.q_min).all()
         assert (found <= LIMITS.q_max).all()
 
-        # answers of one label are one configuration and its full turns, no two of them the same ...
+        # Solutions of one label are distinct full turns of one configuration.
         first = {solution.label: solution for solution in reversed(solutions)}
         turns = (found - np.array([first[solution.label].q for solution in solutions])) / (
             2 * np.pi
@@ -65,7 +65,7 @@ def test_configurations_inside_the_limits(count: int) -> None:
             [[list(first).index(solution.label) for solution in solutions], turns.round()]
         )
         assert len(np.unique(keys, axis=0)) == len(solutions)
-        # ... and those of two labels are different configurations, each of which reaches the pose
+        # Solutions of two labels are different configurations, and each reaches the pose.
         branches = joints(list(first.values()))
         apart = np.abs(np.exp(1j * branches[:, None]) - np.exp(1j * branches[None])).max(axis=2)
         assert (apart + np.eye(len(branches))).min() > FOUND
@@ -78,8 +78,8 @@ def test_near_singular_configurations_are_found_to_the_same_accuracy() -> None:
     for _ in range(500):
         q = rng.uniform(LIMITS.q_min, LIMITS.q_max)
         q[rng.choice([2, 4])] = rng.choice([-1, 1]) * 10 ** rng.uniform(-6, -2)
-        # two singularities at once multiply: a pose rounded to double precision then determines the
-        # joints no better
+        # Two singularities multiply: a pose rounded to double precision then determines the joints
+        # less accurately.
         if np.linalg.svd(jacobian(q), compute_uv=False)[-1] < DOUBLE:
             continue
         assert np.abs(joints(IK.solve(forward(q))) - q).max(axis=1).min() < FOUND
@@ -128,8 +128,8 @@ def test_everyday_posture_has_the_everyday_label() -> None:
 
 
 def test_labels_say_where_the_elbow_and_the_arm_are() -> None:
-    """Of arms that reach well ahead: the elbow's height and the side of the offset, from frames
-    alone.
+    """Height of the elbow and side of the offset, from frames alone, for arms that reach well
+    ahead.
     """
     checked = 0
     for q in np.random.default_rng(3).uniform(-np.pi, np.pi, (500, 6)):
@@ -161,7 +161,7 @@ def test_a_full_turn_keeps_the_label(q: Array, turns: list[int]) -> None:
 @given(q=angles, direction=st.lists(st.floats(-1, 1), min_size=6, max_size=6).map(np.array))
 @settings(max_examples=50, deadline=None)
 def test_label_is_constant_along_a_branch(q: Array, direction: Array) -> None:
-    """Along a path without a singularity the solution next to the last one has its label."""
+    """Along a path without a singularity, adjacent solutions have the same label."""
     path = q + np.linspace(0, 1, 60)[:, None] * direction
     volume = np.array([np.linalg.det(jacobian(point)) for point in path])
     assume(abs(volume).min() > 1e-5 and (np.sign(volume) == np.sign(volume[0])).all())
@@ -172,8 +172,8 @@ def test_label_is_constant_along_a_branch(q: Array, direction: Array) -> None:
             if solution.smallest_singular_value < 0.01:
                 continue
             gaps = [np.abs(np.exp(1j * other.q) - np.exp(1j * solution.q)).max() for other in now]
-            # a nearby one that is another branch would have to cross a singularity within a step of
-            # 1/60 rad
+            # A nearby solution of another branch would have to cross a singularity within a step of
+            # 1/60 rad.
             if min(gaps) < 0.05:
                 assert now[int(np.argmin(gaps))].label == solution.label
 
@@ -199,7 +199,7 @@ def test_windings_are_full_turns_of_the_principal_solutions(q: Array) -> None:
 def test_each_joint_of_two_turns_doubles_the_answers() -> None:
     solutions = IK.solve(forward(EVERYDAY))
     branches = {str(solution.label) for solution in solutions}
-    # the elbow has one turn, the other five joints two
+    # The elbow has one turn, the other five joints two.
     assert len(solutions) == len(branches) * 2**5
 
 

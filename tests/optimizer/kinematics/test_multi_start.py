@@ -1,5 +1,5 @@
-"""Arms without any closed form: many starts find what there is to find, and say that they may have
-missed some.
+"""Arms without a closed form: many starts find the branches, and the result is marked as
+incomplete.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from joulepath import Arm, Pose, Problem, optimize
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.multi_start import MOST_BRANCHES, MultiStart
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.six.multi_start import MULTI_START, MultiStart
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from tests.optimizer.chains import move, serial_chain
 from tests.optimizer.kinematics.six_joints import (
@@ -29,9 +29,9 @@ from tests.optimizer.kinematics.six_joints import (
 from tests.selection import long_but
 
 CHAIN = serial_chain(6)
-# axes turned by up to 17° and moved by up to 0.3 m: nothing is parallel, and nothing meets
+# axes turned by up to 17° and moved by up to 0.3 m: none are parallel, and none meet
 ODD = [calibrated(UR5E, 0.3, seed) for seed in (1, 2, 3)]
-# s: no search comes near it, however busy the machine
+# deadline that no search comes near, however busy the machine [s]
 AMPLE = 300.0
 
 
@@ -45,7 +45,7 @@ def test_the_configuration_is_found(number: int, count: int) -> None:
         found = solved(robot, inside(robot, rng))
         missed += found.away > FOUND
         assert found.error < ACCURACY and not found.twice
-        assert len(found.branches) <= MOST_BRANCHES and len(found.branches) % 2 == 0, (
+        assert len(found.branches) <= MULTI_START.most_branches and len(found.branches) % 2 == 0, (
             "branches come in pairs"
         )
     assert missed <= 0.001 * count
@@ -95,7 +95,7 @@ def test_an_answer_over_branches_that_may_be_missing_is_not_optimal() -> None:
     robot = replace(CHAIN, default_motion=None)
     bound, energy, status, complete = answered(robot, from_pose=False)
     assert status == "feasible" and not complete
-    # the bound holds for every configuration of the goal, and is not that of the candidates
+    # The bound holds for every configuration of the goal, not for the candidates alone.
     assert bound <= energy
 
 

@@ -1,5 +1,5 @@
-"""Poses out of reach, beyond the limits, or reached by singular configurations alone: each reported
-as what it is.
+"""Poses out of reach, beyond the limits, or reached by singular configurations alone: each has its
+own error.
 """
 
 from __future__ import annotations
@@ -13,10 +13,8 @@ from scipy.optimize import minimize
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
-from joulepath.optimizer.kinematics.inverse import (
-    ClosedFormInverseKinematics,
-    required_inverse_kinematics,
-)
+from joulepath.optimizer.kinematics.confirmed_inverse import ConfirmedInverseKinematics
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.problem.branches import Label
 from tests.optimizer.kinematics.flange import (
@@ -35,7 +33,7 @@ from tests.optimizer.kinematics.flange import (
 )
 from tests.optimizer.moves import ROBOT
 
-# the search that judges the distance to reach converges to this [m]
+# accuracy of the numerical search for the distance to reach [m]
 SEARCH = 1e-5
 
 
@@ -72,8 +70,8 @@ def test_distance_from_the_first_axis_is_the_shoulders_offset() -> None:
 
 
 def nearest_by_search(T: Array) -> float:
-    """Least distance from T's position among configurations with T's orientation, from many random
-    starts.
+    """Smallest distance from the position of T among configurations with its orientation, from many
+    random starts.
     """
 
     def turn(q: Array) -> Array:
@@ -113,7 +111,8 @@ def test_any_finite_pose_is_answered(far: float) -> None:
 
 def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
     """Links of equal length put the fourth axis on the second: the arm turns about it, at every
-    q2."""
+    q2.
+    """
     model = ROBOT.model.copy()
     model.jointPlacements[4].translation = np.array([-0.425, 0.0, 0.1333])
     kinematics = required_inverse_kinematics(replace(ROBOT, model=model), "goal")
@@ -121,14 +120,14 @@ def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
     for q in np.random.default_rng(6).uniform(-3, 3, (50, 6)):
         q[2] = np.pi
         pin.framesForwardKinematics(model, data, q)
-        # those with the other wrist or shoulder are
+        # Configurations with the other wrist or shoulder are isolated.
         found = joints(kinematics.solve(np.array(data.oMf[FLANGE].homogeneous)))
         assert (np.abs(np.sin(found[:, 2])) > FOUND).all()
 
 
 class NothingKnown:
-    """A closed form that finds nothing of a pose within reach, like one that does not know its
-    self-motion.
+    """Pose solver without a solution of a reachable pose, as if its self-motion were of unknown
+    form.
     """
 
     confirmed = False
@@ -151,5 +150,5 @@ class NothingKnown:
 
 def test_a_self_motion_of_unknown_form_is_a_singular_pose() -> None:
     with pytest.raises(SingularPose) as caught:
-        ClosedFormInverseKinematics(ROBOT, NothingKnown()).solve(forward(EVERYDAY), target="start")
+        ConfirmedInverseKinematics(ROBOT, NothingKnown()).solve(forward(EVERYDAY), target="start")
     assert (caught.value.target, caught.value.smallest_singular_value) == ("start", 0.0)

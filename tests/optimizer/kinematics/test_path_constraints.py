@@ -1,4 +1,4 @@
-"""Limits along the path: against Pinocchio, and their gradients against finite differences."""
+"""Path constraints against Pinocchio, and their gradients against finite differences."""
 
 import numpy as np
 import pinocchio as pin
@@ -15,15 +15,18 @@ from joulepath.optimizer.kinematics.path_constraints import (
 
 ROBOT = load_robot("ur5e")
 PLACEMENTS = joint_placements(ROBOT.model)
-AXIS, DIRECTION = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.28, -0.96])
+AXIS = np.array([0.6, 0.0, 0.8])
+DIRECTION = np.array([0.0, 0.28, -0.96])
 POINTS = np.array([[0.05, -0.02, 0.2], [0.0, 0.1, 0.0]])
 LIMITS = {
     "cone": ToolConeConstraint(AXIS, DIRECTION, 0.7),
     "tcp": PointSpeedConstraint("tcp_speed", 6, POINTS, 1.5),
     "elbow": PointSpeedConstraint("elbow_speed", 2, np.array([[-0.425, 0.0, 0.13]]), 0.8),
 }
-# central differences of step 1e-6 on values of order one: rounding 1e-10, truncation less
-STEP, GRADIENT_TOLERANCE = 1e-6, 1e-8
+# step of central differences on values of order one
+STEP = 1e-6
+# their error: rounding 1e-10, smaller truncation
+GRADIENT_TOLERANCE = 1e-8
 KINEMATICS_TOLERANCE = 1e-12
 
 
@@ -73,6 +76,6 @@ def test_a_tool_along_the_cones_axis_uses_nothing_of_it() -> None:
     )
     q = np.array([[0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]])
     found = path.linearised(q, np.zeros((1, 6)))
-    # the sum of rounding of six turns
+    # accumulated rounding of six turns
     assert found.value[0, 0] < 1e-6
     assert np.isfinite(found.by_q).all()

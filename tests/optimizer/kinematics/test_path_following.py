@@ -1,5 +1,6 @@
-"""Configurations along a path of the TCP until the deadline: what was found before it is not
-lost."""
+"""Configurations along a path of the TCP until the deadline, which keeps the points found
+before.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +18,13 @@ from tests.optimizer.moves import START
 
 ARM = Arm(robot=load_robot("ur5e"))
 HERE = tcp_pose(ARM, START)[:3, 3]
-# a line of 9 cm, the third point of which is 9 m away
+# a line of 9 cm with its third point 9 m away
 LINE = HERE + np.linspace(0, 0.09, 10)[:, None] * np.array([0.0, 0.0, -1.0])
 LINE[2] += 9.0
 
 
 def followed(seconds: float) -> list[PathPoint]:
-    """What is found if every look at the clock takes a second."""
+    """Result if every reading of the clock takes a second."""
     return follow(ARM, LINE, START, deadline=Deadline.after(seconds, CountingClock()))
 
 
@@ -38,7 +39,7 @@ def test_what_was_found_before_the_deadline_is_kept() -> None:
         np.testing.assert_array_equal(one.q, other.q)
     for wanted, point in zip(LINE[5:], cut[5:], strict=True):
         assert not point.reached and not point.written
-        # where the search would have begun, with the errors that it has there
+        # The start of the search that was not made, with its errors.
         np.testing.assert_array_equal(point.q, cut[4].q)
         distance = np.linalg.norm(tcp_pose(ARM, point.q)[:3, 3] - wanted)
         assert point.position_error == pytest.approx(distance, abs=1e-12)

@@ -1,4 +1,4 @@
-"""Boxes of joint positions that are narrowed to what reaches a pose: nothing that does is lost."""
+"""Boxes of joint positions narrowed to a pose: no configuration that reaches it is lost."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem
 from tests.selection import long_but
 
 TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.9), np.array([0.03, -0.02, 0.15])).homogeneous
-# that joint positions may lie outside a box [rad]: angles are rounded, not bounds
+# largest angle of a configuration outside its box: angles are rounded, not bounded [rad]
 ROUNDING = 1e-12
 ARMS: dict[str, Arm] = {
     "bare": Arm(robot=ROBOT),
@@ -37,7 +37,7 @@ ARMS: dict[str, Arm] = {
 def reached(
     rng: np.random.Generator, arm: Arm, half_angle: float
 ) -> tuple[Array, ConeOrientedPose]:
-    """A configuration, and a pose that it reaches: often right at the edge of its cone."""
+    """Configuration, and a pose that it reaches, often at the edge of its cone."""
     q = rng.uniform(-np.pi, np.pi, arm.robot.nq)
     q[rng.random(len(q)) < 0.2] = 0.0  # stretched and aligned, as singular ones are
     T = tcp_pose(arm, q)
@@ -49,7 +49,7 @@ def reached(
 
 
 def boxes_around(rng: np.random.Generator, q: Array, count: int) -> tuple[Array, Array]:
-    """Random boxes that hold q, from narrow ones to the whole range: some with q in a corner."""
+    """Random boxes that hold q, from narrow ones to the whole range, some with q in a corner."""
     half = np.minimum(10 ** rng.uniform(-4, 0.6, (count, len(q))), np.pi)
     within = np.where(
         rng.random(half.shape) < 0.2,
@@ -60,12 +60,12 @@ def boxes_around(rng: np.random.Generator, q: Array, count: int) -> tuple[Array,
 
 
 def lost(q: Array, centre: Array, half: Array, held: Array) -> Array:
-    """Which boxes (b,) do not hold q, full turns left out."""
+    """Mask (b,) of the boxes that do not hold q, up to full turns."""
     return np.asarray(~(held & (np.abs(wrapped(q - centre)) <= half + ROUNDING).all(axis=1)))
 
 
 def wrist_boxes(arm: Arm, pose: ConeOrientedPose) -> WristBoxes:
-    """The wrist's boxes of an arm of four joints or more."""
+    """Wrist boxes of an arm with at least four joints."""
     geometry = WristGeometry.of(arm)
     assert geometry is not None
     return WristBoxes(geometry, pose)
@@ -75,7 +75,7 @@ def wrist_boxes(arm: Arm, pose: ConeOrientedPose) -> WristBoxes:
 @pytest.mark.parametrize("kind", [PoseBoxes, wrist_boxes])
 @pytest.mark.parametrize("half_angle", [0.0, 0.02, 0.3, 1.6, np.pi])
 @pytest.mark.parametrize("name", ARMS)
-def test_what_reaches_the_pose_stays_in_its_box(
+def test_configurations_of_the_pose_stay_in_their_box(
     name: str, half_angle: float, kind: Any, count: int
 ) -> None:
     rng = np.random.default_rng(7)
@@ -83,7 +83,7 @@ def test_what_reaches_the_pose_stays_in_its_box(
         q, pose = reached(rng, ARMS[name], half_angle)
         centre, half = boxes_around(rng, q, 64)
         if kind is wrist_boxes:
-            # the second joint of a wrist is never wider than half a turn
+            # The second joint of a wrist is never wider than half a turn.
             half[:, -2] = np.minimum(half[:, -2], np.pi / 2)
             centre[:, -2] = q[-2] + np.clip(centre[:, -2] - q[-2], -half[:, -2], half[:, -2])
         assert not lost(q, *kind(ARMS[name], pose).narrowed(centre, half)).any()
@@ -92,8 +92,8 @@ def test_what_reaches_the_pose_stays_in_its_box(
         assert not lost(q, *kind(ARMS[name], pose).narrowed(narrow, sides)).any()
 
 
-def test_small_boxes_shrink_onto_what_reaches_the_pose() -> None:
-    """About an axis through the TCP one angle is free: with it known, narrowing determines the
+def test_small_boxes_shrink_onto_the_configurations_of_the_pose() -> None:
+    """One angle is free about an axis through the TCP: if it is known, narrowing determines the
     other joints.
     """
     rng, arm = np.random.default_rng(3), Arm(robot=ROBOT)
@@ -136,7 +136,7 @@ def test_no_configuration_in_a_box_has_less_potential_energy(name: str) -> None:
         within = rng.choice([-1.0, 1.0, 0.3], centre.shape)
         potential = np.array([made.potential(q) for q in centre + half * within])
         assert (potential >= least - 1e-9).all()
-    # a point's own potential energy is its bound
+    # The bound of a point is its potential energy.
     assert boxes.least_potential(centre, np.zeros_like(centre)) == pytest.approx(
         np.array([made.potential(q) for q in centre]), abs=1e-9
     )

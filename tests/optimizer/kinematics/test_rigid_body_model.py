@@ -1,4 +1,4 @@
-"""Models that are kept: every arm has its own, however many there are."""
+"""Recently used models: each arm has its own, however many arms there are."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ BARE = sum(body.mass for body in ROBOT.model.inertias)
 
 
 def added_mass(payload: float) -> float:
-    """What a new arm's model weighs more than the robot [kg]. The arm is gone afterwards: its id
-    may be another's.
+    """Mass [kg] of a new arm's model beyond the robot's.
+
+    The arm is deleted afterwards, and its id may be reused.
     """
     model = rigid_body_model(Arm(robot=ROBOT, payload=Payload(mass=payload, com=np.zeros(3))))
     return sum(body.mass for body in model.inertias) - BARE

@@ -8,7 +8,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.self_motion import FAR_APART, SelfMotion, spread, without_gaps
+from joulepath.optimizer.kinematics.self_motion import SELF_MOTION, SelfMotion, spread, without_gaps
 
 # one turn of the first joint while the second stays within 0.003 rad of the stretched shoulder
 NEAR_SINGULAR = [0.57244, 0.00264, -2.87612, -1.45547, -0.40888, 2.9146, 0.92274]
@@ -16,9 +16,7 @@ COUNT = 24
 
 
 class Corner:
-    """A curve whose joints stand still but for a step of 3 rad within a thousandth of the
-    parameter.
-    """
+    """Curve whose joints rest except for a step of 3 rad within a thousandth of the parameter."""
 
     label, free, arcs = None, (0,), [(0.0, 1.0)]
 
@@ -31,16 +29,16 @@ def test_members_follow_a_redundant_arm_past_a_singularity() -> None:
     T = flange(robot, np.array(NEAR_SINGULAR))
     ends = required_inverse_kinematics(robot, "goal").solve(T, members=COUNT)
     nearest = min(float(np.abs(wrapped(each.q - NEAR_SINGULAR)).max()) for each in ends)
-    assert nearest < FAR_APART
+    assert nearest < SELF_MOTION.largest_gap
 
 
 def test_evenly_spread_members_are_left_as_they_are() -> None:
     robot = load_robot("fr3")
     T = flange(robot, np.array([0.3, -0.8, 0.4, -1.9, 0.5, 1.7, 0.2]))
-    for motion in required_inverse_kinematics(robot, "goal")._form.self_motions(T, robot.limits):  # type: ignore[attr-defined]
+    for motion in required_inverse_kinematics(robot, "goal")._solver.self_motions(T, robot.limits):  # type: ignore[attr-defined]
         u = spread(motion, COUNT)
         q = motion.at(u)
-        if np.abs(wrapped(np.diff(q, axis=0))).max() < FAR_APART:
+        if np.abs(wrapped(np.diff(q, axis=0))).max() < SELF_MOTION.largest_gap:
             np.testing.assert_array_equal(without_gaps(motion, u, q), q)
 
 

@@ -1,5 +1,5 @@
-"""Singular poses: an edge of elbow or shoulder is a solution like any other, a stretched wrist has
-a curve of them.
+"""Singular poses: an edge of elbow or shoulder is an ordinary solution, a stretched wrist has a
+self-motion.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.confirmed_inverse import INVERSE
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
-from joulepath.optimizer.kinematics.inverse import MEMBERS
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
-from joulepath.optimizer.kinematics.six.ur_closed_form import LEAST_AHEAD, URClosedForm
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.six.ur_geometry import UR
 from joulepath.optimizer.problem.branches import BranchFilter
 from tests.optimizer.kinematics.flange import (
     ACCURACY,
@@ -30,8 +31,8 @@ from tests.optimizer.kinematics.flange import (
 )
 from tests.optimizer.moves import ROBOT
 
-# next to an edge of the reach, a rounding of the pose by 1e-16 m moves elbow and shoulder by its
-# square root [rad]
+# joint error at an edge of the workspace, the square root of a rounding of the pose by 1e-16 m
+# [rad]
 FOUND_ON_AN_EDGE = 2e-6
 FORM = URClosedForm.of(ROBOT.model) or pytest.fail("the robot has a closed form")
 
@@ -39,19 +40,14 @@ angles = st.lists(st.floats(-3.1, 3.1), min_size=6, max_size=6).map(np.array)
 
 
 def self_motions(solutions: list[LimitedSolution]) -> list[SelfMotion]:
-    """Every self-motion among the solutions, once."""
-    return list(
-        {
-            id(each.self_motion): each.self_motion
-            for each in solutions
-            if each.self_motion is not None
-        }.values()
-    )
+    """Distinct self-motions of the solutions."""
+    motions = (each.self_motion for each in solutions if each.self_motion is not None)
+    return list(dict.fromkeys(motions))
 
 
 def apart(a: Array, b: Array) -> Array:
-    """Greatest difference (n,) of joints between configurations (n, nq) or (nq,), full turns left
-    out [rad].
+    """Largest joint difference (n,) [rad] between configurations (n, nq) or (nq,), up to full
+    turns.
     """
     return np.asarray(np.abs(np.exp(1j * a) - np.exp(1j * b)).max(axis=-1))
 
@@ -67,9 +63,9 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
     nearest = min(solutions, key=lambda each: float(apart(each.q, q)))
     if abs(np.sin(q[4])) < 1e-4:
         return  # wrist and elbow at once: the tests of self-motions
-    # next to a stretched wrist, or a singular shoulder, the same rounding turns the fifth axis the
-    # more
-    ahead = min(1.0, max(abs(FORM._ahead(q)), LEAST_AHEAD))
+    # Next to a stretched wrist or a singular shoulder, the same rounding turns the fifth axis
+    # further.
+    ahead = min(1.0, max(abs(FORM.ahead(q)), UR.least_ahead))
     assert apart(nearest.q, q) < max(FOUND_ON_AN_EDGE, 5e-7 / np.sqrt(abs(np.sin(q[4])) * ahead))
     assert "elbow" in nearest.singular
     assert nearest.self_motion is None
@@ -78,23 +74,23 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
 
 
 def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
-    """A stretched elbow, and shoulder and wrist next to their singularities: rounding carries the
-    arm out of reach.
+    """Stretched elbow, nearly singular shoulder and wrist: rounding carries the arm out of
+    reach.
     """
     rng, answered = np.random.default_rng(0), 0
     while answered < 150:
         q = rng.uniform(-2 * np.pi, 2 * np.pi, 6)
         q[2], q[4] = rng.choice([0, np.pi, -np.pi]), 10 ** rng.uniform(-4, -1) * rng.choice([-1, 1])
-        # lift angles at which the last axis meets the first one, to within a micrometre and a
-        # decimetre
+        # Lift angles at which the last axis is between a micrometre and a decimetre from the first
+        # one.
         lifts = np.linspace(-3, 3, 41)
-        ahead = [FORM._ahead(np.array([q[0], lift, *q[2:]])) for lift in lifts]
+        ahead = [FORM.ahead(np.array([q[0], lift, *q[2:]])) for lift in lifts]
         crossings = [k for k in range(40) if ahead[k] * ahead[k + 1] < 0]
         if not crossings:
             continue
         k = crossings[0]
         root = brentq(
-            lambda lift, q=q: FORM._ahead(np.array([q[0], lift, *q[2:]])), lifts[k], lifts[k + 1]
+            lambda lift, q=q: FORM.ahead(np.array([q[0], lift, *q[2:]])), lifts[k], lifts[k + 1]
         )
         q[1] = root + 10 ** rng.uniform(-6, -1) * rng.choice([-1, 1])
         T = forward(q)
@@ -105,7 +101,7 @@ def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
 
 
 def test_an_edge_of_the_elbow_next_to_a_stretched_wrist_is_in_reach() -> None:
-    """The rounding of such a pose turns the fifth axis, and would carry the fourth out of the
+    """The rounding of such a pose turns the fifth axis, and might carry the fourth out of the
     elbow's reach.
     """
     rng = np.random.default_rng(1)
@@ -129,7 +125,7 @@ def test_on_an_edge_the_branches_that_meet_count_once() -> None:
 
 
 def test_rounding_does_not_hide_an_edge() -> None:
-    """A stretched elbow, and a tool's transform there and back, which moves the pose by its last
+    """Stretched elbow, with a tool's transform and its inverse changing the pose by the last
     digit.
     """
     rng = np.random.default_rng(5)
@@ -140,11 +136,11 @@ def test_rounding_does_not_hide_an_edge() -> None:
 
 
 def test_a_singular_shoulder_is_a_solution_like_any_other() -> None:
-    """The last axis right beside the first: both shoulders are one."""
+    """With the last axis beside the first, both shoulders are one."""
     rng = np.random.default_rng(8)
     for q in rng.uniform(-3, 3, (200, 6)):
-        # the last axis' origin level with the first axis: a2 c2 + a3 c23 + d5 s234 = 0, solved for
-        # q4
+        # The last axis' origin is level with the first axis: a2 c2 + a3 c23 + d5 s234 = 0, solved
+        # for q4.
         ahead = -0.425 * np.cos(q[1]) - 0.3922 * np.cos(q[1] + q[2])
         if abs(ahead) > 0.0997:
             continue
@@ -165,14 +161,14 @@ def test_a_stretched_wrist_holds_its_pose_on_a_curve(q: Array, wrist: float) -> 
     assert curves
     for motion in curves:
         own = [each for each in solutions if each.self_motion is motion]
-        # where the curves of both elbows meet, they share a member
-        assert len(own) >= MEMBERS - 2
+        # Curves of both elbows share a member at their meeting point.
+        assert len(own) >= INVERSE.members - 2
         for each in own:
             assert max(errors(T, each.q)) < ACCURACY
             assert "wrist" in each.singular
         moved = np.ptp(motion.at(np.linspace(*motion.arcs[0], 9)), axis=0)
         assert set(np.flatnonzero(moved > ROUNDING)) <= set(motion.free)
-    # the configuration that the pose is of lies on one of the curves
+    # The configuration of the pose lies on one of the curves.
     members = [motion.at(np.array([motion.parameter(q)]))[0] for motion in curves]
     assert min(float(apart(member, q)) for member in members) < FOUND
 
@@ -185,8 +181,8 @@ def test_on_a_self_motion_the_jacobian_loses_a_rank() -> None:
         for parameter in np.linspace(lower, upper, 7)[1:-1]:
             before, here, after = motion.at(parameter + np.array([-1e-6, 0.0, 1e-6]))
             tangent = after - before
-            # full turns left out; central differences are exact to their step squared, and to
-            # rounding over the step
+            # Without full turns; the error of central differences is the squared step, plus
+            # rounding over the step.
             tangent -= 2 * np.pi * np.round(tangent / (2 * np.pi))
             assert np.abs(jacobian(here) @ tangent).max() < 1e-6 * np.abs(tangent).max()
 
@@ -215,8 +211,8 @@ def test_boxes_hold_every_member_of_their_cell(q: Array, seed: int) -> None:
 def test_upright_all_singularities_meet_in_one_configuration() -> None:
     home = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
     solutions = IK.solve(forward(home), windings=False)
-    # the wrist's self-motion has shrunk to a point, as the arm can reach no farther; rounding
-    # leaves 1e-5 rad of it
+    # The wrist's self-motion has shrunk to a point, because the arm can reach no farther; rounding
+    # leaves 1e-5 rad of it.
     assert apart(joints(solutions), home).max() < 1e-4
     for each in solutions:
         assert set(each.singular) == {"shoulder", "elbow", "wrist"}
@@ -225,7 +221,7 @@ def test_upright_all_singularities_meet_in_one_configuration() -> None:
 
 
 def test_the_curve_and_the_isolated_solutions_beside_it_agree() -> None:
-    """Just beyond the tolerance a pose has two isolated solutions; both lie next to the curve."""
+    """Just beyond the tolerance a pose has two isolated solutions, both next to the curve."""
     for bend in (1e-9, 1e-8, 1e-6):
         q = np.array([0.4, -1.3, 1.5, 0.5, bend, 0.3])
         solutions = IK.solve(forward(q), windings=False)
@@ -255,5 +251,5 @@ def test_members_are_evenly_spread(members: int) -> None:
         length = sum(upper - lower for lower, upper in motion.arcs)
         sixth = np.sort(own[:, 5] % (2 * np.pi))
         assert len(own) >= members
-        # by at most an even step, except where the curve has a gap
+        # The largest step is even, except at gaps of the curve.
         assert np.diff(sixth).max() <= length / members + (2 * np.pi - length) + FOUND

@@ -1,5 +1,4 @@
-"""An arm with a spherical wrist: every configuration is found, next to each singularity and on
-it."""
+"""Arm with a spherical wrist: every configuration is found, next to each singularity and on it."""
 
 from __future__ import annotations
 
@@ -26,23 +25,23 @@ IK = required_inverse_kinematics(KUKA, "goal")
 WRIST = SphericalWrist.of(JointAxes.of(Chain.of(KUKA.model))) or pytest.fail(
     "the arm has a spherical wrist"
 )
-# a pose rounded by 1e-16 moves a configuration by this over the smallest singular value; the
-# product of seven rounded matrices makes some more of it
+# joint error of a pose rounded by 1e-16, times the smallest singular value; larger for the product
+# of seven rounded matrices
 ROUNDING = 4e-15
-# distance from a fold [rad] within which both branches count as one
+# distance from a fold within which both branches count as one [rad]
 ON_A_FOLD = 5e-7
 
 
 def stretched() -> float:
-    """The third joint's position [rad] with the elbow stretched."""
+    """Third joint position [rad] with a stretched elbow."""
     return float(
         brentq(lambda q3: WRIST.measures(np.array([0, 0, q3, 0, 0, 0]))[1], -0.3, 0.3, xtol=1e-16)
     )
 
 
 def overhead(q: Array) -> Array:
-    """The configuration with the second joint moved until the wrist is on the first axis, if it can
-    be.
+    """Configuration with the second joint moved until the wrist is on the first axis, if
+    possible.
     """
     angles = np.linspace(-np.pi, np.pi, 60)
     ahead = [WRIST.measures(np.array([0, angle, q[2], 0, 0, 0]))[0] for angle in angles]
@@ -69,10 +68,10 @@ def test_every_configuration_is_found_once(count: int) -> None:
 
 
 @pytest.mark.parametrize("off", [1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1.0])
-def test_far_from_singularities_the_short_way_finds_the_same(
+def test_regular_poses_have_the_same_solutions_by_the_general_method(
     off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So far from one of them, too: where the short way begins, and on both sides of that."""
+    """On both sides of the threshold between the regular solution and the general one."""
     rng, folded = np.random.default_rng(8), stretched()
     starts = [inside(KUKA, rng) for _ in range(30)]
     for k, q in enumerate(starts):
@@ -88,7 +87,7 @@ def test_far_from_singularities_the_short_way_finds_the_same(
     for T, (q, labels) in zip(poses, short, strict=True):
         q_long, labels_long = form.solve(T)
         assert labels == labels_long
-        # rounding over the smallest singular value, which is some tenth of the distance
+        # Rounding over the smallest singular value, about a tenth of the distance.
         assert np.abs(wrapped(q - q_long)).max() < 1e-13 + 1e-11 * 1e-3 / off
 
 
@@ -139,7 +138,7 @@ def test_the_boxes_of_a_self_motion_hold_it() -> None:
     centre, sides = motion.boxes(parameter, half)
     members = motion.at(np.clip(wrapped(parameter + rng.uniform(-1, 1, 200) * half), -np.pi, np.pi))
     assert (np.abs(wrapped(members - centre)) <= sides + 1e-12).all()
-    # and no larger than they have to be
+    # The boxes are no larger than necessary.
     assert np.abs(sides.max(axis=1) - half).max() < 1e-12
 
 
@@ -152,8 +151,8 @@ def test_next_to_a_stretched_elbow(off: float) -> None:
         found = solved(KUKA, q)
         assert found.away < FOUND and found.error < ACCURACY and not found.twice
         here = [each for each in found.branches if abs(each.q[2] - edge) < 2 * off + 1e-6]
-        # half the branches meet: two wrists of one or two shoulders are left, or twice as many next
-        # to the edge
+        # Half of the branches meet: two wrists of one or two shoulders remain, or twice as many
+        # next to the edge.
         assert len(here) in ((2, 4) if off < ON_A_FOLD else (4, 8))
 
 
@@ -168,7 +167,7 @@ def test_next_to_the_first_axis(off: float) -> None:
 
 
 def test_a_wrist_on_the_first_axis_is_refused() -> None:
-    """The first axis turns and the wrist turns back: a curve that is not known here."""
+    """The first axis turns and the wrist compensates: a self-motion of unknown form."""
     rng = np.random.default_rng(16)
     for _ in range(20):
         with pytest.raises(SingularPose, match="start"):
@@ -176,7 +175,7 @@ def test_a_wrist_on_the_first_axis_is_refused() -> None:
 
 
 def test_a_label_changes_only_across_its_singularity() -> None:
-    """Along random paths; where the shoulder changes, so does the elbow."""
+    """Along random paths; a change of the shoulder changes the elbow, too."""
     rng = np.random.default_rng(17)
     changes = 0
     for _ in range(100):
@@ -195,16 +194,14 @@ def test_a_label_changes_only_across_its_singularity() -> None:
 
 
 def test_parts_of_the_label_are_where_the_jacobian_is_singular() -> None:
-    """The determinant of a decoupled arm is the product of what the parts measure, times a
-    constant.
-    """
+    """The determinant of a decoupled arm is a constant times the product of the three measures."""
     rng, ratios = np.random.default_rng(18), []
     model, data = KUKA.model, KUKA.model.createData()
     for _ in range(50):
         q = inside(KUKA, rng)
         J = pin.computeFrameJacobian(model, data, q, model.getFrameId("flange"))
         ratios.append(abs(np.linalg.det(J) / np.prod(WRIST.measures(q))))
-    # relative rounding of the determinant of a matrix of condition up to 1e5
+    # relative rounding of a determinant with a condition number up to 1e5
     assert np.ptp(ratios) < 1e-9 * np.mean(ratios)
 
 
@@ -221,8 +218,8 @@ def test_the_everyday_posture_has_the_everyday_names() -> None:
 
 
 def test_the_distance_out_of_reach_is_that_of_the_wrist() -> None:
-    """Towards the second axis, by less than it the pose is still out of reach, by more it is
-    reached.
+    """Shifted towards the second axis by less than the distance, the pose is out of reach; by more,
+    it is reached.
     """
     T = np.eye(4)
     for position in ([1.6, 0.3, 0.5], [0.2, 0.1, 2.0], [-0.7, 0.9, -0.6]):
@@ -244,12 +241,10 @@ def test_the_distance_out_of_reach_is_that_of_the_wrist() -> None:
 
 @pytest.mark.parametrize("off", [1e-5, 1e-4])
 @pytest.mark.parametrize("other", ["elbow", "shoulder"])
-def test_next_to_two_singularities_only_the_rounding_of_the_pose_is_missed(
+def test_next_to_two_singularities_solutions_are_as_accurate_as_the_pose(
     other: str, off: float
 ) -> None:
-    """With the wrist nearly aligned, too, a configuration is found as well as a pose in double
-    precision tells it.
-    """
+    """A nearly aligned wrist, too, is as accurate as a pose in double precision allows."""
     rng, edge = np.random.default_rng(19), stretched()
     for _ in range(20):
         q = inside(KUKA, rng)
@@ -270,7 +265,7 @@ def test_next_to_two_singularities_only_the_rounding_of_the_pose_is_missed(
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-7, 1e-6])
 @pytest.mark.parametrize("parts", ["elbow wrist", "shoulder wrist", "elbow shoulder"])
 def test_on_two_singularities_at_once_no_branch_is_lost_in_silence(parts: str, off: float) -> None:
-    """The formulas for each alone lose branches there."""
+    """The formulas for a single singularity lose branches there."""
     rng = np.random.default_rng(8)
     for _ in range(10):
         q = inside(KUKA, rng)

@@ -22,10 +22,12 @@ T_FLANGE_TCP = pin.SE3(
     pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.02, -0.05, 0.18])
 ).homogeneous
 ARM = Arm(robot=moves.ROBOT, T_flange_tcp=T_FLANGE_TCP)
-# double precision over a product of eight matrices of entries about 1
+# rounding of a product of eight matrices with entries of about 1
 ROUNDING = 1e-14
-# central differences of step 1e-6 on values of order one: rounding 1e-10, truncation less
-STEP, GRADIENT_TOLERANCE = 1e-6, 1e-8
+# step of central differences on values of order one
+STEP = 1e-6
+# their error: rounding 1e-10, smaller truncation
+GRADIENT_TOLERANCE = 1e-8
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +81,6 @@ def test_rotated_poses_keep_the_tcp_in_place(configurations: Array) -> None:
         rotvecs, rotated_poses(ARM, configurations[0], rotvecs), strict=True
     ):
         assert (position == T[:3, 3]).all()
-        # the rotation is about the TCP's own axes
+        # The rotation is about the TCP's own axes.
         expected = T[:3, :3] @ pin.exp3(rotvec)
         assert np.abs(Rotation.from_quat(quaternion).as_matrix() - expected).max() < ROUNDING

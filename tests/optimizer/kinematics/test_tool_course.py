@@ -1,4 +1,4 @@
-"""How far a motion is from the course of a tool path: nothing of the course can be left out."""
+"""Deviation of a motion from the course of a tool path: no part of the course can be omitted."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def test_the_certificate_refuses_what_leaves_the_path() -> None:
 
 
 def test_the_certificate_refuses_a_short_cut_of_a_loop() -> None:
-    """Out and back on nearly the same line: who stays at the start is on the path all the time, and
-    does not go it.
+    """Out and back on nearly the same line: a motion that rests at the start is on the path all the
+    time, but does not follow it.
     """
     out, back = moved([0.0, 0.2, 0.0]), moved([0.0, 0.0, 0.001])
     course = ToolCourse.of(ToolPath(via=[out], blend=0.02), tcp_pose(HOME).T, back.T)
@@ -67,7 +67,7 @@ def test_an_excursion_of_the_path_cannot_be_left_out() -> None:
 
 
 def test_a_course_that_turns_back_between_two_of_its_points_is_compared() -> None:
-    """Two points of the course's grid are the same then."""
+    """Two points of the course's grid then coincide."""
     out = 0.1
     for cell in range(50, 150, 10):
         back = out * (200 / (cell + 0.5) - 1)

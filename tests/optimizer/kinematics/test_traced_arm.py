@@ -1,5 +1,4 @@
-"""Seven-joint arms without a closed form: curves that are followed point by point, against
-Pinocchio and the closed form of another arm."""
+"""Seven-joint arms without a closed form: traced curves, against Pinocchio and a closed form."""
 
 from __future__ import annotations
 
@@ -9,36 +8,29 @@ import numpy as np
 import pytest
 
 from joulepath import Arm, Pose, Problem, optimize
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.chain import Chain, miss, pose_error
+from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.kinematics.newton import solved
-from joulepath.optimizer.kinematics.seven.curve_tracing import cycles, traced
+from joulepath.optimizer.kinematics.seven.curve_tracing import cycles, trace
 from joulepath.optimizer.kinematics.seven.hermite import hermite_weights
-from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
-from joulepath.optimizer.kinematics.seven.nearby_loops import LONG, SHORT, followed
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
 from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
-from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
-from joulepath.optimizer.problem.branches import NumberedBranch
-from tests.optimizer.chains import move, serial_chain
+from tests.optimizer.chains import move
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, inside
+from tests.optimizer.kinematics.traced import CHAIN, GEN3, PANDA, away
 from tests.selection import long_but
 
-GEN3, CHAIN, PANDA = load_robot("gen3"), serial_chain(7), load_robot("panda")
-# rad: a parameter's derivative against a difference, and how far apart members of the least step
-# are at most
+# largest distance of members with nearly equal parameters, and beyond limits [rad]
 LIMIT = 1e-8
-# rad: of points on cubics
+# rounding of points on cubics [rad]
 ROUNDING = 1e-13
-# share of the members of a closed form that are on the curves found: of a pose next to a
-# singularity some are not
+# smallest share of the members of a closed form on the curves found; some of a pose next to a
+# singularity are missed
 COVERED = 0.99
-# configurations [rad] next to which the curve of their pose bends by a right angle
+# configurations at which the curve of their pose bends by a right angle [rad]
 BENT_CURVES = (
     np.array(
         [
@@ -63,11 +55,8 @@ BENT_CURVES = (
         ]
     ),
 )
-# configuration [rad] of an arm stretched further than the one nearby reaches: 0.35 mm lie between
-# their axes
-STRETCHED = np.array([-5.237985, 0.035838, 1.066330, -0.002736, -4.184650, -1.781755, -3.956364])
-# configuration [rad] on a curve that passes another one so near that both are followed as one:
-# found a step beside
+# configuration on a curve so near to another one that both are traced as one; found a step beside
+# [rad]
 MISSED = np.array(
     [
         1.7421639313669246,
@@ -79,9 +68,7 @@ MISSED = np.array(
         4.203107568439206,
     ]
 )
-# least share of poses all of whose curves are found without being followed step by step
-AT_ONCE = 0.9
-# s: no search comes near it, however busy the machine
+# deadline that no search comes near, however busy the machine [s]
 AMPLE = 300.0
 
 
@@ -95,11 +82,6 @@ def arm(robot: Robot) -> TracedArm:
     found = TracedArm.of(robot.model)
     assert found is not None and RedundantArm.of(robot.model) is None
     return found
-
-
-def away(curve: TracedCurve, q: Array) -> float:
-    """How far [rad] q (7,) is from a curve."""
-    return float(np.abs(wrapped(curve.at(np.array([curve.parameter(q)]))[0] - q)).max())
 
 
 @pytest.mark.parametrize("count", long_but((12,), (12, 10_000)))
@@ -137,83 +119,27 @@ def test_a_configuration_on_a_limit_is_on_an_arc(robot: Robot, arm: TracedArm) -
         assert min(away(each, q) for each in arm.self_motions(flange(robot, q), limits)) < FOUND
 
 
-def test_the_curves_of_the_arm_nearby_are_near_those_of_the_arm() -> None:
-    """From its flange on, the Gen3 is of the form with a spherical shoulder but for 0.35 mm; a
-    calibrated Panda is.
-    """
-    rng, panda = np.random.default_rng(57), PANDA.model.copy()
-    panda.jointPlacements[6].translation += np.array([1e-4, 2e-4, -1e-4])
-    for model, mirrored in ((GEN3.model, True), (panda, False)):
-        chain = Chain.of(model)
-        nearby = NearbyArm.of(chain)
-        assert nearby is not None and nearby.mirrored == mirrored
-        for q in rng.uniform(-1.5, 1.5, (5, 7)):
-            T = chain.flange(q[None])[0]
-            found, rest = nearby.loops(T)
-            starts = np.vstack([found.points, *rest])
-            assert len(starts) and miss(pose_error(chain.flange(starts), T)).max() < 2e-3
-        found = TracedArm.of(model)
-        assert found is not None and found.self_motions(T)
-    assert NearbyArm.of(Chain.of(CHAIN.model)) is None
-
-
-def test_curves_found_all_points_at_once_are_those_followed_point_by_point() -> None:
-    rng, chain = np.random.default_rng(59), Chain.of(GEN3.model)
-    nearby, count = NearbyArm.of(chain), 0
-    assert nearby is not None
-    for _ in range(4):
-        T = flange(GEN3, inside(GEN3, rng))
-        stack, good = followed(chain, nearby.loops(T)[0], T)
-        assert len(stack.first) == good.sum()
-        for first, last in zip(stack.first, stack.last, strict=True):
-            start, _ = solved(chain, stack.nodes[[first]], T)
-            (other,) = traced(chain, start, T)
-            curve = TracedCurve.of(chain, T, other, NumberedBranch(1))
-            assert other.closed and all(
-                away(curve, q) < SHORT for q in stack.nodes[first : last + 1]
-            )
-            count += 1
-    assert count > 15
-
-
-def test_nearly_all_poses_have_points_enough_along_their_curves() -> None:
-    """A pose with a curve that is followed step by step takes ten times as long; once, that was
-    every seventh.
-    """
-    rng, chain, count, poses = np.random.default_rng(61), Chain.of(GEN3.model), 0, 40
-    nearby = NearbyArm.of(chain)
-    assert nearby is not None
-    for _ in range(poses):
-        T = flange(GEN3, inside(GEN3, rng))
-        loops, rest = nearby.loops(T)
-        assert all(
-            np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * LONG for each in loops.each()
-        )
-        count += not rest and followed(chain, loops, T)[1].all()
-    assert count >= AT_ONCE * poses
-
-
-def test_parts_of_curves_between_starts_make_loops_and_ways_to_an_end() -> None:
-    """Start 4 is the same as 0; 5 and 6 come to a start from which the curve ends."""
-    loops, ways = cycles([1, 2, 0, 3, 1, 7, 7, -1])
+def test_parts_of_curves_between_starts_make_loops_and_open_paths() -> None:
+    """Start 4 is the same as 0; 5 and 6 lead to a start from which the curve ends."""
+    loops, paths = cycles([1, 2, 0, 3, 1, 7, 7, -1])
     assert sorted(map(sorted, loops)) == [[0, 1, 2], [3]]
-    assert ways in ([[5, 7]], [[6, 7]])
+    assert paths in ([[5, 7]], [[6, 7]])
 
 
-def test_a_loop_is_followed_once_however_many_starts_it_has(robot: Robot, arm: TracedArm) -> None:
+def test_a_loop_is_traced_once_however_many_starts_it_has(robot: Robot, arm: TracedArm) -> None:
     rng, chain = np.random.default_rng(58), Chain.of(robot.model)
     T = flange(robot, inside(robot, rng))
     for curve in arm.self_motions(T)[:3]:
         for count in (1, 9):
             starts = curve.at(rng.uniform(-np.pi, np.pi, count))
-            (path,) = traced(chain, np.vstack([starts, starts[:1]]), T)
+            (path,) = trace(chain, np.vstack([starts, starts[:1]]), T)
             assert path.closed == curve.closed
             ends = wrapped(path.q[-1] - path.q[0])
             assert not path.closed or np.abs(ends).max() < FOUND
             assert all(away(curve, q) < FOUND for q in path.q)
 
 
-def test_what_limits_cut_off_is_outside(robot: Robot, arm: TracedArm) -> None:
+def test_parts_cut_off_by_limits_are_outside(robot: Robot, arm: TracedArm) -> None:
     rng, q_min, q_max = np.random.default_rng(53), np.full(7, -2.0), np.full(7, 2.2)
     narrow, cut = replace(robot.limits, q_min=q_min, q_max=q_max), 0
     for _ in range(5):
@@ -255,7 +181,7 @@ def test_points_at_many_shares_are_those_at_each(robot: Robot, arm: TracedArm) -
         )
 
 
-def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
+def test_boxes_hold_the_curve(robot: Robot, arm: TracedArm) -> None:
     rng = np.random.default_rng(54)
     for curve in arm.self_motions(flange(robot, inside(robot, rng))):
         middle, half = rng.uniform(-np.pi, np.pi, 6), rng.uniform(0.0, 0.5, 6)
@@ -266,7 +192,7 @@ def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
 
 
 def test_no_curve_of_a_closed_form_is_missing() -> None:
-    """The Panda's closed form knows all curves. It gives no starts here."""
+    """The Panda's closed form, which knows all curves, gives no seeds here."""
     exact, chain = RedundantArm.of(PANDA.model), Chain.of(PANDA.model)
     traced = TracedArm(chain, SeedTable(chain, PANDA.limits.q_min, PANDA.limits.q_max), None)
     assert exact is not None
@@ -311,18 +237,6 @@ def test_a_curve_that_bends_within_a_thousandth_goes_on() -> None:
         assert min(away(each, q) for each in curves) < FOUND and all(each.closed for each in curves)
 
 
-def test_an_arm_stretched_further_than_the_one_nearby_is_found() -> None:
-    """The one nearby has no curve there. The starts of the table led to two others of the arm's
-    curves.
-    """
-    arm, T = TracedArm.of(GEN3.model), flange(GEN3, STRETCHED)
-    nearby = NearbyArm.of(Chain.of(GEN3.model))
-    assert arm is not None and nearby is not None and nearby.beside(T)
-    loops, rest = nearby.loops(T)
-    assert not loops.counts and not rest
-    assert min(away(each, STRETCHED) for each in arm.self_motions(T, GEN3.limits)) < FOUND
-
-
 def test_out_of_reach_no_distance_is_claimed() -> None:
     T = np.eye(4)
     T[0, 3] = 3.0
@@ -351,7 +265,7 @@ def test_an_answer_over_curves_that_may_be_missing_is_not_optimal(from_pose: boo
     assert found.certificate.valid and found.status == "feasible" and not found.complete
     assert 0 <= found.lower_bound <= found.energy.electrical.total
     to_joints = optimize(replace(problem, goal=goal)) if not from_pose else None
-    # any posture of the goal pose needs no more than the one that the pose was made of
+    # With a free configuration of the goal pose, the energy is at most that of the given one.
     assert (
         to_joints is None
         or found.energy.electrical.total <= 1.001 * to_joints.energy.electrical.total

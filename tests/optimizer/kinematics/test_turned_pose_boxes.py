@@ -1,6 +1,4 @@
-"""Boxes for a pose that is turned about the tool's axis: they hold every configuration that reaches
-it.
-"""
+"""Boxes of a pose turned about the tool's axis hold every configuration that reaches it."""
 
 from __future__ import annotations
 
@@ -17,15 +15,15 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 
-# rad: what a solution of the closed form may be off, next to a singularity
+# largest error of a solution of the closed form next to a singularity [rad]
 EXACT = 1e-9
 
 
 def _singular(rng: np.random.Generator, kind: str) -> Array:
-    """A configuration (6,) [rad] on a singularity, or next to one."""
+    """Configuration (6,) [rad] at a singularity, or next to one."""
     q = rng.uniform(-np.pi, np.pi, 6)
     if kind == "shoulder":
-        # the last axis' origin as near to the first axis as it can be
+        # The last axis' origin is as close to the first axis as possible.
         q[1:4] = [-np.pi / 2, 0.0, rng.choice([0.0, np.pi])]
     if kind != "any":
         q[{"elbow": 2, "wrist": 4, "beside the wrist": 4, "shoulder": 2}[kind]] = 1e-6 * (
@@ -37,7 +35,7 @@ def _singular(rng: np.random.Generator, kind: str) -> Array:
 @pytest.mark.parametrize("kind", ["any", "elbow", "wrist", "beside the wrist", "shoulder"])
 @pytest.mark.parametrize("robot", ["ur5e", "ur10e"])
 def test_no_configuration_is_outside_the_boxes(robot: str, kind: str) -> None:
-    """Wherever the tool is, and however its axis lies."""
+    """For arbitrary tools and tool axes."""
     for seed in range(6):
         rng = np.random.default_rng([seed, len(kind)])
         aligned = seed % 2 == 0
@@ -52,7 +50,7 @@ def test_no_configuration_is_outside_the_boxes(robot: str, kind: str) -> None:
         assert turned is not None
         angles = np.append(rng.uniform(-np.pi, np.pi, 12), 0.0)
         width = float(rng.choice([0.3, 0.05, 1e-3]))
-        # the angle is anywhere in its cell, on its edge as well
+        # Angles anywhere in their cell, including its edges.
         cells = angles + width * np.append(rng.uniform(-1, 1, 11), [1.0, -1.0])
         reached = 0
         for angle, cell in zip(angles, cells, strict=True):

@@ -9,7 +9,7 @@ from joulepath.models.robot import Robot
 from joulepath.optimizer.collision.bodies import bodies_of
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.names import LONGEST_NAME, first_repeated, is_plain, reading
+from joulepath.optimizer.problem.names import LONGEST_NAME, first_repeated, is_plain, normalized
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere, capsule_between
 from tests.optimizer.chains import serial_chain
 
@@ -111,7 +111,7 @@ def test_names_that_read_alike_are_refused(first: str, second: str) -> None:
     with pytest.raises(InvalidProblem) as error:
         scene("other", first, second)
     refused(error, "scene.obstacles.2.name", first)
-    assert reading(first) == reading(second)
+    assert normalized(first) == normalized(second)
 
 
 def test_names_that_differ_are_accepted() -> None:

@@ -109,7 +109,7 @@ def test_another_payload_needs_no_new_model() -> None:
     simulated, (q, v, a) = SimulatedArm(arm), states(arm.robot)
     model = simulated.model
     for changed in (with_changes(arm, payload=1.4), replace(arm, payload=Payload()), arm):
-        simulated.carry(changed)
+        simulated.use_figures(changed)
         assert simulated.model is model
         tau = by_pinocchio(changed, q, v, a)
         assert (

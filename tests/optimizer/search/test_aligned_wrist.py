@@ -36,7 +36,7 @@ def test_no_member_needs_less(every: bool) -> None:
     assert np.abs(flange(KUKA, found.goal.q) - flange(KUKA, ALIGNED)).max() < 1e-9
     branches = required_inverse_kinematics(KUKA, "goal").branches(flange(KUKA, ALIGNED))
     motions = {
-        id(each.self_motion): each.self_motion for each in branches if each.self_motion is not None
+        each.self_motion: each.self_motion for each in branches if each.self_motion is not None
     }
     own = min(motions.values(), key=lambda each: np.abs(each.q[:3] - found.goal.q[:3]).max())
     parameters = (

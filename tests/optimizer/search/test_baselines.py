@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 import ruckig
 
@@ -16,22 +14,13 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.motion.ruckig_motion import time_optimal
 from joulepath.optimizer.motion.time_scalings import (
-    SampledMotion,
     controller_default,
-    quintic,
     trapezoid,
 )
-from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import (
-    Broken,
-    baselines,
-    broken_limits,
     guesses,
-    motion_energy,
     nearest,
-    saving,
 )
 from tests.optimizer.moves import problem_with
 
@@ -40,12 +29,9 @@ EXACT = 1e-12  # relative; closed forms in double precision
 # target
 RUCKIG_POSITION = 1e-7
 RATE = 1e-9  # relative; Ruckig's states are cubic polynomials evaluated in double precision
-BALANCE = (
-    1e-6  # relative; shaft power is smooth within panels, but for friction's steep rise near rest
-)
 
 ROBOT = load_robot("ur5e")
-NAMES = ["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]
+NAMES = ["trapezoid", "quintic", "ruckig", "ruckig_slowed", "straight", "controller_default"]
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
 GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
 DURATION = 1.3
@@ -62,28 +48,6 @@ def limits(**given: float | list[float] | Array) -> Limits:
         ROBOT.limits,
         **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()},
     )
-
-
-def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Broken]:
-    """Torques and potential energy by Pinocchio, and a path without limits."""
-    load = task.arm.payload
-    model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
-    data = model.createData()
-    return (
-        lambda q, v, a: np.array(
-            [pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]
-        ),
-        lambda q: float(pin.computePotentialEnergy(model, data, q)),
-        lambda q, v: [[] for _ in q],
-    )
-
-
-def compare(task: Problem, duration: float = DURATION, ours: float = 60.0) -> dict[str, Baseline]:
-    goals = np.asarray(task.goal)[None]
-    return {
-        each.name: each
-        for each in baselines(task, np.asarray(task.start), goals, duration, ours, *oracle(task))
-    }
 
 
 def one_joint(displacement: float) -> Array:
@@ -223,124 +187,3 @@ def test_nearest_goal() -> None:
     other[3] += 2.0  # less time with a slow last joint, though more displacement
     slow_wrist = problem(limits=limits(v_max=[3, 3, 3, 3, 3, 0.1]))
     assert nearest(slow_wrist, START, np.array([near, other])) == pytest.approx(other)
-
-
-def test_energies_balance() -> None:
-    """total = sum of parts for every baseline, with payload and tilted gravity."""
-    payload = Payload(mass=3.0, com=np.array([0.0, 0.05, 0.1]), inertia=np.diag([0.01, 0.01, 0.01]))
-    task = problem(payload=payload, gravity=np.array([3.0, -5.0, -7.9]))
-    torques, potential, _ = oracle(task)
-    for motion in guesses(task, START, GOAL, DURATION).values():
-        energy = motion_energy(
-            task, motion, torques(motion.q, motion.v, motion.a), potential
-        ).electrical
-        assert energy.parts_sum == pytest.approx(energy.total, rel=BALANCE)
-
-
-@pytest.mark.parametrize("friction", list(ROBOT.friction_laws))
-def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
-    """Each law's own loss, ∫ v · friction(v) dt, from the motion's samples."""
-    task = problem(friction=friction)
-    torques, potential, _ = oracle(task)
-    motion = quintic(START, GOAL, DURATION)
-    energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential)
-    loss = motion.weights @ (motion.v * ROBOT.friction_laws[friction].torque(motion.v))
-    assert energy.per_joint.friction == pytest.approx(loss, rel=EXACT)
-
-
-@pytest.mark.parametrize("objective", ["electrical", "mechanical"])
-def test_report(objective: str) -> None:
-    """All five, in order, each with its saving of the objective, however the comparison ends."""
-    task = problem(objective=objective, duration_min=DURATION, duration_max=DURATION)
-    report = compare(task)
-    assert list(report) == NAMES
-    for each in report.values():
-        assert each.saving == pytest.approx(1 - 60.0 / getattr(each, objective), rel=EXACT)
-    assert compare(task, ours=1e6)["quintic"].saving < 0
-
-
-def test_savings_keep_their_sign() -> None:
-    """Regeneration may leave less than nothing to pay; a baseline of no duration has nothing to
-    save.
-    """
-    assert saving(30.0, 60.0) == 0.5
-    assert saving(-2.0, -1.0) == 1.0
-    assert saving(-1.0, -2.0) == -0.5
-    assert saving(5.0, 0.0) == 0.0
-
-
-def test_within_limits_in_time() -> None:
-    """A second and more is comfortable; in less than Ruckig's own time nothing is within the
-    limits.
-    """
-    comfortable, hasty = compare(problem()), compare(problem(), duration=0.5)
-    assert [name for name in NAMES if comfortable[name].within_limits] == [
-        "quintic",
-        "ruckig",
-        "ruckig_slowed",
-    ]
-    assert comfortable["ruckig"].duration > 0.5
-    assert [name for name in NAMES if hasty[name].within_limits] == ["ruckig"]
-    assert hasty["ruckig_slowed"].duration == pytest.approx(0.5, rel=EXACT)
-    assert (
-        comfortable["trapezoid"].reason == "unbounded jerk"
-        and comfortable["quintic"].reason is None
-    )
-    assert all(
-        name in str(hasty["quintic"].reason) for name in ("velocity", "acceleration", "jerk")
-    )
-
-
-def test_within_limits_of_torque() -> None:
-    """Ruckig does not know torque: with a torque limit just below its peak it is out, just above it
-    is in.
-    """
-    free = problem()
-    torques, *_ = oracle(free)
-    motion = time_optimal(free.arm.active_limits, START, GOAL)
-    tau = torques(motion.q, motion.v, motion.a)
-    peaks = np.abs(tau + ROBOT.friction.torque(motion.v)).max(axis=0)
-    for factor, inside in ((1 - 1e-5, False), (1 + 1e-5, True)):
-        broken = broken_limits(problem(limits=limits(tau_max=peaks * factor)), motion, tau)
-        assert not broken if inside else broken[0].startswith("torque") and len(broken) == 1
-
-
-def test_trapezoids_pass_without_a_jerk_limit() -> None:
-    """Only their jerk rules them out; Ruckig then moves without jerk phases."""
-    robot = replace(ROBOT, limits=limits(j_max=math.inf))
-    report = compare(problem(robot=robot))
-    assert all(each.within_limits for each in report.values())
-    bang_bang = time_optimal(problem(robot=robot).arm.active_limits, START, one_joint(0.4))
-    assert bang_bang.duration == pytest.approx(2 * math.sqrt(0.4 / 10.0), rel=RATE)
-
-
-def test_no_travel() -> None:
-    """Where the arm already is: those in our duration hold it there, the others are done at once
-    for nothing.
-    """
-    task = problem(goal=START)
-    report = compare(task)
-    torques, *_ = oracle(task)
-    none = np.zeros((1, 6))
-    current = torques(START[None], none, none)[0] / ROBOT.drives.torque_constant
-    holding = DURATION * (36.7 + ROBOT.drives.copper @ current**2)
-    for name in ("trapezoid", "quintic", "ruckig_slowed"):
-        assert report[name].duration == pytest.approx(DURATION, rel=EXACT)
-        assert report[name].electrical == pytest.approx(holding, rel=EXACT)
-        assert report[name].mechanical == 0
-    for name in ("ruckig", "controller_default"):
-        assert (report[name].duration, report[name].electrical, report[name].saving) == (0, 0, 0)
-    assert all(each.within_limits for each in report.values())
-
-
-def test_next_to_no_travel() -> None:
-    """Down to rounding every figure stays finite."""
-    for displacement in (1e-6, 1e-9, 1e-12, 1e-15):
-        goal = START + displacement
-        for motion in guesses(problem(goal=goal), START, goal, DURATION).values():
-            assert isinstance(motion, SampledMotion)
-            assert all(
-                np.isfinite(part).all()
-                for part in (motion.t, motion.weights, motion.q, motion.v, motion.a)
-            )
-        assert all(math.isfinite(each.saving) for each in compare(problem(goal=goal)).values())

@@ -18,8 +18,8 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import Reason
+from joulepath.optimizer.search.coarse_motions import COARSE, CoarseSolver, best_of_each
 from joulepath.optimizer.search.least_work import explore_least_work
-from joulepath.optimizer.search.rough_work import COARSE, RoughWork, best_of_each
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.moves import GOAL, START, fixed, problem, tcp_pose
 
@@ -45,8 +45,8 @@ def answer(collisions: bool) -> Solution:
     )
 
 
-def rough_work(own: Run) -> RoughWork:
-    return RoughWork(own.incumbent.prepared, DURATION)
+def rough_work(own: Run) -> CoarseSolver:
+    return CoarseSolver(own.state.prepared, DURATION)
 
 
 @pytest.mark.parametrize("collisions", [False, True])
@@ -88,31 +88,31 @@ def test_as_good_as_if_all_are_solved() -> None:
 )
 def test_others_are_explored_as_before(given: dict[str, Any]) -> None:
     own = run(**given)
-    assert not explore_least_work(own.incumbent, lambda: pytest.fail("explored"))
-    assert own.incumbent.best() is None
+    assert not explore_least_work(own.state, lambda: pytest.fail("explored"))
+    assert own.state.best() is None
 
 
 def test_time_that_is_over_on_the_way() -> None:
     """Nothing is lost: every candidate can still be solved, or counts as not reached."""
     own = run()
     instants = iter(np.arange(0.0, 1e3, 0.05).tolist())
-    own.incumbent.end = Deadline.after(4.0, lambda: next(instants))
-    assert not explore_least_work(own.incumbent, lambda: None)
-    assert own.incumbent.cut_short
-    statuses = {each.status for each in own.incumbent.candidates if each.holdable}
+    own.state.end = Deadline.after(4.0, lambda: next(instants))
+    assert not explore_least_work(own.state, lambda: None)
+    assert own.state.cut_short
+    statuses = {each.status for each in own.state.candidates if each.holdable}
     assert statuses <= {CandidateStatus.UNVISITED, CandidateStatus.INFEASIBLE}
-    assert not any(each.deferred for each in own.incumbent.candidates)
+    assert not any(each.deferred for each in own.state.candidates)
 
 
 def test_guesses_rest_at_their_ends() -> None:
     own = run()
-    candidate = own.incumbent.candidates[0]
+    candidate = own.state.candidates[0]
     work = rough_work(own)
     guesses = [*work.first([candidate]), *work.random(candidate, 4)]
     assert len(guesses) == 5
     rest = bspline.REST_POINTS
     for each in guesses:
-        assert each.points.shape == (COARSE, 6)
+        assert each.points.shape == (COARSE.control_points, 6)
         assert (each.points[:rest] == candidate.q_start).all()
         assert (each.points[-rest:] == candidate.q_goal).all()
         finer = each.on(24)
@@ -126,14 +126,14 @@ def test_rough_work_is_that_of_the_motion() -> None:
     candidate comes first.
     """
     own = run()
-    prepared: PreparedProblem = own.incumbent.prepared
+    prepared: PreparedProblem = own.state.prepared
     chosen = [
-        each for each in own.incumbent.candidates if each.holdable and each.shortest < DURATION / 2
+        each for each in own.state.candidates if each.holdable and each.shortest < DURATION / 2
     ][:2]
     work = rough_work(own)
     found = work.solved(
         [*work.first(chosen), *(work.random(each, 1)[0] for each in chosen)],
-        COARSE,
+        COARSE.control_points,
         0.5,
         1e-2,
         np.inf,

@@ -13,7 +13,7 @@ import pytest
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import DeadlinePassed
 from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.in_hand import least_certified
+from joulepath.optimizer.feasible_answer import least_certified
 from joulepath.optimizer.motion.spline import Spline, lasting
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
@@ -21,16 +21,17 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search import refinement
-from joulepath.optimizer.search.incumbent import Incumbent
+from joulepath.optimizer.search import baseline_comparison
 from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods import METHODS
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
 from tests.selection import long_but
 
-# relative: the error of the quadratures that are compared, `incumbent.SLACK`
+# relative: the error of the quadratures that are compared, `state.ENERGY_TOLERANCE`
 SLACK = 1e-6
 # s: the quintic, and motions like it, are within all limits
 SLOW = 3.0
@@ -57,26 +58,32 @@ def test_the_least_that_is_certified_is_the_answer() -> None:
     assert least_certified([first, second]) == "1 J" and first is not second
 
 
-def incumbent_with(*splines: Spline) -> Incumbent:
-    """An incumbent whose only candidate got these motions, one after the other."""
+def _name(spline: Spline) -> str:
+    return f"{spline.duration:g} s"
+
+
+def incumbent_with(*splines: Spline) -> SearchState:
+    """The state of a search whose only candidate got these motions, one after the other."""
     run = Run(problem(), clock=still)
     run.prepare()
     for spline in splines:
-        result = SolveResult(SolveStatus.SOLVED, f"{spline.duration:g} s", spline=spline)
-        run.incumbent.accept_if_better(
-            run.incumbent.candidates[0], result, run.incumbent.prepared.energy(spline)
+        result = SolveResult(
+            SolveStatus.SOLVED, SolveReason.BASELINE, spline=spline, figures=(_name(spline),)
         )
-    return run.incumbent
+        run.state.accept_if_better(
+            run.state.candidates[0], result, run.state.prepared.energy(spline)
+        )
+    return run.state
 
 
 def test_a_refused_motion_leaves_the_one_before_it() -> None:
     slow, faster, best = (quintic_spline(START, GOAL, duration) for duration in (9.0, 6.0, SLOW))
-    incumbent = incumbent_with(slow, faster, best)
-    (candidate,) = incumbent.candidates
+    state = incumbent_with(slow, faster, best)
+    (candidate,) = state.candidates
     for spline in (best, faster, slow):
-        assert candidate.spline is spline and candidate.message == f"{spline.duration:g} s"
-        assert candidate.energy == incumbent.prepared.cost_of(spline)
-        incumbent.reject(candidate)
+        assert candidate.spline is spline and _name(spline) in candidate.message
+        assert candidate.energy == state.prepared.cost_of(spline)
+        state.reject(candidate)
     assert (
         candidate.energy is None
         and candidate.attempt is None
@@ -85,17 +92,17 @@ def test_a_refused_motion_leaves_the_one_before_it() -> None:
 
 
 def test_a_refused_candidate_takes_certified_motions_alone() -> None:
-    incumbent = incumbent_with(quintic_spline(START, GOAL, 9.0), quintic_spline(START, GOAL, 6.0))
-    (candidate,) = incumbent.candidates
-    incumbent.reject(candidate)
+    state = incumbent_with(quintic_spline(START, GOAL, 9.0), quintic_spline(START, GOAL, 6.0))
+    (candidate,) = state.candidates
+    state.reject(candidate)
     best = quintic_spline(START, GOAL, SLOW)
     result, energy = (
-        SolveResult(SolveStatus.SOLVED, "found", spline=best),
-        incumbent.prepared.energy(best),
+        SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, spline=best),
+        state.prepared.energy(best),
     )
-    incumbent.accept_if_better(candidate, result, energy)
+    state.accept_if_better(candidate, result, energy)
     assert candidate.duration == 9.0
-    incumbent.accept_if_better(candidate, result, energy, certified=True)
+    state.accept_if_better(candidate, result, energy, certified=True)
     assert candidate.spline is best
 
 
@@ -115,7 +122,7 @@ def test_what_the_certificate_refuses_is_not_all_that_was_found(
             return replace(honest, start_error=(1.0, 0.0))
         return honest
 
-    monkeypatch.setattr("joulepath.optimizer.search.incumbent.certify", judge)
+    monkeypatch.setattr("joulepath.optimizer.search.state.certify", judge)
     found = Run(asked, [known]).solution()
     assert refused
     assert found.certificate.valid and found.energy.electrical.total == cost_of(known)
@@ -125,7 +132,8 @@ def own_kind(found: Solution, method: MethodName) -> list[float]:
     """Savings against the feasible baselines that the method can represent, in our duration."""
     kinds = METHODS[method].accepted_baselines
     feasible = [each for each in found.baselines if each.name in kinds and each.within_limits]
-    return [each.saving for each in feasible if each.duration == pytest.approx(found.duration)]
+    same = [each for each in feasible if each.duration == pytest.approx(found.duration)]
+    return [each.saving for each in same if each.saving is not None]
 
 
 KINDS: dict[MethodName, tuple[str, ...]] = {
@@ -148,7 +156,7 @@ def test_a_baseline_of_the_own_kind_is_the_answer_if_nothing_better_is_found(
     poor = _detour()
 
     def solve(self: Method, *_: Any, **__: Any) -> SolveResult:
-        return SolveResult(SolveStatus.SOLVED, "a detour", spline=poor)
+        return SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, spline=poor)
 
     for name in ("solve", "solve_from"):
         monkeypatch.setattr(METHODS[method], name, solve)
@@ -177,16 +185,17 @@ def test_a_baseline_that_is_not_certified_in_time_is_not_feasible(
         monkeypatch.setattr(
             METHODS["bspline"],
             name,
-            lambda *_, **__: SolveResult(SolveStatus.SOLVED, "", spline=poor),
+            lambda *_, **__: SolveResult(SolveStatus.SOLVED, SolveReason.CONVERGED, spline=poor),
         )
 
     def late(*_: Any) -> Any:
         raise DeadlinePassed
 
-    monkeypatch.setattr(refinement, "_accept_certified", late)
+    monkeypatch.setattr(baseline_comparison, "_accept_certified", late)
     found = optimize(problem(**fixed(SLOW)))
     (quintic,) = (each for each in found.baselines if each.name == "quintic")
-    assert quintic.saving < -SLACK and quintic.reason == refinement.NOT_CONFIRMED
+    assert quintic.saving is None and quintic.reason == baseline_comparison.NOT_CONFIRMED
+    assert quintic.electrical < found.energy.electrical.total
     assert all(each >= -SLACK for each in own_kind(found, "bspline"))
 
 

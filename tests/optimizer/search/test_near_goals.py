@@ -24,7 +24,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import label_of
-from joulepath.optimizer.search.near_goals import APART, MOST, OTHERS, activate_near_goals
+from joulepath.optimizer.search.near_goals import NEAR_GOALS, activate_near_goals
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import nearest_configuration
 from joulepath.optimizer.search.seeds import estimates
@@ -64,7 +64,7 @@ def explored(problem: Problem) -> Candidate:
     run = Run(problem)
     run.prepare()
     run.explore()
-    best = run.incumbent.best()
+    best = run.state.best()
     assert best is not None
     return best
 
@@ -95,19 +95,22 @@ def test_what_is_activated_is_different_and_may_be_solved() -> None:
     problem, _ = task("xarm7", 3, "cone")
     run = Run(problem)
     run.prepare()
-    incumbent = run.incumbent
-    before = len(incumbent.candidates)
-    assert activate_near_goals(incumbent.prepared, incumbent.candidates)
-    active = [each for each in incumbent.candidates if not each.deferred and each.holdable]
-    fresh = incumbent.candidates[before:]
-    assert 0 < len(fresh) <= MOST and len(active) <= MOST + OTHERS
+    state = run.state
+    before = len(state.candidates)
+    assert activate_near_goals(state.prepared, state.candidates)
+    active = [each for each in state.candidates if not each.deferred and each.holdable]
+    fresh = state.candidates[before:]
+    assert (
+        0 < len(fresh) <= NEAR_GOALS.electrical.count
+        and len(active) <= NEAR_GOALS.electrical.count + NEAR_GOALS.others
+    )
     for k, each in enumerate(fresh):
         assert each.goal.tolerance is problem.goal and each.lower_bound > 0 and each.shortest > 0
         for other in fresh[:k]:
-            assert np.abs(each.q_goal - other.q_goal).max() > APART
+            assert np.abs(each.q_goal - other.q_goal).max() > NEAR_GOALS.electrical.separation
     # the place of the shortest way is nearer than all samples
     coulomb = problem.arm.friction_law.coulomb
-    ways = [np.abs(each.q_goal - each.q_start) @ coulomb for each in incumbent.candidates]
+    ways = [np.abs(each.q_goal - each.q_start) @ coulomb for each in state.candidates]
     assert min(ways[before:]) < min(ways[:before])
 
 
@@ -115,7 +118,7 @@ def test_without_a_free_orientation_nothing_is_activated() -> None:
     problem, goal = task("panda", 0, "about")
     run = Run(replace(problem, goal=Pose(tcp_pose(problem.arm, goal))))
     run.prepare()
-    assert not activate_near_goals(run.incumbent.prepared, run.incumbent.candidates)
+    assert not activate_near_goals(run.state.prepared, run.state.candidates)
 
 
 def test_a_full_pose_among_free_ones_is_searched_too() -> None:
@@ -135,10 +138,10 @@ def test_a_proposed_goal_is_put_back_beside(name: str) -> None:
     problem, goal = task(name, 4, "about")
     run, rng = Run(problem), np.random.default_rng(9)
     run.prepare()
-    end = next(each.goal for each in run.incumbent.candidates)
+    end = next(each.goal for each in run.state.candidates)
     for _ in range(5):
         asked = goal + rng.uniform(-BESIDE, BESIDE, len(goal))
-        found = nearest_configuration(run.incumbent.prepared, end, asked)
+        found = nearest_configuration(run.state.prepared, end, asked)
         assert found is not None and np.abs(found - asked).max() < FARTHER * BESIDE
 
 
@@ -162,7 +165,7 @@ def test_estimates_count_what_waiting_at_a_goal_draws() -> None:
     )
     run = Run(problem)
     run.prepare()
-    some = [each for each in run.incumbent.candidates if each.holdable][:20:4]
+    some = [each for each in run.state.candidates if each.holdable][:20:4]
     motions = [quintic_spline(each.q_start, each.q_goal, 2.0) for each in some]
-    energy = [run.incumbent.prepared.energy(motion).electrical.total for motion in motions]
-    np.testing.assert_allclose(estimates(run.incumbent.prepared, some), energy, rtol=FEW_POINTS)
+    energy = [run.state.prepared.energy(motion).electrical.total for motion in motions]
+    np.testing.assert_allclose(estimates(run.state.prepared, some), energy, rtol=FEW_POINTS)

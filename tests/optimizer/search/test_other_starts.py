@@ -15,9 +15,9 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.state import SearchState
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -25,7 +25,7 @@ AMPLE = 300.0
 HELD = 1e-9
 
 
-def explored(index: int, both: bool, bus: Bus) -> tuple[Incumbent, Candidate]:
+def explored(index: int, both: bool, bus: Bus) -> tuple[SearchState, Candidate]:
     """The search for a random task to a pose, from a pose too if `both`, before anything is
     refined.
     """
@@ -36,24 +36,24 @@ def explored(index: int, both: bool, bus: Bus) -> tuple[Incumbent, Candidate]:
     run = Run(Problem(arm=arm, start=poses[0] if both else start, goal=poses[1], deadline=AMPLE))
     run.prepare()
     run.explore()
-    best = run.incumbent.best()
+    best = run.state.best()
     assert best is not None
-    return run.incumbent, best
+    return run.state, best
 
 
 @pytest.mark.parametrize(("index", "both"), [(5, False), (19, False), (1, False), (6, True)])
 def test_what_is_found_beside_needs_less_and_holds_the_poses(index: int, both: bool) -> None:
-    incumbent, first = explored(index, both, Bus())
-    before, energy = len(incumbent.candidates), first.energy or 0.0
-    best = start_beside(incumbent, first)
-    fresh = incumbent.candidates[before:]
-    assert best is (incumbent.best() if fresh else first)
+    state, first = explored(index, both, Bus())
+    before, energy = len(state.candidates), first.energy or 0.0
+    best = start_beside(state, first)
+    fresh = state.candidates[before:]
+    assert best is (state.best() if fresh else first)
     for each in fresh:
         assert (each.energy or 0.0) < energy and each.lower_bound <= (each.energy or 0.0)
         assert (each.spline.control_points[[0, -1]] == [each.q_start, each.q_goal]).all()
         for side in ("start", "goal"):
             reached, asked = (
-                tcp_pose(incumbent.prepared.arm, getattr(end, f"q_{side}")) for end in (each, first)
+                tcp_pose(state.prepared.arm, getattr(end, f"q_{side}")) for end in (each, first)
             )
             assert np.abs(reached - asked).max() < HELD
     # of these tasks, the first two begin in a poor local optimum
@@ -61,6 +61,6 @@ def test_what_is_found_beside_needs_less_and_holds_the_poses(index: int, both: b
 
 
 def test_cornered_power_is_left_to_its_own_restarts() -> None:
-    incumbent, first = explored(1, False, Bus(mode="isolated"))
-    before = len(incumbent.candidates)
-    assert start_beside(incumbent, first) is first and len(incumbent.candidates) == before
+    state, first = explored(1, False, Bus(mode="isolated"))
+    before = len(state.candidates)
+    assert start_beside(state, first) is first and len(state.candidates) == before

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.kinematics.end_configuration import FULL_TURN
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -18,8 +19,8 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search.candidates import FULL_TURN, Candidate
-from joulepath.optimizer.search.other_turns import MOST, NEAR, other_turns
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.other_turns import OTHER_TURNS, other_turns
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import estimates_between, expected
 
@@ -58,7 +59,7 @@ def explored(problem: Problem) -> Candidate:
     """The best candidate before refinement and bounds, which take most of the time of a search."""
     run = prepared(problem)
     run.explore()
-    best = run.incumbent.best()
+    best = run.state.best()
     assert best is not None
     return best
 
@@ -76,9 +77,9 @@ def test_the_other_way_around_is_found_where_it_needs_less() -> None:
 
 def turned(problem: Problem) -> tuple[Run, list[Candidate], list[Candidate], float]:
     run = prepared(problem)
-    samples = [each for each in run.incumbent.candidates if each.holdable]
-    least = float(expected(run.incumbent.prepared, samples).min())
-    return run, samples, other_turns(run.incumbent.prepared, samples, least), least
+    samples = [each for each in run.state.candidates if each.holdable]
+    least = float(expected(run.state.prepared, samples).min())
+    return run, samples, other_turns(run.state.prepared, samples, least), least
 
 
 @pytest.mark.parametrize("start", [START, "pose"])
@@ -88,10 +89,10 @@ def test_one_joint_is_turned_within_the_limits(start: Any) -> None:
         problem = replace(problem, start=Pose(tcp_pose(problem.arm, START)))
     run, samples, others, least = turned(problem)
     limits = problem.arm.active_limits
-    known = {(id(each.start), id(each.goal)): each for each in samples}
-    assert 0 < len(others) <= MOST
+    known = {(each.start, each.goal): each for each in samples}
+    assert 0 < len(others) <= OTHER_TURNS.most
     for each in others:
-        sample = known[id(each.start), id(each.goal)]
+        sample = known[each.start, each.goal]
         way, least_way = each.q_goal - each.q_start, sample.q_goal - sample.q_start
         (joint,) = np.flatnonzero(np.abs(way - least_way) > SAME)
         assert abs(way[joint] - least_way[joint]) == pytest.approx(FULL_TURN)
@@ -101,8 +102,10 @@ def test_one_joint_is_turned_within_the_limits(start: Any) -> None:
             assert (q >= limits.q_min).all() and (q <= limits.q_max).all()
         assert (each.q_start == sample.q_start).all() or not sample.start.fixed
         assert each.lower_bound >= sample.lower_bound
-        assert each.lower_bound <= (least + (NEAR - 1) * abs(least)) * (1 + ROUGH)
-    assert not other_turns(run.incumbent.prepared, samples, 0.0)
+        assert each.lower_bound <= (least + (OTHER_TURNS.energy_ratio - 1) * abs(least)) * (
+            1 + ROUGH
+        )
+    assert not other_turns(run.state.prepared, samples, 0.0)
 
 
 def test_without_full_turns_nothing_is_turned() -> None:
@@ -111,13 +114,13 @@ def test_without_full_turns_nothing_is_turned() -> None:
 
 def test_a_rough_estimate_is_near_that_of_several_durations() -> None:
     run = prepared(task())
-    some = [each for each in run.incumbent.candidates if each.holdable][:40]
+    some = [each for each in run.state.candidates if each.holdable][:40]
     q_start, q_goal = (
         np.array([getattr(each, name) for each in some]) for name in ("q_start", "q_goal")
     )
     shortest = np.asarray(shortest_duration(q_goal - q_start, run.problem.arm.active_limits))
     rough, exact = (
-        estimates_between(run.incumbent.prepared, q_start, q_goal, shortest, rough=rough)
+        estimates_between(run.state.prepared, q_start, q_goal, shortest, rough=rough)
         for rough in (True, False)
     )
     ratio = rough / exact

@@ -14,6 +14,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.bounds.holding_cells import HoldingCells
+from joulepath.optimizer.bounds.self_motion_bound import self_motion_bound
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
@@ -26,7 +27,6 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.search.self_motion_bound import self_motion_bound
 from tests.selection import long_but
 
 # relative: the least step along a curve and the solver's tolerance
@@ -70,10 +70,10 @@ def pose_of(robot: Robot, q: Array) -> Pose:
 def members(robot: Robot, q: Array, count: int, seed: int) -> list[Array]:
     """So many configurations of the pose of q, within the limits, drawn evenly from its curves."""
     inverse, rng = required_inverse_kinematics(robot, "goal"), np.random.default_rng(seed)
-    curves: dict[int, SelfMotion] = {}
+    curves: dict[SelfMotion, SelfMotion] = {}
     for each in inverse.solve(pose_of(robot, q).T):
         if each.self_motion is not None:
-            curves[id(each.self_motion)] = each.self_motion
+            curves[each.self_motion] = each.self_motion
     arcs = [(curve, *arc) for curve in curves.values() for arc in curve.arcs]
     lengths = np.array([upper - lower for _, lower, upper in arcs])
     found: list[Array] = []

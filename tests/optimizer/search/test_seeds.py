@@ -24,9 +24,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import (
-    MOST_ESTIMATED,
-    MOST_SEEDS,
-    NEAR,
+    SEEDS,
     activate_seeds,
     estimates,
 )
@@ -65,8 +63,8 @@ def prepared(name: str, index: int, both: bool = False) -> Run:
 @pytest.mark.parametrize("name", ["panda", "gen3"])
 def test_estimates_are_above_the_lower_bounds_and_near_the_least_energy(name: str) -> None:
     run = prepared(name, 1)
-    known = [each for each in run.incumbent.candidates if each.deferred]
-    energy = estimates(run.incumbent.prepared, known)
+    known = [each for each in run.state.candidates if each.deferred]
+    energy = estimates(run.state.prepared, known)
     assert (energy >= np.array([each.lower_bound for each in known])).all()
     least = optimize(run.problem).energy.electrical.total
     assert least <= energy.min() <= HIGHEST * least
@@ -76,14 +74,12 @@ def test_estimates_are_of_motions_in_the_time_that_is_asked_for() -> None:
     asked = replace(problem_of("panda", 1), duration_min=SLOW, duration_max=SLOW)
     run = Run(asked)
     run.prepare()
-    some = run.incumbent.candidates[::9]
+    some = run.state.candidates[::9]
     energy = [
-        run.incumbent.prepared.energy(
-            quintic_spline(each.q_start, each.q_goal, SLOW)
-        ).electrical.total
+        run.state.prepared.energy(quintic_spline(each.q_start, each.q_goal, SLOW)).electrical.total
         for each in some
     ]
-    np.testing.assert_allclose(estimates(run.incumbent.prepared, some), energy, rtol=FEW_POINTS)
+    np.testing.assert_allclose(estimates(run.state.prepared, some), energy, rtol=FEW_POINTS)
 
 
 @pytest.mark.long
@@ -110,15 +106,15 @@ def test_of_work_more_is_tried_than_what_the_straight_line_says() -> None:
 def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
     run = Run(problem_of("panda", 7, both))
     run.prepare()
-    incumbent = run.incumbent
-    before = [each for each in incumbent.candidates if each.deferred]
-    assert activate_seeds(incumbent.prepared, incumbent.candidates)
+    state = run.state
+    before = [each for each in state.candidates if each.deferred]
+    assert activate_seeds(state.prepared, state.candidates)
     seeds = [each for each in before if not each.deferred]
-    assert 0 < len(seeds) <= MOST_SEEDS
+    assert 0 < len(seeds) <= SEEDS.count
     assert all(each.status is CandidateStatus.UNVISITED for each in seeds)
-    energy = dict(zip(map(id, before), estimates(incumbent.prepared, before), strict=True))
-    assert max(energy[id(each)] for each in seeds) <= NEAR * min(energy[id(each)] for each in seeds)
-    ends: list[Array] = [end.q for end in {id(each.goal): each.goal for each in before}.values()]
+    energy = dict(zip(before, estimates(state.prepared, before), strict=True))
+    assert max(energy[each] for each in seeds) <= SEEDS.ratio * min(energy[each] for each in seeds)
+    ends: list[Array] = [end.q for end in dict.fromkeys(each.goal for each in before)]
     for seed in seeds:
         beside = [
             each
@@ -133,18 +129,18 @@ def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
             for each in beside
             if any(each.goal.q is q for q in ends[max(place - 1, 0) : place + 2])
         ]
-        assert all(energy[id(each)] >= energy[id(seed)] for each in near)
+        assert all(energy[each] >= energy[seed] for each in near)
 
 
 def test_the_next_seeds_follow_until_none_is_left() -> None:
     run = Run(problem_of("panda", 4))
     run.prepare()
-    incumbent, rounds = run.incumbent, 0
-    while activate_seeds(incumbent.prepared, incumbent.candidates):
+    state, rounds = run.state, 0
+    while activate_seeds(state.prepared, state.candidates):
         rounds += 1
-        assert rounds <= len(incumbent.candidates)
+        assert rounds <= len(state.candidates)
     assert not any(
-        each.deferred and each.status is CandidateStatus.UNVISITED for each in incumbent.candidates
+        each.deferred and each.status is CandidateStatus.UNVISITED for each in state.candidates
     )
 
 
@@ -164,15 +160,15 @@ def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
         )
     )
     run.prepare()
-    incumbent = run.incumbent
+    state = run.state
     before = [
         each
-        for each in incumbent.candidates
+        for each in state.candidates
         if each.deferred and each.status is CandidateStatus.UNVISITED
     ]
-    assert sum(each.lower_bound == 0 for each in before) > MOST_ESTIMATED
-    assert activate_seeds(incumbent.prepared, incumbent.candidates)
-    assert 0 < sum(not each.deferred for each in before) <= MOST_SEEDS
+    assert sum(each.lower_bound == 0 for each in before) > SEEDS.most_estimated
+    assert activate_seeds(state.prepared, state.candidates)
+    assert 0 < sum(not each.deferred for each in before) <= SEEDS.count
 
 
 @pytest.mark.long
@@ -181,14 +177,14 @@ def test_motions_that_give_energy_back_have_seeds_too() -> None:
     asked = downwards("iiwa14", [0, 0.2, 0, -0.5, 0, 0.5, 0], [0, 1.4, 0, -1.2, 0, 0.9, 0], bus)
     run = Run(asked)
     run.prepare()
-    incumbent = run.incumbent
+    state = run.state
     before = [
         each
-        for each in incumbent.candidates
+        for each in state.candidates
         if each.deferred and each.status is CandidateStatus.UNVISITED
     ]
-    assert estimates(incumbent.prepared, before).min() < 0
-    assert activate_seeds(incumbent.prepared, incumbent.candidates)
+    assert estimates(state.prepared, before).min() < 0
+    assert activate_seeds(state.prepared, state.candidates)
     assert any(not each.deferred for each in before)
     assert run.search().energy.electrical.total < 0
 

@@ -50,7 +50,7 @@ def curves(q: Array) -> list[SelfMotion]:
     found = required_inverse_kinematics(ROBOT, "goal").solve(tcp_pose(q).T, windings=False)
     return list(
         {
-            id(each.self_motion): each.self_motion for each in found if each.self_motion is not None
+            each.self_motion: each.self_motion for each in found if each.self_motion is not None
         }.values()
     )
 

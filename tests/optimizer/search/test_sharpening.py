@@ -17,9 +17,9 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.branch_and_bound import explore
-from joulepath.optimizer.search.incumbent import Incumbent
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sharpening import sharpen
+from joulepath.optimizer.search.state import SearchState
 from tests.optimizer.moves import AMPLE, ROBOT, problem
 
 # relative; what is promised against the best of many starts on as many control points
@@ -34,18 +34,18 @@ BEST_GOAL = np.array(
 BEST_DURATION, BEST_ENERGY = 3.977043743, 44.05294296
 
 
-def explored(**given: Any) -> Incumbent:
+def explored(**given: Any) -> SearchState:
     """A search whose candidates are solved, but not refined."""
     run = Run(problem(**given))
     run.prepare()
-    incumbent = run.incumbent
+    state = run.state
     explore(
-        incumbent.prepared,
-        incumbent.candidates,
-        lambda each: solve(incumbent, each),
-        incumbent.deadline,
+        state.prepared,
+        state.candidates,
+        lambda each: solve(state, each),
+        state.deadline,
     )
-    return incumbent
+    return state
 
 
 def test_as_good_as_the_best_of_many_starts() -> None:
@@ -70,16 +70,16 @@ def test_as_good_as_the_best_of_many_starts() -> None:
     ],
 )
 def test_sharper_corners_need_less(given: dict[str, Any]) -> None:
-    incumbent = explored(**given)
-    before = incumbent.best()
+    state = explored(**given)
+    before = state.best()
     assert before is not None and before.energy is not None
     energy = before.energy
-    sharpen(incumbent, before)
-    after = incumbent.best()
+    sharpen(state, before)
+    after = state.best()
     assert after is not None and after.energy is not None
     assert after.energy < energy
     # the candidate's energy is that of its motion, by the exact formulas
-    prepared: PreparedProblem = incumbent.prepared
+    prepared: PreparedProblem = state.prepared
     assert after.energy == prepared.objective_of(prepared.energy(after.spline))
 
 
@@ -87,29 +87,29 @@ def test_sharper_corners_need_less(given: dict[str, Any]) -> None:
     "given", [{}, {"method": "uniform_scaling", "objective": "mechanical", "duration_max": 1.5}]
 )
 def test_nothing_is_solved_again_without_corners_or_even_spacing(given: dict[str, Any]) -> None:
-    incumbent = explored(**given)
-    best = incumbent.best()
+    state = explored(**given)
+    best = state.best()
     assert best is not None
-    spline, solves = best.spline, incumbent.solves
-    sharpen(incumbent, best)
-    assert best.spline is spline and incumbent.solves == solves
+    spline, solves = best.spline, state.solves
+    sharpen(state, best)
+    assert best.spline is spline and state.solves == solves
 
 
 def test_longest_duration_of_mechanical_work() -> None:
     """Rest costs nothing: a motion that may take longer takes all of the time."""
-    incumbent = explored(objective="mechanical", duration_max=2.0)
-    best = incumbent.best()
+    state = explored(objective="mechanical", duration_max=2.0)
+    best = state.best()
     assert best is not None
-    sharpen(incumbent, best)
+    sharpen(state, best)
     assert best.duration == pytest.approx(2.0, rel=1e-12)
 
 
 def test_no_time_is_left() -> None:
     """The motion stays as it is."""
-    incumbent = explored(objective="mechanical", duration_max=1.5)
-    best = incumbent.best()
+    state = explored(objective="mechanical", duration_max=1.5)
+    best = state.best()
     assert best is not None
     spline = best.spline
-    incumbent.end = Deadline.after(-1.0)
-    sharpen(incumbent, best)
+    state.end = Deadline.after(-1.0)
+    sharpen(state, best)
     assert best.spline is spline

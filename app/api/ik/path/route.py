@@ -30,9 +30,9 @@ async def follow(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
 ) -> Response:
-    """Follows positions or poses of the TCP from a guess, each from the configuration before
-    (Levenberg-Marquardt). Points that are out of reach, nearly singular or beyond the range of a
-    joint are listed, but left out of `trajectory`. `POST /evaluate` takes `trajectory` unchanged.
+    """Follows positions or poses of the TCP from a guess, by Levenberg-Marquardt from the previous
+    configuration. Points out of reach, nearly singular or beyond a joint range are listed, but
+    omitted in `trajectory`, which has the form of a request of `POST /evaluate`.
     """
     work = engine.run(IKPathTask(body, request.state.id), deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))

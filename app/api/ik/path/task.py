@@ -1,4 +1,4 @@
-"""What `POST /ik/path` takes and answers, and its work in a worker."""
+"""Request and answer of `POST /ik/path`, and its work in a worker."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.convert.arm import robot_named
-from joulepath.app.convert.pose import to_base, to_base_pose, to_matrix
+from joulepath.app.convert.pose import to_base, to_base_pose
+from joulepath.app.convert.tool import to_tcp
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.common import (
     BasePose,
@@ -28,7 +29,7 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import PerSample, PerSampleAndJoint, Seconds, Unit
 from joulepath.optimizer.kinematics.tool_path.path_following import PathPoint, follow
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 MOST_POINTS = 1000
 """Largest number of points of a path."""
@@ -89,7 +90,7 @@ class IKPathRequest(RobotWithTcp):
         10.0,
         default=10.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
 
     @model_validator(mode="after")
@@ -107,10 +108,10 @@ class IKPathRequest(RobotWithTcp):
 
 @dataclass(frozen=True)
 class JointPath:
-    """A trajectory in the form that `POST /evaluate` takes."""
+    """A trajectory in the form of a request of `POST /evaluate`."""
 
     t: Annotated[PerSample, Unit("s")]
-    """Time of each sample."""
+    """Times of the samples."""
     q: Annotated[PerSampleAndJoint, Unit("rad")]
     """Joint positions, [sample][joint]."""
 
@@ -137,9 +138,7 @@ class IKPathAnswer(Answer):
     """Configurations along the path."""
 
     trajectory: JointPath
-    """Configurations of all points that are reached, not nearly singular and within the joint
-    range.
-    """
+    """Configurations of all points in reach, not nearly singular and within the joint ranges."""
     points: list[TimedPathPoint]
     """One entry per point."""
 
@@ -152,12 +151,10 @@ class IKPathTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The answer of `POST /ik/path`, with the points that were tried within about `deadline`
-        seconds.
-        """
+        """The answer of `POST /ik/path` with the points tried within about `deadline` seconds."""
         end = Deadline.after(deadline)
         request = self.request
-        arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_matrix(request.tcp))
+        arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_tcp(request.tcp))
         T_base_frame = to_base(request.frame, arm.robot)
         targets = (
             np.array(request.points) @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]

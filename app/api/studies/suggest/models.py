@@ -23,8 +23,8 @@ class SuggestQuery(Query):
     )
     deadline: float | None = described(
         "Wall time for all suggestions together; those without a result by then are in "
-        "`not_computed`. Null: "
-        f"{DEFAULT_DEADLINE:g} s, or the service's largest deadline if that is shorter.",
+        f"`not_computed`. Null: {DEFAULT_DEADLINE:g} s, or the service's largest deadline if that "
+        "is shorter.",
         "s",
         10.0,
         default=None,
@@ -59,8 +59,7 @@ class Suggestion(_Proposal):
     duration: float = described("Duration of the motion.", "s", 1.33)
     status: Literal["optimal", "feasible"] = described(
         "`optimal`: posting `request` gives the same energy. `feasible`: the search was not "
-        "complete; posting "
-        "`request` with more time may give less energy.",
+        "complete; posting `request` with more time may give less energy.",
         None,
         "optimal",
     )
@@ -74,8 +73,7 @@ class NotComputed(_Proposal):
 
     problem: str = described(
         "Type of the error. `deadline-exceeded` and `busy`: no time or no free worker was left. "
-        "Other types: the "
-        "change is impossible.",
+        "Other types: the change is impossible.",
         None,
         "duration-too-short",
     )

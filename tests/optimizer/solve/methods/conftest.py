@@ -1,7 +1,8 @@
-"""Few generations of the genetic algorithm: what holds of its motions does not need its best
-ones."""
+"""Few generations of the genetic algorithm, whose tests do not need its best motions."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import pytest
 
@@ -13,4 +14,5 @@ FEW_GENERATIONS = 20
 @pytest.fixture(autouse=True)
 def _few_generations(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     if request.node.get_closest_marker("long") is None:
-        monkeypatch.setattr(polynomial_ga, "GENERATIONS", FEW_GENERATIONS)
+        settings = replace(polynomial_ga.POLYNOMIAL_GA, generations=FEW_GENERATIONS)
+        monkeypatch.setattr(polynomial_ga, "POLYNOMIAL_GA", settings)

@@ -1,9 +1,8 @@
-"""Obstacles on a method's own path: it goes around them, or its result carries the collision and
-the error names it.
-"""
+"""Obstacles on the own path of a method: a motion around them, or a result with the collision."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -23,31 +22,32 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 from joulepath.optimizer.solve.methods import METHODS, planned_paths, solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.method import SolveStatus
-from joulepath.optimizer.solve.methods.path_retiming import PathRetiming, RetimingProgram
+from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
 from joulepath.optimizer.solve.methods.planned_paths import (
-    ALONG_PLANNED_PATH,
-    FROM_PLANNED_PATH,
+    PLANNED_PATHS,
     plan,
     smooth_path,
     to_goal,
 )
+from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import MotionOrigin, SolveStatus
 from tests.optimizer.moves import ROBOT, problem_with
 from tests.selection import long_but
 
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([-1.8, -1.57, 1.57, -1.57, -1.57, 0.0])
 DEADLINE = 60.0
-# states that a planning checks where there is no way: more take time alone
+# states checked by a planning without a solution; more would only take time
 FEW_STATES = 2_000
-# distance [rad] between a motion and the path it follows: the error of the fit of a spline, and of
-# sampling the path
-FIT = 2e-3
-# step of central differences of the retiming's variables, and their relative error; friction bends
-# over some mrad/s
-STEP, DIFFERENCES = 1e-6, 2e-4
-# share of a limit, as the certificate's
-HELD = 1e-6
+# distance between a motion and its path, from the fit of a spline and from sampling [rad]
+FIT_TOLERANCE = 2e-3
+# step of the retiming's variables in central differences
+EPS = 1e-6
+# relative tolerance of the differences; friction reverses within a few mrad/s
+DIFFERENCE_TOLERANCE = 2e-4
+# relative excess over a limit, as of the certificate
+LIMIT_TOLERANCE = 1e-6
 
 
 def placed(x: float, y: float, z: float, yaw: float = 0.0) -> Array:
@@ -59,8 +59,7 @@ def placed(x: float, y: float, z: float, yaw: float = 0.0) -> Array:
 
 # on the straight line in joint space
 POST = Obstacle("post", Sphere(0.06), placed(-0.45, 0.35, 0.5))
-# a wall that leads outwards from the base, between start and goal, and beside the upper arm at the
-# goal
+# a wall from the base outwards, between start and goal, and beside the upper arm at the goal
 WALL = Obstacle(
     "wall",
     Box(np.array([1.2, 0.02, 2.4])),
@@ -80,7 +79,7 @@ def _compiled() -> None:
 
 def planned_path(prepared: PreparedProblem) -> Array:
     """The shortest planned path (k, nq) [rad] from START to GOAL."""
-    method = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE))
+    method = solver_for(SolveContext.of(prepared, START, GOAL, Deadline.after(DEADLINE)))
     return to_goal(method, plan(method))[0]
 
 
@@ -88,19 +87,22 @@ def planned_path(prepared: PreparedProblem) -> Array:
     ("method", "states"),
     long_but(
         [(method, FEW_STATES) for method in ("time_scaling", "polynomial_ga")],
-        product(METHODS, (FEW_STATES, planned_paths.MOST_STATES)),
+        product(METHODS, (FEW_STATES, PLANNED_PATHS.most_states)),
     ),
 )
 def test_the_error_names_the_colliding_pair(
     method: MethodName, states: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(planned_paths, "MOST_STATES", states)
+    limited = replace(PLANNED_PATHS, most_states=states)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     problem = blocked(method, WALL)
     with pytest.raises(NoCollisionFreeTrajectory) as caught:
         optimize(problem)
     assert WALL.name in caught.value.pair and caught.value.depth > 0
     assert all(WALL.name in candidate.reason for candidate in caught.value.candidates)
-    result = solver_for(PreparedProblem.of(problem), START, GOAL, Deadline.after(DEADLINE)).solve()
+    result = solver_for(
+        SolveContext.of(PreparedProblem.of(problem), START, GOAL, Deadline.after(DEADLINE))
+    ).solve()
     assert result.status is SolveStatus.FAILED and result.spline is None
     assert result.collision is not None and WALL.name in result.collision.pair
 
@@ -113,33 +115,35 @@ def test_every_method_passes_the_post(method: MethodName) -> None:
         solution.certificate.clearance is not None
         and solution.certificate.clearance.min_clearance >= 0
     )
-    along = method in ("time_scaling", "uniform_scaling")
-    assert solution.candidates[0].reason.endswith(ALONG_PLANNED_PATH) == along
-    assert solution.candidates[0].reason.endswith(FROM_PLANNED_PATH) == (method == "polynomial_ga")
+    origins = {
+        "time_scaling": MotionOrigin.ALONG_PLANNED_PATH,
+        "uniform_scaling": MotionOrigin.ALONG_PLANNED_PATH,
+        "polynomial_ga": MotionOrigin.FROM_PLANNED_PATH,
+    }
+    reason, expected = solution.candidates[0].reason, origins.get(method)
+    for origin in (MotionOrigin.ALONG_PLANNED_PATH, MotionOrigin.FROM_PLANNED_PATH):
+        assert reason.endswith(origin.value) == (origin is expected)
 
 
 @pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
 def test_a_followed_path_is_the_smooth_one(method: MethodName) -> None:
-    """The motion stays on the smooth path along the planned one, apart from the fit of its
-    spline."""
+    """The motion stays on the smooth path, within the error of its spline's fit."""
     prepared = PreparedProblem.of(blocked(method, POST))
-    result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
+    result = solver_for(SolveContext.of(prepared, START, GOAL, Deadline.after(DEADLINE))).solve()
     assert result.spline is not None
     smooth = smooth_path(prepared, planned_path(prepared))
     assert smooth is not None and prepared.surroundings.worst_violation(smooth) is None
     nearby = KDTree(smooth.curve(np.linspace(0.0, 1.0, 20_001)))
     assert (
         nearby.query(result.spline.curve(np.linspace(0.0, result.spline.duration, 400)))[0].max()
-        < FIT
+        < FIT_TOLERANCE
     )
 
 
 def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -> None:
-    """The exact energy, against the quintic law along the same path in any duration within its
-    limits.
-    """
+    """Exact energies, compared with the quintic law along the path for all feasible durations."""
     prepared = PreparedProblem.of(blocked("time_scaling", POST))
-    result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
+    result = solver_for(SolveContext.of(prepared, START, GOAL, Deadline.after(DEADLINE))).solve()
     smooth = smooth_path(prepared, planned_path(prepared))
     assert result.spline is not None and smooth is not None
     space = bspline.uniform(60)
@@ -155,9 +159,7 @@ def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -
 
 
 def test_gradients_of_the_retiming() -> None:
-    """Cost and every constraint, tool cone and speed of the TCP included, against central
-    differences.
-    """
+    """Cost and constraints, with tool cone and TCP speed, compared with central differences."""
     cone = ToolCone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 1.5)
     prepared = PreparedProblem.of(
         problem_with(
@@ -171,26 +173,29 @@ def test_gradients_of_the_retiming() -> None:
     assert prepared.path is not None
     first = np.append(retiming.scaling.quintic[retiming.scaling.free], np.log(2.0))
     program = RetimingProgram(retiming, limits, np.ones(len(prepared.path.names)), first)
-    # away from the symmetric point, where some derivatives vanish
+    # not at the symmetric point, at which some derivatives vanish
     x = first + np.random.default_rng(5).uniform(-0.01, 0.01, len(first))
     state = program.state(x)
     for k in range(len(x)):
-        step = STEP * np.eye(len(x))[k]
+        step = EPS * np.eye(len(x))[k]
         ahead, behind = program.state(x + step), program.state(x - step)
-        slope = (ahead.cost - behind.cost) / (2 * STEP)
+        slope = (ahead.cost - behind.cost) / (2 * EPS)
         assert state.gradient[k] == pytest.approx(
-            slope, rel=DIFFERENCES, abs=DIFFERENCES * abs(state.cost)
+            slope, rel=DIFFERENCE_TOLERANCE, abs=DIFFERENCE_TOLERANCE * abs(state.cost)
         )
-        slopes = (ahead.slack - behind.slack) / (2 * STEP)
+        slopes = (ahead.slack - behind.slack) / (2 * EPS)
         scale = 1 + np.abs(slopes).max()
-        assert np.abs(state.slopes[:, k] - slopes).max() < DIFFERENCES * scale
+        assert np.abs(state.slopes[:, k] - slopes).max() < DIFFERENCE_TOLERANCE * scale
 
 
 @pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
 def test_limits_along_the_motion_hold_on_a_planned_path(method: MethodName) -> None:
     free = optimize(blocked(method, POST))
     slower = optimize(problem_with(START, GOAL, scene=Scene((POST,)), method=method, tcp_speed=0.4))
-    assert slower.certificate.valid and slower.certificate.worst_ratio["tcp_speed"] <= 1 + HELD
+    assert (
+        slower.certificate.valid
+        and slower.certificate.worst_ratio["tcp_speed"] <= 1 + LIMIT_TOLERANCE
+    )
     assert slower.trajectory.spline.duration > free.trajectory.spline.duration
     fixed = optimize(
         problem_with(

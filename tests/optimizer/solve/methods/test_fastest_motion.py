@@ -1,4 +1,4 @@
-"""The fastest motion of one candidate: what counts, and when it ends."""
+"""The search for the fastest motion of one candidate."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import pytest
 
 from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.motion.spline import lasting
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.search.fastest import fastest_of
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, problem
 
 SPLINE = lasting(time_optimal_spline(ROBOT.limits, START, GOAL), 2.0)
@@ -25,25 +26,27 @@ def prepared(**given: object) -> Run:
 
 
 def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
-    incumbent = prepared().incumbent
-    models = incumbent.prepared
+    state = prepared().state
+    models = state.prepared
 
     def cost(interval: DurationInterval) -> float:
-        return FreeSpline(models, START, GOAL, incumbent.deadline, interval).cost_of(SPLINE)
+        return FreeSpline(SolveContext.of(models, START, GOAL, state.deadline, interval)).cost_of(
+            SPLINE
+        )
 
     energy = models.cost_of(SPLINE)
-    own = DurationInterval(models.objective_parameters, LEAST_DURATION, LONGEST_DURATION)
+    own = DurationInterval(models.objective_parameters, DURATIONS.least, DURATIONS.longest)
     assert cost(own) == energy
     assert cost(replace(own, price=30.0)) == pytest.approx(energy + 30.0 * SPLINE.duration)
     assert cost(fastest(models)) == SPLINE.duration
-    assert FreeSpline(models, START, GOAL, incumbent.deadline, own).cost_of(None) == float("inf")
+    assert FreeSpline(SolveContext.of(models, START, GOAL, state.deadline, own)).cost_of(
+        None
+    ) == float("inf")
 
 
 def test_a_known_motion_counts_if_it_is_certified() -> None:
-    """A polynomial is slower than splines: one that is known is the fastest motion then, whole or
-    not at all.
-    """
-    splines, polynomials = prepared().incumbent, prepared(method="lagrange").incumbent
+    """A polynomial is slower than a known spline, which is then the fastest motion unchanged."""
+    splines, polynomials = prepared().state, prepared(method="lagrange").state
     known = fastest_of(splines, splines.candidates[0])
     candidate = polynomials.candidates[0]
     own = fastest_of(polynomials, candidate)

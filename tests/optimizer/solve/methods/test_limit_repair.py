@@ -1,6 +1,4 @@
-"""Torques far below their limits are checked at quadrature points alone: between them they stay
-within the limits.
-"""
+"""Torques far below their limits, checked at quadrature points alone, keep the limits between."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.limited_torque import limited_parts
-from joulepath.optimizer.dynamics.torque_bound import SHARPNESS
+from joulepath.optimizer.dynamics.torque_bound import TORQUE_BOUND
 from joulepath.optimizer.motion import bspline, seven_segment
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.spline import Spline, peak_rates, retimed, sample, time_scale
@@ -19,12 +17,11 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
 from tests.optimizer.moves import PAYLOAD, START, TILTED, limits, problem
 
-# finer than the certificate's grid of 1 ms
-POINTS = 6_001
-# relative; torques by the same kernel at other instants
+# samples of a motion, finer than the certificate's grid of 1 ms
+SAMPLES = 6_001
+# relative tolerance of torques by the same kernel at other instants
 ROUNDING = 1e-12
-# how far the control points are from START [rad], smallest first: short motions have the steepest
-# torques
+# spread of the control points about START [rad]: short motions have the steepest torques
 SPREADS = (1e-3, 1e-2, 0.1, 1.0)
 TASKS: list[dict[str, Any]] = [
     {},
@@ -34,7 +31,7 @@ TASKS: list[dict[str, Any]] = [
 
 
 def spaces() -> list[Basis]:
-    """Few control points, many, and knots repeated where jerk switches."""
+    """Few control points, many control points, and repeated knots at switches of jerk."""
     graded = bspline.graded(seven_segment.switches(np.full(6, 1.0), 1.0, limits()), 3)
     return [bspline.uniform(13), bspline.uniform(40), graded]
 
@@ -42,7 +39,7 @@ def spaces() -> list[Basis]:
 def random_motion(
     prepared: PreparedProblem, space: Basis, spread: float, rng: np.random.Generator
 ) -> Spline:
-    """A motion through random control points, at the greatest rates that the limits allow."""
+    """A motion through random control points at the largest feasible rates."""
     points = START + spread * rng.uniform(-1, 1, (space.n, len(START)))
     points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = points[0], points[-1]
     spline = Spline(bspline.DEGREE, space.knots, points)
@@ -71,14 +68,14 @@ def test_what_is_far_below_the_torque_limits_is_within_them_everywhere(
         for spread in SPREADS * 2:
             spline = random_motion(prepared, space, spread, rng)
             estimated = estimate(prepared, spline)
-            q, v, a = sample(spline, np.linspace(0.0, spline.duration, POINTS))
+            q, v, a = sample(spline, np.linspace(0.0, spline.duration, SAMPLES))
             truth = np.abs(prepared.limited_torques(q, v, a)).max(axis=0)
             worst = max(worst, float((truth / estimated).max()))
-            if (estimated <= SHARPNESS.far_below * tau_max).all():
+            if (estimated <= TORQUE_BOUND.far_below * tau_max).all():
                 skipped += 1
                 assert (truth <= tau_max).all()
             else:
                 assert (torque_peaks(prepared, spline) >= truth * (1 - ROUNDING)).all()
-    # with limits made to measure, every one of the motions would have been taken as far below them
-    assert worst <= 1 / SHARPNESS.far_below
+    # with limits at the measured torques, all motions would count as far below
+    assert worst <= 1 / TORQUE_BOUND.far_below
     assert skipped

@@ -23,8 +23,10 @@ from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.solve.methods import METHODS, polynomial_ga
-from joulepath.optimizer.solve.methods.method import SolveResult, with_excess
+from joulepath.optimizer.solve.methods.method import with_excess
 from joulepath.optimizer.solve.methods.polynomial_ga import PolynomialGA
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import (
     GOAL,
@@ -40,11 +42,11 @@ from tests.optimizer.moves import (
 )
 from tests.selection import long_but
 
-# share by which a wider space may spend more than a narrower one: both are solved to 5e-5, with
-# smoothed friction
-WIDER = 2e-3
-# a factor is found to 1e-5 of itself, and energy is flat there
-LEAST = 1e-6
+# relative excess of the energy in a wider space over a narrower space: both are solved to 5e-5,
+# with smoothed friction
+WIDER_SPACE = 2e-3
+# relative tolerance of the least energy over factors, which are found to 1e-5
+LEAST_ENERGY = 1e-6
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -76,15 +78,15 @@ CONDITIONS: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("number", long_but([1], range(len(CONDITIONS))))
 def test_a_free_spline_spends_least(number: int) -> None:
-    """The others are splines too, or come as near to one as its knots allow."""
+    """Other methods give splines too, or motions close to splines."""
     given = CONDITIONS[number]
     for start, goal in random_moves(51, 3):
         best = electrical(solved("bspline", start, goal, **given))
         for method in METHODS:
             if method != "bspline":
-                assert best <= electrical(solved(method, start, goal, **given)) * (1 + WIDER), (
-                    method
-                )
+                assert best <= electrical(solved(method, start, goal, **given)) * (
+                    1 + WIDER_SPACE
+                ), method
 
 
 def test_bounds_hold_for_all() -> None:
@@ -103,7 +105,7 @@ def test_a_polynomial_is_one() -> None:
 
 
 def test_a_polynomial_keeps_inside_its_joint_range() -> None:
-    """Joints that need not move draw the load in while the base swings, as far as they are let."""
+    """Joints free to move draw the load in while the base swings."""
     goal = START + np.array([2.5, 0, 0, 0, 0, 0])
     lower, upper = np.minimum(START, goal) - 0.003, np.maximum(START, goal) + 0.003
     q = solved("lagrange", START, goal).trajectory.q
@@ -118,7 +120,7 @@ def test_a_polynomial_keeps_inside_its_joint_range() -> None:
 def test_a_polynomial_may_start_and_end_on_its_limits() -> None:
     own = replace(ROBOT.limits, q_min=np.minimum(START, GOAL), q_max=np.maximum(START, GOAL))
     assert electrical(solved("lagrange", limits=own)) >= electrical(solved("lagrange")) * (
-        1 - WIDER
+        1 - WIDER_SPACE
     )
 
 
@@ -130,7 +132,7 @@ def test_a_polynomial_spends_no_more_than_the_quintic_that_it_could_be() -> None
 
 
 def test_the_factor_is_the_best_of_many() -> None:
-    """Against the same motion retimed by a hundred factors."""
+    """Compared with the motion retimed by a hundred factors."""
     for start, goal in random_moves(53, 4):
         task = PreparedProblem.of(problem(start, goal, method="uniform_scaling"))
         solution = solved("uniform_scaling", start, goal)
@@ -141,7 +143,8 @@ def test_the_factor_is_the_best_of_many() -> None:
             slower = replace(given, knots=given.knots * factor)
             tau = solution.certificate.worst_ratio["torque"]
             if tau < 0.99:  # else the factor may be that at which torque holds
-                assert electrical(solution) <= task.energy(slower).electrical.total * (1 + LEAST)
+                other = task.energy(slower).electrical.total
+                assert electrical(solution) <= other * (1 + LEAST_ENERGY)
 
 
 def test_a_tighter_torque_limit_needs_a_greater_time_scale() -> None:
@@ -174,15 +177,15 @@ def test_mechanical_work(method: str) -> None:
     assert slow.duration <= 3.0
 
 
-# with all of its generations it is better than its first population
-ALL = polynomial_ga.GENERATIONS
+# all generations of the genetic algorithm, for the test of its improvement
+ALL = polynomial_ga.POLYNOMIAL_GA
 
 
 def by_genetic_algorithm(
     start: Any = START, goal: Any = GOAL, **given: Any
 ) -> tuple[PolynomialGA, SolveResult]:
     task = PreparedProblem.of(problem(start, goal, method="polynomial_ga", **given))
-    solver = PolynomialGA(task, start, goal, NEVER)
+    solver = PolynomialGA(SolveContext.of(task, start, goal, NEVER))
     return solver, solver.solve()
 
 
@@ -190,13 +193,13 @@ def by_genetic_algorithm(
 def test_the_genetic_algorithm_is_deterministic_and_improves_on_its_first_population(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(polynomial_ga, "GENERATIONS", ALL)
+    monkeypatch.setattr(polynomial_ga, "POLYNOMIAL_GA", ALL)
     solver, attempt = by_genetic_algorithm()
     _, again = by_genetic_algorithm()
     assert attempt.spline is not None and again.spline is not None
     assert (attempt.spline.control_points == again.spline.control_points).all()
     assert attempt.spline.duration == again.spline.duration
-    # by far more than bringing it within every limit can cost
+    # the improvement exceeds the cost of bringing the motion within its limits
     assert solver.prepared.energy(attempt.spline).electrical.total < 0.999 * solver.first_cost
     assert attempt.iterations == solver.generations > 0
 
@@ -230,7 +233,7 @@ def test_the_genetic_algorithm_solves_a_few_candidates_and_says_so_of_the_others
 
 
 def test_the_genetic_algorithm_is_never_optimal_with_energy_storage_either() -> None:
-    """There the answer may be the one found without the store."""
+    """With a store, the answer may be the motion found without the store."""
     store = Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9)
     solution = optimize(problem(method="polynomial_ga", bus=store))
     assert solution.certificate.valid and solution.status == "feasible"
@@ -238,9 +241,7 @@ def test_the_genetic_algorithm_is_never_optimal_with_energy_storage_either() -> 
 
 @pytest.mark.parametrize("cost", [5.0, -5.0])
 def test_a_torque_beyond_its_limit_costs_more_even_if_the_cost_is_below_zero(cost: float) -> None:
-    """Where waiting less is a gain, costs are negative: then durations that no motor can make were
-    preferred.
-    """
+    """Costs are negative if less waiting is a gain: infeasible durations must not be preferred."""
     own = ROBOT.limits
     within, beyond = (with_excess(cost, share * own.tau_max[None], own) for share in (0.9, 1.5))
     assert within == cost and beyond == pytest.approx(cost + 2.5)

@@ -1,6 +1,4 @@
-"""Motions through configurations without a rest: exactly through them, within every limit, and of
-less energy.
-"""
+"""Motions through passes: exactly through the configurations, within limits, of less energy."""
 
 from __future__ import annotations
 
@@ -23,9 +21,10 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.passing_spline import PassingSpline
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from tests.optimizer.moves import AMPLE, GOAL, START, fixed, problem
 
-# rad; rounding of a spline at a time that is known to rounding
+# tolerance of a spline at the time of a pass [rad]
 ON_PASS = 1e-9
 
 
@@ -81,25 +80,23 @@ def test_a_motion_that_misses_a_pass_is_not_certified() -> None:
     missed[1, 3] += 2e-6
     run = Run(through(missed))
     run.prepare()
-    candidate, spline = run.incumbent.candidates[0], found.trajectory.spline
-    certificate = run.incumbent.certified(candidate, spline, run.incumbent.prepared.energy(spline))
+    candidate, spline = run.state.candidates[0], found.trajectory.spline
+    certificate = run.state.certified(candidate, spline, run.state.prepared.energy(spline))
     assert 1e-6 < certificate.pass_error < 2.1e-6 and not certificate.valid
-    # nor is one that goes through them in another order
+    # a motion through the passes in another order is not valid either
     turned = Run(through(q[[0, 2, 1, 3]]))
     turned.prepare()
     with pytest.raises(NoTrajectory):
         Run(through(missed)).as_it_is(spline)
     assert Run(through(q)).as_it_is(spline).energy.electrical.total == found.energy.electrical.total
-    other = turned.incumbent.certified(
-        turned.incumbent.candidates[0], spline, run.incumbent.prepared.energy(spline)
+    other = turned.state.certified(
+        turned.state.candidates[0], spline, run.state.prepared.energy(spline)
     )
     assert not other.valid
 
 
 def test_it_is_never_worse_than_a_known_motion_that_stops() -> None:
-    """Passes that turn the arm right round leave nothing to save: the known motion is the answer
-    then, or better.
-    """
+    """Passes that reverse the arm leave nothing to save: the answer costs no more than rests."""
     q = np.array([START, GOAL, START + 0.02 * (GOAL - START)])
     theirs = stopping(q)
     known = joined([each.trajectory.spline for each in theirs])
@@ -116,15 +113,15 @@ def test_a_given_duration_is_kept_and_the_fastest_is_faster_than_stopping() -> N
     assert slow.duration == pytest.approx(1.4 * own.duration, rel=1e-12) and slow.certificate.valid
     assert slow.energy.electrical.total > own.energy.electrical.total
     prepared = PreparedProblem.of(through(q))
-    solver = PassingSpline(prepared, q[0], q[-1], Deadline.after(AMPLE), fastest(prepared))
+    solver = PassingSpline(
+        SolveContext.of(prepared, q[0], q[-1], Deadline.after(AMPLE), fastest(prepared))
+    )
     motion = solver.solve().spline
     assert motion is not None and motion.duration < own.duration
 
 
 def test_it_passes_by_an_obstacle() -> None:
-    """A box in the way of the tool before the pass: the motion goes round it, and still through the
-    pass.
-    """
+    """With a box before the pass, the motion avoids the box and still passes."""
     q = np.array(
         [
             [0.0, -1.2, 1.6, -2.0, -1.57, 0.0],

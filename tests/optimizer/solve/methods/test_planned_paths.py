@@ -1,6 +1,4 @@
-"""Planned paths of candidates: to goals that differ by full turns, in how many states, and when
-their solves end.
-"""
+"""Planned paths of candidates: goals by full turns, checked states, and early ends of solves."""
 
 from __future__ import annotations
 
@@ -10,14 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.collision.planner.path_planner import (
-    USUAL,
-    Effort,
-    PlannedPaths,
-    PlanningEnd,
-    along,
-    plan_paths,
-)
+from joulepath.optimizer.collision.planner.joint_path import path_samples
+from joulepath.optimizer.collision.planner.path_planner import USUAL_EFFORT, Effort, plan_paths
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -25,9 +18,15 @@ from joulepath.optimizer.problem.bus import Bus, BusMode
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.solve.methods import free_spline, planned_paths
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.planned_paths import FROM_PLANNED_PATH
-from joulepath.optimizer.solve.methods.sqp_method import NOT_MUCH_BETTER, above
+from joulepath.optimizer.solve.methods.method import above
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import (
+    MotionOrigin,
+    SolveReason,
+    SolveResult,
+    SolveStatus,
+)
+from joulepath.optimizer.solve.methods.sqp_method import SQP_METHOD
 from joulepath.optimizer.surroundings import Surroundings
 from tests.optimizer.collision.test_path_planner import (
     AMPLE,
@@ -40,12 +39,12 @@ from tests.optimizer.collision.test_path_planner import (
 
 
 def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
-    """The first bars are passed once: what comes after is the same, a full turn of a wrist away."""
+    """A path to a goal is reused for the goal after a full turn of a wrist."""
     arm, q_start, q_goal = task("cage")
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     turned = q_goal - 2 * np.pi * np.sign(q_goal) * np.eye(6)[3]
     alone = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), Effort(paths=1))
-    beside = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), like=path)
+    beside = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), template=path)
     (found,) = beside.paths
     np.testing.assert_array_equal(found[[0, -1]], [q_start, turned])
     assert least(arm, between(found)) > 0
@@ -53,13 +52,11 @@ def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
 
 
 def test_more_paths_are_planned_only_where_the_first_is_hard_to_find() -> None:
-    """Around the post there are more than two; a first path that counts as easy leads to the usual
-    ones.
-    """
+    """There are more than two paths around the post; an easy first path gives the usual paths."""
     ends, more = task("post"), Effort(paths=4, more_states=12_000)
     usual, many, easy = (
         plan_paths(*ends, Deadline.after(AMPLE), effort).paths
-        for effort in (USUAL, more, replace(more, easy=10**9))
+        for effort in (USUAL_EFFORT, more, replace(more, easy=10**9))
     )
     assert 2 == len(usual) < len(many) <= 4
     for path, same in zip(usual, easy, strict=True):
@@ -85,24 +82,26 @@ def test_more_paths_are_planned_for_the_only_candidate(
 
 def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion() -> None:
     arm, q_start, q_goal = task("post")
-    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
+    prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    path, t = along(path, 1.0, arm.active_limits.v_max)
-    alone = solver.along_path(path, t)
-    energy = solver.prepared.cost_of(alone.spline)
-    solver.best_known = energy / NOT_MUCH_BETTER * 1.01
-    np.testing.assert_array_equal(
-        solver.along_path(path, t).spline.control_points, alone.spline.control_points
-    )  # type: ignore[union-attr]
-    solver.best_known = energy / 1.3
-    assert 0 < solver.along_path(path, t).iterations < alone.iterations
-    solver.best_known = energy / 10
-    skipped = solver.along_path(path, t)
+    path, t = path_samples(path, 1.0, arm.active_limits.v_max)
+
+    def solved(incumbent_cost: float) -> SolveResult:
+        context = SolveContext.of(prepared, q_start, q_goal, NEVER)
+        return FreeSpline(replace(context, incumbent_cost=incumbent_cost)).along_path(path, t)
+
+    alone = solved(np.inf)
+    energy = prepared.cost_of(alone.spline)
+    near = solved(energy / SQP_METHOD.obstacle_margin * 1.01)
+    assert alone.spline is not None and near.spline is not None
+    np.testing.assert_array_equal(near.spline.control_points, alone.spline.control_points)
+    assert 0 < solved(energy / 1.3).iterations < alone.iterations
+    skipped = solved(energy / 10)
     assert skipped.status is SolveStatus.PRUNED and skipped.iterations == 0
 
 
 @pytest.mark.parametrize(
-    ("best_known", "was_postponed", "others", "thorough"),
+    ("incumbent_cost", "was_postponed", "others", "thorough"),
     [
         (np.inf, False, 1, False),
         (np.inf, True, 1, True),
@@ -111,28 +110,31 @@ def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion()
     ],
 )
 def test_many_states_are_checked_only_where_few_were_in_vain(
-    best_known: float,
+    incumbent_cost: float,
     was_postponed: bool,
     others: int,
     thorough: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Walled in, the planning uses all states that it may; so long as others are open, the
-    candidate is postponed.
-    """
-    monkeypatch.setattr(planned_paths, "FEW_STATES", 100)
-    monkeypatch.setattr(planned_paths, "MOST_STATES", 1_000)
+    """Walled in, the planning uses all its states; with other candidates open, it is postponed."""
+    limited = replace(planned_paths.PLANNED_PATHS, few_states=100, most_states=1_000)
+    monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     arm, q_start, q_goal = walled_in()
-    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
-    solver.best_known, solver.was_postponed = best_known, was_postponed
-    solver.other_goals = lambda: [q_goal] * others
+    prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
+    context = replace(
+        SolveContext.of(prepared, q_start, q_goal, NEVER),
+        incumbent_cost=incumbent_cost,
+        was_postponed=was_postponed,
+        other_goals=lambda: [q_goal] * others,
+    )
+    solver = FreeSpline(context)
     found = planned_paths.plan(solver)
     assert found.end is PlanningEnd.EXHAUSTED
     assert (found.checked_states >= 1_000) == thorough
     failed = planned_paths.without_path(
-        solver, SolveResult(SolveStatus.FAILED, "it collides"), found
+        solver, SolveResult(SolveStatus.FAILED, SolveReason.MOTION_COLLIDES), found
     )
-    few = np.isinf(best_known) and not thorough
+    few = np.isinf(incumbent_cost) and not thorough
     assert failed.status is (SolveStatus.POSTPONED if few else SolveStatus.FAILED)
 
 
@@ -152,47 +154,50 @@ def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(
     arm, q_start, q_goal = task("post")
     asked = problem(arm, q_start, q_goal)
     prepared = PreparedProblem.of(replace(asked, arm=replace(asked.arm, bus=Bus(mode))))
-    solver = FreeSpline(prepared, q_start, q_goal, NEVER)
+    context = SolveContext.of(prepared, q_start, q_goal, NEVER)
+    solver = FreeSpline(replace(context, incumbent_cost=0.1))
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    solver.best_known = 0.1
     assert (
-        solver.along_path(*along(path, 1.0, arm.active_limits.v_max)).iterations == 0
+        solver.along_path(*path_samples(path, 1.0, arm.active_limits.v_max)).iterations == 0
     ) == skipped
 
 
 def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_paths(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It may have left it on the wrong side; of both motions, the one of least energy is kept, with
-    its own reason.
-    """
+    """The motion may have left the obstacle on the wrong side: the cheaper motion is kept."""
     arm, q_start, q_goal = task("post")
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
+    context = SolveContext.of(prepared, q_start, q_goal, NEVER)
     with monkeypatch.context() as alone:
-        alone.setattr(free_spline, "WAY_OUT", np.inf)
-        direct = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+        settings = free_spline.FREE_SPLINE
+        alone.setattr(free_spline, "FREE_SPLINE", replace(settings, detour_cost=np.inf))
+        direct = FreeSpline(context).solve()
     energy = prepared.cost_of(direct.spline)
-    assert direct.unhindered is not None and energy > free_spline.WAY_OUT * direct.unhindered
-    compared = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
-    assert prepared.cost_of(compared.spline) <= energy and compared.solves > direct.solves
-    assert (FROM_PLANNED_PATH in compared.reason) == (prepared.cost_of(compared.spline) < energy)
-    # a path that leads nowhere better
-    costlier = replace(compared, spline=direct.spline, reason=FROM_PLANNED_PATH)
-    monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_: costlier)
-    kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
     assert (
-        kept.reason == direct.reason
+        direct.unobstructed_cost is not None
+        and energy > settings.detour_cost * direct.unobstructed_cost
+    )
+    compared = FreeSpline(context).solve()
+    assert prepared.cost_of(compared.spline) <= energy and compared.solves > direct.solves
+    planned = MotionOrigin.FROM_PLANNED_PATH
+    assert (compared.origin is planned) == (prepared.cost_of(compared.spline) < energy)
+    # a planned path without a better motion
+    costlier = replace(compared, spline=direct.spline, origin=planned)
+    monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_: costlier)
+    kept = FreeSpline(context).solve()
+    assert (
+        kept.message == direct.message
         and prepared.cost_of(kept.spline) == energy
         and not kept.cut_short
     )
-    # a deadline that ends the comparison ends the solution of the candidate: nobody may call it
-    # optimal
+    # if the deadline ends the comparison, the result must not count as optimal
     for late in (
-        SolveResult(SolveStatus.OUT_OF_TIME, ""),
+        SolveResult(SolveStatus.OUT_OF_TIME, SolveReason.DEADLINE_PASSED),
         replace(direct, status=SolveStatus.FAILED, cut_short=True),
     ):
         monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_, late=late: late)
-        kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+        kept = FreeSpline(context).solve()
         assert (
             kept.cut_short
             and kept.status is SolveStatus.SOLVED

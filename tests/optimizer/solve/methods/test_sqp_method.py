@@ -1,9 +1,8 @@
-"""One candidate from guess to motion: it holds every limit between the nodes too, and says so when
-it cannot.
-"""
+"""Solves of one candidate from guess to motion, within all limits between the nodes too."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import count, product
 from typing import Any
 
@@ -20,8 +19,11 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods import METHODS, solver_for
 from joulepath.optimizer.solve.methods import duration_intervals as duration_intervals
-from joulepath.optimizer.solve.methods.free_spline import TIGHT, FreeSpline
-from joulepath.optimizer.solve.methods.method import Method, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,
@@ -36,8 +38,10 @@ from tests.optimizer.moves import (
 )
 from tests.selection import long_but
 
-SAMPLES = 3001  # at primes and their like: on nobody's grid
-HELD = 1e-6  # share of a limit, as the certificate's
+# samples of a motion, apart from all grids of the optimiser
+SAMPLES = 3001
+# relative excess over a limit, as of the certificate
+LIMIT_TOLERANCE = 1e-6
 ROUNDING = 1e-9
 
 CONDITIONS: list[dict[str, Any]] = [
@@ -50,30 +54,35 @@ CONDITIONS: list[dict[str, Any]] = [
 
 
 def solver(
-    start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any
+    start: Array,
+    goal: Array,
+    fastest: bool = False,
+    wait: float = 60.0,
+    is_sole: bool = False,
+    deadline: Deadline | None = None,
+    **given: Any,
 ) -> Method:
     compile_kernel(ROBOT)
     task = PreparedProblem.of(problem(start, goal, **given))
     interval = duration_intervals.fastest(task) if fastest else None
-    return solver_for(task, start, goal, Deadline.after(wait), interval)
+    context = SolveContext.of(task, start, goal, deadline or Deadline.after(wait), interval)
+    return solver_for(replace(context, is_sole=is_sole))
 
 
 def spline(attempt: SolveResult) -> Spline:
-    assert attempt.status is SolveStatus.SOLVED and attempt.spline is not None, attempt.reason
+    assert attempt.status is SolveStatus.SOLVED and attempt.spline is not None, attempt.message
     return attempt.spline
 
 
 def assert_held(task: Problem, motion: Spline) -> None:
-    """Every limit, at samples apart from any grid of the optimiser's, with SciPy's spline and
-    Pinocchio's torques.
-    """
+    """All limits at samples apart from the optimiser's grids, by SciPy and Pinocchio."""
     own = task.arm.active_limits
     curve = BSpline(motion.knots, motion.control_points, motion.degree)
     t = np.linspace(0.0, motion.duration, SAMPLES)
     q, v, a, jerk = (curve(t, d) for d in range(4))
     tau = torques(task, q, v, a) + task.arm.friction_law.torque(v)
     for values, maxima in ((v, own.v_max), (a, own.a_max), (jerk, own.j_max), (tau, own.tau_max)):
-        assert (np.abs(values) <= maxima * (1 + HELD)).all()
+        assert (np.abs(values) <= maxima * (1 + LIMIT_TOLERANCE)).all()
     assert (q >= own.q_min - ROUNDING).all() and (q <= own.q_max + ROUNDING).all()
     assert np.abs(v[[0, -1]]).max() < 1e-8 and np.abs(a[[0, -1]]).max() < 1e-6
     assert q[0] == pytest.approx(np.asarray(task.start), abs=ROUNDING)
@@ -104,7 +113,7 @@ def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
 
 
 def test_a_time_scaled_motion_stays_on_its_line() -> None:
-    """Every control point, so every point; each a little further along."""
+    """All control points, hence all points, lie on the line in order."""
     for start, goal in random_moves(32, 4):
         points = spline(solver(start, goal, method="time_scaling").solve()).control_points
         displacement = goal - start
@@ -131,15 +140,13 @@ def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
 
 
 def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
-    """Its goal has moved since: in fewer steps than from fits, to no more energy, within every
-    limit.
-    """
+    """After the goal moved: in fewer steps than from a fit, at no more energy, within limits."""
     steps = np.zeros(2, dtype=int)
     for start, goal in ((START, GOAL), *random_moves(3, 1)):
         own, moved = solver(start, goal + 0.02), solver(start, goal)
-        assert isinstance(own, FreeSpline) and isinstance(moved, FreeSpline)
-        tight = spline(own.solve_tightly(*sampled(spline(own.solve())), 1e-3))
-        again, fitted = moved.solve_regraded(tight), moved.solve_from(*sampled(tight), fine=True)
+        tight = spline(own.solve_at_switches(spline(own.solve()), 1e-3))
+        again = moved.solve_at_switches(tight, 1e-3)
+        fitted = moved.solve_from(*sampled(tight), fine=True)
         steps += again.iterations, fitted.iterations
         cost = moved.prepared.cost_of
         assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
@@ -148,16 +155,13 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
 
 
 def test_a_sole_candidate_is_refined_at_once() -> None:
-    """Its coarse motion is only a guess: the result is that of two solves, one after the other, and
-    within limits.
-    """
-    at_once, twice = solver(START, GOAL), solver(START, GOAL)
-    at_once.is_sole = True
+    """The coarse motion is only a guess: the result is that of two solves, within limits."""
+    at_once, twice = solver(START, GOAL, is_sole=True), solver(START, GOAL)
     found = spline(at_once.solve())
     coarse = spline(twice.solve())
     assert FreeSpline.may_refine(coarse) and not FreeSpline.may_refine(found)
     assert_held(at_once.prepared.problem, found)
-    tight = coarse.duration < TIGHT * shortest_duration(GOAL - START, ROBOT.limits)
+    tight = coarse.duration < SPLINE_SPACES.tight * shortest_duration(GOAL - START, ROBOT.limits)
     cost = at_once.prepared.cost_of
     assert cost(found) == pytest.approx(
         cost(spline(twice.refined(coarse, fine=bool(tight)))), rel=1e-3
@@ -166,10 +170,10 @@ def test_a_sole_candidate_is_refined_at_once() -> None:
 
 @pytest.mark.parametrize("why", ["refining fails", "another candidate", "little time"])
 def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    own = solver(START, GOAL, wait=0.8 if why == "little time" else 60.0)
-    own.is_sole = why != "another candidate"
+    wait, is_sole = 0.8 if why == "little time" else 60.0, why != "another candidate"
+    own = solver(START, GOAL, wait=wait, is_sole=is_sole)
     if why == "refining fails":
-        failed = SolveResult(SolveStatus.FAILED, "for a test", 5, 1)
+        failed = SolveResult(SolveStatus.FAILED, SolveReason.NOT_CONVERGED, 5, 1)
         monkeypatch.setattr(FreeSpline, "refined", lambda *_, **__: failed)
     result = own.solve()
     assert FreeSpline.may_refine(spline(result))
@@ -181,31 +185,29 @@ def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyP
     ("readings", "refined"), [(25, False), (30, False), (34, False), (200, False), (1000, True)]
 )
 def test_on_a_slow_machine_a_checked_motion_comes_first(readings: int, refined: bool) -> None:
-    """Of the time that is left, a reading of the clock takes a share; coarse and refined motion
-    take 34 of them.
-    """
-    own, ticks = solver(START, GOAL), count()
-    own.is_sole, own.deadline = True, Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
+    """Every reading of the clock takes a share of the time; both solves take 34 readings."""
+    ticks = count()
+    deadline = Deadline(2.0, clock=lambda: 2.0 * next(ticks) / readings)
+    own = solver(START, GOAL, is_sole=True, deadline=deadline)
     found = spline(own.solve())
     assert FreeSpline.may_refine(found) is not refined
     assert_held(own.prepared.problem, found)
 
 
 def test_a_coarse_motion_that_collides_is_no_guess() -> None:
-    """Of this move it hits the arm itself: clearance constraints are added to it, as without a
-    refined motion.
-    """
+    """The coarse motion hits the arm itself: clearance constraints are added, as usual."""
     start, goal = list(random_moves(5, 7))[6]
-    own, usual = (solver(start, goal, collisions=True) for _ in range(2))
-    own.is_sole = True
+    own, usual = (
+        solver(start, goal, collisions=True, is_sole=is_sole) for is_sole in (True, False)
+    )
     found, expected = own.solve(), usual.solve()
-    assert expected.unhindered is not None
-    assert found.unhindered == pytest.approx(expected.unhindered)
+    assert expected.unobstructed_cost is not None
+    assert found.unobstructed_cost == pytest.approx(expected.unobstructed_cost)
     assert FreeSpline.may_refine(spline(found))
 
 
 def slowly(speed: float, **given: object) -> FreeSpline:
-    """The solver of a move whose joints are limited to a speed [rad/s]."""
+    """Method of a move with joints limited to a speed [rad/s]."""
     own = solver(START, GOAL, **{"limits": limits(v_max=speed)} | given)
     assert isinstance(own, FreeSpline)
     return own
@@ -228,7 +230,7 @@ def test_a_slow_motion_has_its_first_knots_at_the_ramps_and_is_refined_from_itse
     "given", [{}, {"objective": "mechanical", "duration_max": 15.0}, {"limits": ROBOT.limits}]
 )
 def test_other_first_knots_are_evenly_spaced(given: dict[str, object]) -> None:
-    """At the robot's own limits of speed; and of least work, for which no time is too long."""
+    """At the speed limits of the robot, and for least work, which has no longest useful time."""
     own = slowly(0.1, **given)
     even = bool(np.ptp(np.diff(np.unique(spline(own.solve()).knots))) < 1e-9)
     assert even is bool(given)

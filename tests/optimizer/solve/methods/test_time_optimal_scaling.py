@@ -1,6 +1,4 @@
-"""The shortest law along a straight line: closed forms where torque is ample, and a true bound
-where it is not.
-"""
+"""Time-optimal scaling of a straight line: closed forms, and a bound under tight torque."""
 
 from __future__ import annotations
 
@@ -18,7 +16,11 @@ from joulepath.optimizer.motion.bspline import DEGREE
 from joulepath.optimizer.motion.time_scalings import quintic
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.baselines import broken_limits
-from joulepath.optimizer.solve.methods.time_optimal_scaling import GRID, TRUST, time_optimal_on_line
+from joulepath.optimizer.solve.methods.time_optimal_scaling import (
+    BOUND_SHARE,
+    GRID,
+    time_optimal_on_line,
+)
 from tests.optimizer.moves import (
     CEILING,
     GOAL,
@@ -31,10 +33,9 @@ from tests.optimizer.moves import (
     torques,
 )
 
-# relative; acceleration switches somewhere between two of the 60 steps, and toppra's lies on one of
-# them
+# relative error of the duration: acceleration switches between two of the grid points
 GRID_STEP = 0.02
-# of the line; a law's corner is rounded over the reach of a few Greville points
+# error of a scaling at its corners, rounded over a few Greville points [fraction of the line]
 CORNER = 0.02
 ALMOST_WEIGHTLESS: dict[str, Any] = {"gravity": [0, 0, -0.01]}
 WEAK = [60.0, 75.0, 45.0, 12.0, 10.0, 9.0]
@@ -51,17 +52,15 @@ def law_of(start: Array, goal: Array, **given: Any) -> Any:
 def test_one_joint_with_ample_torque_moves_in_a_trapezoid(
     displacement: float, duration: float
 ) -> None:
-    """The last joint at 3.14 rad/s and 10 rad/s²: T = Δ/v + v/a, or 2 (Δ/a)^½ where it turns before
-    its full speed.
-    """
+    """The last joint at 3.14 rad/s and 10 rad/s²: T = Δ/v + v/a, or 2 (Δ/a)^½ below full speed."""
     law = law_of(START, START + displacement * np.eye(6)[5], **ALMOST_WEIGHTLESS)
     assert law.times[-1] == pytest.approx(duration, rel=GRID_STEP)
-    assert TRUST * law.times[-1] == pytest.approx(law.duration_bound)
+    assert BOUND_SHARE * law.times[-1] == pytest.approx(law.duration_bound)
     assert law.duration_bound <= duration
 
 
 def test_the_law_runs_from_rest_to_rest() -> None:
-    """Time goes on, slowest at the ends, and with as much speed as the limits allow in between."""
+    """Times increase, slowly at the ends, at the speed limit in between."""
     law = law_of(START, GOAL)
     steps = np.diff(law.times)
     assert len(law.times) == len(GRID) and law.times[0] == 0
@@ -71,9 +70,7 @@ def test_the_law_runs_from_rest_to_rest() -> None:
 
 
 def fastest_quintic(start: Array, goal: Array, **given: Any) -> float:
-    """The least duration [s] at which the straight quintic holds every limit but jerk, by
-    bisection.
-    """
+    """Shortest duration [s] of the straight quintic without jerk limits, by bisection."""
     task = problem(start, goal, **given)
     free = problem(
         start,
@@ -91,7 +88,7 @@ def fastest_quintic(start: Array, goal: Array, **given: Any) -> float:
 
 @pytest.mark.parametrize("weak", [False, True], ids=["as it comes", "weak"])
 def test_no_quintic_is_faster(weak: bool) -> None:
-    """Where torque is ample, its smooth acceleration costs it time, but not the treble."""
+    """With ample torque, the quintic takes more time, but less than threefold."""
     given: dict[str, Any] = {
         "payload": PAYLOAD,
         "limits": limits(tau_max=WEAK) if weak else limits(),
@@ -110,9 +107,7 @@ def test_no_quintic_is_faster(weak: bool) -> None:
 
 
 def test_torque_counts_with_payload_and_mounting() -> None:
-    """An arm with little torque is slower, and slower still under a load; how it hangs makes a
-    difference.
-    """
+    """Less torque or a load make the arm slower; the direction of gravity matters."""
     weak = limits(tau_max=[150.0, 60.0, 150.0, 28.0, 28.0, 28.0])
     lift = START + np.array([0.0, 1.0, -0.3, 0.0, 0.0, 0.0])
     strong = law_of(START, lift).duration_bound
@@ -124,9 +119,7 @@ def test_torque_counts_with_payload_and_mounting() -> None:
 
 
 def test_no_law_where_the_arm_cannot_be_held_on_the_way() -> None:
-    """Folded at both ends, stretched out in the middle: there gravity asks for more than the
-    shoulder has.
-    """
+    """Folded at both ends and stretched in the middle, beyond the torque of the shoulder."""
     start, goal = np.array([0.0, 0.0, 2.7, 0, 0, 0]), np.array([0.0, 0.0, -2.7, 0, 0, 0])
     ends = np.abs(torques(problem(), np.array([start, goal]), np.zeros((2, 6)), np.zeros((2, 6))))
     middle = np.abs(
@@ -149,7 +142,7 @@ def test_no_travel_takes_no_time() -> None:
     "space", [bspline.uniform(13), bspline.graded(np.array([0.1, 0.4, 0.6, 0.9]), 3)]
 )
 def test_control_values_follow_the_law(space: bspline.Basis) -> None:
-    """At rest at both ends, never turning back, and near the law itself in between."""
+    """The spline rests at both ends, is monotonic, and stays close to the scaling."""
     law = law_of(START, GOAL)
     values = law.fractions(space.knots)
     assert values[:3].tolist() == [0, 0, 0] and values[-3:].tolist() == [1, 1, 1]

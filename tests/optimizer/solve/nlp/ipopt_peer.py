@@ -19,14 +19,13 @@ from joulepath.optimizer.motion.bspline import REST_POINTS, Basis
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from tests.optimizer.moves import ROBOT
 
-# of the optimiser's grid, every so many points of each knot span, both of its ends among them
+# distance of the grid points used, in points of the optimiser's grid; a divisor of those of a span
 THINNING = 8
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """Where IPOPT ended: whether it converged, cost [J], duration [s], free control points (m,
-    nq)."""
+    """Result of IPOPT: convergence, cost [J], duration [s], free control points (m, nq)."""
 
     converged: bool
     cost: float
@@ -42,9 +41,7 @@ def thinned(basis: Basis) -> Array:
 
 
 class Peer:
-    """One program family: motions of all joints in a spline space. Built once, solved for any ends
-    and limits.
-    """
+    """Programs of motions in a spline space, built once and solved for any ends and limits."""
 
     def __init__(self, basis: Basis) -> None:
         nq, m = ROBOT.nq, basis.n - 2 * REST_POINTS
@@ -81,7 +78,7 @@ class Peer:
         )
 
     def solve(self, program: NonlinearProgram, free: Array, duration: float) -> Optimum:
-        """The optimum near a guess, under the program's own limits and duration bounds."""
+        """Local optimum near a guess, under the limits and duration bounds of the program."""
         limits, line = program.limits, program.coordinates
         bounds = np.concatenate([np.ones(self._rows), np.tile(limits.tau_max, self._nodes)])
         found = self._solver(

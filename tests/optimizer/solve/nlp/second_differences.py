@@ -1,4 +1,4 @@
-"""The curvature of what an NLP holds against second differences of its cost."""
+"""Curvature of the equations of an NLP, compared with second differences of the cost."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from joulepath.optimizer.solve.nlp.passing import Passing
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide
 from tests.optimizer.dynamics.kernel_states import places
 
-# duration [s], and length of a step
-DURATION, STEP = 2.0, 1e-3
+# duration of the motions [s]
+DURATION = 2.0
+# length of a step of the differences
+EPS = 1e-3
 
 
 def without_dry_friction(program: NonlinearProgram) -> NonlinearProgram:
-    """The program of an arm whose friction has no step: the Hessian leaves out what its reversal
-    makes concave.
-    """
+    """The program without dry friction, whose reversal is concave and left out of the Hessian."""
     p = program.p.copy()
     p[places("coulomb", program.kernel.nq)] = 0.0
     return replace(program, p=p)
@@ -36,19 +36,25 @@ def assert_curvature(
     steps: Sequence[Array],
     relative: float,
 ) -> None:
-    """Second differences of the cost of motions that are `put` back on what is held at `free` after
-    each of the `steps` (m, r), of length 1, which keep it to first order.
+    """Compare the Hessian of cost and equations with second differences of the cost.
 
-    `drifted` is what the cost changes by to first order, for its gradient and the drift (m, r)
-    along what is held that putting back makes.
+    Args:
+        own: the NLP.
+        free: free control points that meet the equations, shape (m, r).
+        at: the equations at these points.
+        put: puts free control points back on the equations.
+        drifted: change of the cost to first order, for its gradient and the drift (m, r) along the
+            equations made by `put`.
+        steps: steps (m, r) of length 1 that meet the equations to first order.
+        relative: relative tolerance.
     """
     line = own.derivatives(free, DURATION, np.zeros((len(own.basis.nodes), own.r)))
     gradient = line.gradient[:-1].reshape(free.shape)
-    # a cost whose gradient along what is held is zero: else how a step is put back counts, too
+    # with the gradient along the equations taken out, the way of putting back does not matter
     hessian = line.hessian[:-1, :-1] + at.curvature(gradient, free.size)
     for step in steps:
-        sides = [put(free + sign * STEP * step) for sign in (-1, 1)]
+        sides = [put(free + sign * EPS * step) for sign in (-1, 1)]
         along = drifted(gradient, sum(sides) - 2 * free)
         second = sum(own.value(each, DURATION)[0] for each in sides) - 2 * line.cost - along
-        exact = float(step.ravel() @ hessian @ step.ravel()) * STEP * STEP
+        exact = float(step.ravel() @ hessian @ step.ravel()) * EPS * EPS
         assert second == pytest.approx(exact, rel=relative, abs=1e-9 * abs(line.cost))

@@ -1,5 +1,4 @@
-"""Path constraints as rows of an NLP: gradients and Hessian against finite differences in (s,
-T)."""
+"""Path constraints as rows of an NLP: gradients and Hessian against finite differences."""
 
 from __future__ import annotations
 
@@ -18,12 +17,13 @@ from joulepath.optimizer.solve.nlp.active_path_constraints import PathConstraint
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from tests.optimizer.moves import GOAL, ROBOT, START
 
-STEP = 1e-6  # of control points [rad, or of the line's fraction] and of the duration [s]
-# relative to the largest entry: central differences of values and gradients of order one
-FIRST = 1e-7
-# the Hessian is itself a forward difference, of step 1e-6
-SECOND = 1e-4
-# of its halves
+# step of control points [rad, or fraction of the line] and of the duration [s] in differences
+EPS = 1e-6
+# tolerance relative to the largest entry
+GRADIENT_TOLERANCE = 1e-7
+# the same; the Hessian itself is a forward difference with a step of 1e-6
+HESSIAN_TOLERANCE = 1e-4
+# tolerance of the symmetry of the Hessian
 ROUNDING = 1e-13
 SPACE = bspline.uniform(9)
 # a path point of the middle and one near the end
@@ -38,7 +38,7 @@ PATH = PathConstraints(
 
 
 class Case:
-    """Rows of a NLP in joints or along a line, with a point that is bent and moving."""
+    """Rows of an NLP in joints or along a line, at a point of a curved motion."""
 
     def __init__(self, kind: str) -> None:
         build = {"joints": Coordinates.joints, "line": Coordinates.straight_line}[kind]
@@ -82,12 +82,12 @@ def test_gradients_are_those_of_finite_differences(case: Case) -> None:
     gradients = case.gradients(case.x)
     n = len(case.x)
     assert gradients.shape == (len(SPACE.at_path[0]) * len(PATH.names), n) and case.rows.n == n
-    steps = STEP * np.eye(n)
+    steps = EPS * np.eye(n)
     slopes = np.stack(
-        [(case.values(case.x + d) - case.values(case.x - d)).ravel() / (2 * STEP) for d in steps],
+        [(case.values(case.x + d) - case.values(case.x - d)).ravel() / (2 * EPS) for d in steps],
         axis=1,
     )
-    assert np.abs(gradients - slopes).max() < FIRST * np.abs(slopes).max()
+    assert np.abs(gradients - slopes).max() < GRADIENT_TOLERANCE * np.abs(slopes).max()
 
 
 def test_the_hessian_is_the_slope_of_the_gradients(case: Case) -> None:
@@ -96,15 +96,15 @@ def test_the_hessian_is_the_slope_of_the_gradients(case: Case) -> None:
     weights = np.zeros_like(values.ratios.value)
     weights[POINTS, :] = np.array([[0.7, 1.3], [0.4, 2.0]])
     hessian = case.rows.hessian(values, T, weights)
-    steps = STEP * np.eye(len(case.x))
+    steps = EPS * np.eye(len(case.x))
     slopes = np.stack(
         [
-            weights.ravel() @ (case.gradients(case.x + d) - case.gradients(case.x - d)) / (2 * STEP)
+            weights.ravel() @ (case.gradients(case.x + d) - case.gradients(case.x - d)) / (2 * EPS)
             for d in steps
         ]
     )
-    assert np.abs(hessian - slopes).max() < SECOND * np.abs(slopes).max()
-    assert np.abs(hessian[-1] - slopes[-1]).max() < SECOND * np.abs(slopes[-1]).max()
+    assert np.abs(hessian - slopes).max() < HESSIAN_TOLERANCE * np.abs(slopes).max()
+    assert np.abs(hessian[-1] - slopes[-1]).max() < HESSIAN_TOLERANCE * np.abs(slopes[-1]).max()
     assert np.abs(hessian - hessian.T).max() < ROUNDING * np.abs(hessian).max()
 
 

@@ -1,7 +1,6 @@
-"""Motions among obstacles: they keep away, they cost no less than without, and what is far costs
-nothing.
-"""
+"""Clearance constraints: distance of motions to obstacles, cost, and gradients."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,7 @@ from joulepath import optimize
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_constraint import (
-    CHECKED,
-    COUNTED,
-    RESERVE,
-    SCALE,
+    CLEARANCE_CONSTRAINT,
     ClearanceConstraint,
 )
 from joulepath.optimizer.collision.model import CollisionModel
@@ -28,28 +24,34 @@ from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
-from joulepath.optimizer.solve.methods.limit_repair import REPAIR_MARGIN
-from joulepath.optimizer.solve.methods.method import SolveResult, SolveStatus
-from joulepath.optimizer.solve.methods.sqp_method import COSTLIER, NO_BETTER
-from joulepath.optimizer.solve.nlp.working_set_qp import NEAR_PATH
+from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
+from joulepath.optimizer.solve.methods.solve_context import SolveContext
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET
 from tests.optimizer.moves import fixed, problem_with
 
 ROBOT = load_robot("ur5e")
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([1.8, -1.1, 1.9, -2.4, -1.57, 0.4])
-# of the motion between the two without anything in the way: where the flange passes
-WAY = np.array([0.0, -0.57, 0.27])
-# replay, and where gradients are differenced [rad]; distances are smooth there to their own
-# curvature
-REPLAY, STEP, GRADIENT_TOLERANCE = 1e-4, 1e-6, 1e-4
-# a limit that binds is used up to the solver's own margins
+# point of the flange on the motion from HOME to GOAL without obstacles [m]
+WAYPOINT = np.array([0.0, -0.57, 0.27])
+# tolerance of replayed distances [m]
+REPLAY = 1e-4
+# step of joint positions in differences of distances, which are smooth there [rad]
+EPS = 1e-6
+# relative tolerance of gradients
+GRADIENT_TOLERANCE = 1e-4
+# share of an active limit that is used within the margins of the solver
 USED = 0.999
-# one whose peaks between the points of the program are repaired is tightened by one and a half
-# times their excess
+# the same after peaks between the path points were repaired by one and a half times their excess
 USED_AFTER_REPAIR = 0.997
-# above this a share is exact
-COUNTED_SHARE = 1 - (COUNTED - RESERVE) / SCALE
-# energies of the same motion solved apart
+# ratio of a clearance above which it is exact
+COUNTED_SHARE = (
+    1
+    - (CLEARANCE_CONSTRAINT.gradient_distance - CLEARANCE_CONSTRAINT.reserve)
+    / CLEARANCE_CONSTRAINT.ratio_range
+)
+# relative tolerance of energies of one motion solved twice
 SAME_ENERGY = 1e-3
 
 
@@ -60,16 +62,16 @@ def at(*xyz: float) -> Array:
 
 
 def low_post(margin: float = 0.0) -> Obstacle:
-    return Obstacle("post", Box(np.array([0.08, 0.08, 0.25])), at(WAY[0], WAY[1], 0.125), margin)
+    shape = Box(np.array([0.08, 0.08, 0.25]))
+    return Obstacle("post", shape, at(WAYPOINT[0], WAYPOINT[1], 0.125), margin)
 
 
 POST = Scene((low_post(),))
 Fields = dict[str, Any]
 
 
-def solved(*obstacles: Obstacle, **given: object) -> Solution:
-    problem = problem_with(HOME, GOAL, windings=False, scene=Scene(obstacles), **given)  # type: ignore[arg-type]
-    return optimize(problem)
+def solved(*obstacles: Obstacle, **given: Any) -> Solution:
+    return optimize(problem_with(HOME, GOAL, windings=False, scene=Scene(obstacles), **given))
 
 
 def least_distance(solution: Solution, *obstacles: Obstacle) -> float:
@@ -109,23 +111,22 @@ def test_what_is_far_away_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("given", "reason"),
     [
-        ({}, COSTLIER),
-        ({"objective": "mechanical"} | fixed(2.0), NO_BETTER),
+        ({}, SolveReason.PROMISES_NO_LESS),
+        ({"objective": "mechanical"} | fixed(2.0), SolveReason.COLLIDES_AND_COSTS_MORE),
     ],  # no promise is made of work
     ids=["electrical", "mechanical"],
 )
 def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned(
-    given: Fields, reason: str
+    given: Fields, reason: SolveReason
 ) -> None:
     task, empty = (
         PreparedProblem.of(problem_with(HOME, GOAL, scene=scene, **given))
         for scene in (POST, Scene())
     )
 
-    def attempt(on: PreparedProblem, best_known: float) -> SolveResult:
-        solver = FreeSpline(on, HOME, GOAL, NEVER)
-        solver.best_known = best_known
-        return solver.solve()
+    def attempt(on: PreparedProblem, incumbent_cost: float) -> SolveResult:
+        context = SolveContext.of(on, HOME, GOAL, NEVER)
+        return FreeSpline(replace(context, incumbent_cost=incumbent_cost)).solve()
 
     through = attempt(empty, np.inf).spline
     assert through is not None
@@ -149,30 +150,37 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     q = np.linspace(HOME, GOAL, 25)
     v = np.zeros_like(q)
     found = path.linearised(q, v)
-    near = (found.value > COUNTED_SHARE) & (found.value < 1 + 0.01 / SCALE)
+    near = (found.value > COUNTED_SHARE) & (
+        found.value < 1 + 0.01 / CLEARANCE_CONSTRAINT.ratio_range
+    )
     assert near.sum() > 10
     for j in range(6):
-        d = STEP * np.eye(6)[j]
-        by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * STEP)
+        d = EPS * np.eye(6)[j]
+        by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * EPS)
         np.testing.assert_allclose(
-            found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE
+            found.by_q[near][:, j],
+            by_q[near],
+            atol=GRADIENT_TOLERANCE / CLEARANCE_CONSTRAINT.ratio_range,
         )
 
 
 def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     model = CollisionModel(problem_with(HOME, GOAL, scene=Scene((low_post(),))).arm)
     q = np.linspace(HOME, GOAL, 25)
-    expected = 1 - (model.signed_distances(q)[0] - RESERVE) / SCALE
+    expected = (
+        1
+        - (model.signed_distances(q)[0] - CLEARANCE_CONSTRAINT.reserve)
+        / CLEARANCE_CONSTRAINT.ratio_range
+    )
     path, v = every_pair(model), np.zeros_like(q)
     for shares, counted, low in (
-        (path.linearised(q, v).value, COUNTED_SHARE, NEAR_PATH),
-        (path.ratios(q, v), CHECKED, 1 - REPAIR_MARGIN),
+        (path.linearised(q, v).value, COUNTED_SHARE, WORKING_SET.near_path),
+        (path.ratios(q, v), CLEARANCE_CONSTRAINT.exact_ratio, 1 - LIMIT_REPAIR.tightening),
     ):
         near = expected > counted
         assert 2 < near.sum() < near.size
         np.testing.assert_allclose(shares[near], expected[near])
-        # of the others only a bound is known: too low for the solver to look at them, or for a
-        # motion to be repaired
+        # the others have a lower bound alone, too low to become active
         assert (shares[~near] < low).all() and (shares >= expected - 1e-12).all()
 
 

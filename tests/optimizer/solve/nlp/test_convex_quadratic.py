@@ -1,4 +1,4 @@
-"""Quadratics of banded Hessians: their least, and what becomes of negative eigenvalues."""
+"""Quadratics of banded Hessians: minimisers, and the correction of negative eigenvalues."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.solve.nlp.convex_quadratic import MOST_AGAIN, Convexity
+from joulepath.optimizer.solve.nlp.convex_quadratic import CONVEXITY, Convexity
 
 WIDTH = 5
-# relative; rounding of factorisations of well-conditioned matrices
+# relative tolerance of factorisations of well-conditioned matrices
 ROUNDING = 1e-9
 
 
@@ -33,7 +33,7 @@ def test_positive_definite() -> None:
     quadratic = Convexity().of(band)
     x = quadratic.least(gradient)
     assert x == pytest.approx(np.linalg.solve(H, -gradient), rel=ROUNDING)
-    assert quadratic.bend(x) == pytest.approx(x @ H @ x, rel=ROUNDING)
+    assert quadratic.curvature(x) == pytest.approx(x @ H @ x, rel=ROUNDING)
 
 
 def test_negative_eigenvalues_change_sign() -> None:
@@ -60,15 +60,13 @@ def test_added() -> None:
 
 
 def test_what_was_lacking_is_tried_again() -> None:
-    """Of a large matrix a little different from the last one: positive definite, and not far from
-    its own.
-    """
-    n = MOST_AGAIN + 1
+    """The correction of the last large matrix is reused for a slightly different matrix."""
+    n = CONVEXITY.reuse_above + 1
     convexity, gradient = Convexity(), np.ones(n)
     _, band = banded(n, 0.5)
     first = convexity.of(band).least(gradient)
     moved = band.copy()
     moved[:, 0] += 1e-6
     again = convexity.of(moved)
-    assert again.bend(gradient) > 0
+    assert again.curvature(gradient) > 0
     assert again.least(gradient) == pytest.approx(first, rel=1e-2, abs=1e-2 * np.abs(first).max())

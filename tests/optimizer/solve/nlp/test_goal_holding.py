@@ -1,6 +1,4 @@
-"""What holding the arm at a goal that slides draws: its derivatives, and what the search makes of
-it.
-"""
+"""Energy of holding at a sliding goal: derivatives, and its effect on a search."""
 
 from __future__ import annotations
 
@@ -9,8 +7,8 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -26,10 +24,8 @@ from tests.optimizer.moves import AMPLE
 from tests.optimizer.solve.nlp.test_sliding_ends import GOAL, START, curve, straight
 
 ARM = Arm(robot=load_robot("panda"), collisions=False)
-ON_MOTORS, ON_BRAKES = (
-    Dwell(time=12.0),
-    Dwell(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0),
-)
+ON_MOTORS = Dwell(time=12.0)
+ON_BRAKES = Dwell(time=6.0, hold="brakes", brake_delay=1.0, brake_power=20.0)
 
 
 def test_a_quadratic_power_has_exact_derivatives() -> None:
@@ -51,7 +47,7 @@ def test_a_quadratic_power_has_exact_derivatives() -> None:
 
 @pytest.mark.parametrize("dwell", [ON_MOTORS, ON_BRAKES], ids=["motors", "brakes"])
 def test_the_cost_of_another_goal_is_that_of_its_wait(dwell: Dwell) -> None:
-    """A program whose goal has moved costs what the same motion costs in a program of that goal."""
+    """The cost after the goal moved equals the cost in a program of the new goal."""
     prepared = PreparedProblem.of(Problem(arm=ARM, start=START, goal=GOAL, dwell=dwell))
     moved = GOAL + np.array([0.1, -0.2, 0.1, 0.2, 0.0, -0.1, 0.1])
     for here, there in zip(*(duration_intervals(prepared, q) for q in (GOAL, moved)), strict=True):
@@ -86,7 +82,7 @@ def test_the_cost_of_another_goal_is_that_of_its_wait(dwell: Dwell) -> None:
 
 
 def test_no_posture_near_by_waits_for_less() -> None:
-    """Most of this dwell is a wait: once, its posture was the one that is best without."""
+    """Most of this dwell is spent waiting, so that the best posture differs from that without."""
     asked = Problem(
         arm=ARM,
         start=START,

@@ -1,6 +1,4 @@
-"""The interior-point method of least work: its derivatives against differences, its motions against
-limits and SQP.
-"""
+"""The interior-point method of least work: derivatives, limits, and comparison with the SQP."""
 
 from __future__ import annotations
 
@@ -11,20 +9,26 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.solve.methods.sharp_motion import sharp_motion
+from joulepath.optimizer.solve.methods.refined_work import refine_work
 from joulepath.optimizer.solve.nlp.interior_point import InteriorPoint
 from tests.optimizer.moves import GOAL, START, fixed, limits, problem
 
-DURATION, WIDE, WIDTH = 2.0, 0.5, 0.1
+# duration of the motions [s]
+DURATION = 2.0
+# wide and narrow corners [W]
+WIDE = 0.5
+WIDTH = 0.1
 SPACE = bspline.uniform(24)
 ENDS = np.array([START, GOAL])
-STEP = 1e-6  # of control points [rad]
-# relative to the largest entry, of central differences
-FIRST, SECOND = 1e-6, 1e-5
+# step of control points in central differences [rad]
+EPS = 1e-6
+# tolerances relative to the largest entry
+GRADIENT_TOLERANCE = 1e-6
+HESSIAN_TOLERANCE = 1e-5
 
 
 @pytest.fixture(name="prepared")
@@ -55,11 +59,11 @@ def test_ratios_change_as_their_linearisation_says(prepared: PreparedProblem) ->
     def ratio(step: float) -> Array:
         return own._nodes(ENDS, own.first(ENDS, free + step * change, WIDTH, bounds)).ratio
 
-    difference = (ratio(STEP) - ratio(-STEP)) / (2 * STEP)
+    difference = (ratio(EPS) - ratio(-EPS)) / (2 * EPS)
     by_state = (own._D @ change).reshape(len(nodes.power), -1, 1)
     predicted = own._change(change, (nodes.torque_jacobian @ by_state)[:, :, 0])
-    assert predicted == pytest.approx(difference, abs=FIRST * np.abs(difference).max())
-    # the pull on the variables is the transpose of that
+    assert predicted == pytest.approx(difference, abs=GRADIENT_TOLERANCE * np.abs(difference).max())
+    # the pull on the variables is the transpose of this map
     weight = np.random.default_rng(2).normal(size=len(predicted))
     assert float((own._pulled(nodes, weight) * change).sum()) == pytest.approx(
         float(weight @ predicted), rel=1e-9
@@ -84,26 +88,28 @@ def test_hessian_is_that_of_the_lagrangian(prepared: PreparedProblem) -> None:
         by_torque = (pull[:, None] @ nodes.torque_jacobian).reshape(-1, own._r)
         return np.asarray(own._D.T @ (by_power + by_torque))
 
-    difference = (gradient(STEP) - gradient(-STEP)) / (2 * STEP)
+    difference = (gradient(EPS) - gradient(-EPS)) / (2 * EPS)
     by_state = (own._D @ change).reshape(len(SPACE.nodes), -1, 1)
     product = own._D.T @ (own._nodes(ENDS, at).hessian @ by_state).reshape(-1, own._r)
-    assert product == pytest.approx(difference, abs=SECOND * np.abs(difference).max())
+    assert product == pytest.approx(difference, abs=HESSIAN_TOLERANCE * np.abs(difference).max())
 
 
 @pytest.mark.parametrize("given", [{}, {"v_max": 1.1}])
 def test_work_falls_within_the_limits(prepared: PreparedProblem, given: dict[str, float]) -> None:
-    """From a motion with wide corners, as it is used."""
+    """From a motion with wide corners, as in a search."""
     own = program(prepared, **given)
     bounds = own.unbounded()
     wide = own.minimised(ENDS, own.first(ENDS, line(), WIDE, bounds), WIDE, bounds, 1e-3)
     first = own.first(ENDS, wide.free, WIDE, bounds)
-    found = own.minimised(ENDS, first, SHARPER_WIDTHS[-1], bounds, 2e-4)
+    found = own.minimised(ENDS, first, SMOOTHING.sharper_power_widths[-1], bounds, 2e-4)
     assert found.converged and found.work < first.work
     spline = spline_of(SPACE, own.points(ENDS, found.free), DURATION)
     # between the points, a rate exceeds its limit by little
     assert (peak_rates(spline) <= 1.02 * own.limits.rates).all()
     assert (found.slack > 0).all() and (np.abs(found.slope) <= 1).all()
-    again = own.minimised(ENDS, first, SHARPER_WIDTHS[-1], bounds, 2e-4, below=0.5 * found.work)
+    again = own.minimised(
+        ENDS, first, SMOOTHING.sharper_power_widths[-1], bounds, 2e-4, below=0.5 * found.work
+    )
     assert again.costlier and again.iterations < found.iterations
 
 
@@ -118,13 +124,13 @@ def test_bounds_are_tightened_per_span(prepared: PreparedProblem) -> None:
     assert (tightened < 1).sum() == (jerk < 1).sum()
 
 
-def test_sharp_motion_is_within_every_limit(prepared: PreparedProblem) -> None:
+def test_a_refined_motion_is_within_every_limit(prepared: PreparedProblem) -> None:
     points = START + np.outer(bspline.uniform(40).quintic, GOAL - START)
-    result, own = sharp_motion(prepared, points, DURATION, WIDTH)
+    result, own = refine_work(prepared, points, DURATION, WIDTH)
     assert result.spline is not None
     assert (peak_rates(result.spline) <= prepared.problem.arm.active_limits.rates).all()
     assert own == pytest.approx(result.spline.control_points)
-    costlier, _ = sharp_motion(
+    costlier, _ = refine_work(
         prepared, points, DURATION, WIDTH, 0.5 * prepared.cost_of(result.spline)
     )
     assert costlier.spline is None

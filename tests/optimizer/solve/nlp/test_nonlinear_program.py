@@ -1,6 +1,4 @@
-"""The program of a candidate: its cost against an independent integral, its derivatives against
-differences.
-"""
+"""The NLP of a candidate: cost compared with an integral, derivatives with differences."""
 
 from __future__ import annotations
 
@@ -13,7 +11,7 @@ from scipy.interpolate import BSpline
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.losses import drawn_power, power_flow
-from joulepath.optimizer.dynamics.plant import KNEE, WIDTH
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.bspline import DEGREE, Basis
 from joulepath.optimizer.motion.quadrature import quadrature
@@ -23,16 +21,21 @@ from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
 from tests.optimizer.solve.nlp.second_differences import without_dry_friction
 
-STEP = 1e-6  # of control points [rad, or of the line's fraction] and of the duration [s]
-# relative to the largest candidate: a central difference loses STEP² of the third derivative, which
-# friction's reversal at KNEE makes large, and rounding over STEP of the value
-FIRST, SECOND = 1e-6, 1e-5
-# relative; corners of |power| rounded over WIDTH, and friction's reversal at rest, lie between the
-# nodes
-QUADRATURE = 2e-3
-SUM = 1e-9  # relative; the same sum of powers by another route
-EXACT = 1e-12  # relative; the same linear maps in another order
-TORQUE = 1e-9  # N·m, as symbolic inverse dynamics against Pinocchio
+# step of control points [rad, or fraction of the line] and of the duration [s] in differences
+EPS = 1e-6
+# tolerances relative to the largest entry: a central difference has the error step² of the third
+# derivative, large at the reversal of friction, and rounding / step
+GRADIENT_TOLERANCE = 1e-6
+HESSIAN_TOLERANCE = 1e-5
+# relative error of the quadrature: smoothed corners of |power| and the reversal of friction lie
+# between the nodes
+QUADRATURE_TOLERANCE = 2e-3
+# relative tolerance of a sum of powers in another order
+SUM_TOLERANCE = 1e-9
+# relative tolerance of linear maps in another order
+LINEAR_TOLERANCE = 1e-12
+# tolerance of symbolic inverse dynamics against Pinocchio [N·m]
+TORQUE_TOLERANCE = 1e-9
 
 SPACES = {
     "uniform": bspline.uniform(13),
@@ -42,7 +45,7 @@ SPACES = {
 
 @dataclass(frozen=True)
 class Case:
-    """A program and a point that is neither optimal nor a straight line nor feasible."""
+    """A program and a point neither optimal, nor on a straight line, nor feasible."""
 
     task: PreparedProblem
     program: NonlinearProgram
@@ -92,16 +95,16 @@ def motion(case: Case) -> BSpline:
 
 
 def power(case: Case, q: Array, v: Array, a: Array) -> Array:
-    """The smoothed power that is minimised (k,) [W], from Pinocchio's torques and the plain
-    formulas.
-    """
+    """Smoothed power (k,) [W], from Pinocchio's torques and the plain formulas."""
     task = case.task.problem
     tau = torques(task, q, v, a)
     if task.objective == "mechanical":
-        return np.asarray(np.hypot(tau * v, WIDTH).sum(axis=1))
-    friction = replace(task.arm.friction_law, knee=KNEE)
-    net = 36.7 + power_flow(tau, v, a, ROBOT.drives, friction, 0.1 * WIDTH).joints.sum(axis=1)
-    return np.asarray(drawn_power(net, 0.4, WIDTH))
+        return np.asarray(np.hypot(tau * v, SMOOTHING.power_width).sum(axis=1))
+    friction = replace(task.arm.friction_law, knee=SMOOTHING.knee)
+    net = 36.7 + power_flow(
+        tau, v, a, ROBOT.drives, friction, 0.1 * SMOOTHING.power_width
+    ).joints.sum(axis=1)
+    return np.asarray(drawn_power(net, 0.4, SMOOTHING.power_width))
 
 
 def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
@@ -109,7 +112,7 @@ def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
     curve, basis, T = motion(case), case.program.basis, case.duration
     t = basis.nodes * T
     expected = T * basis.weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
-    assert case.program.value(case.free, T)[0] == pytest.approx(float(expected), rel=SUM)
+    assert case.program.value(case.free, T)[0] == pytest.approx(float(expected), rel=SUM_TOLERANCE)
 
 
 def test_cost_is_the_integral_of_power(case: Case) -> None:
@@ -121,7 +124,7 @@ def test_cost_is_the_integral_of_power(case: Case) -> None:
     t, weights = quadrature(curve.t, 64)
     expected = weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
     assert case.program.value(smooth.free, case.duration)[0] == pytest.approx(
-        float(expected), rel=QUADRATURE
+        float(expected), rel=QUADRATURE_TOLERANCE
     )
 
 
@@ -129,17 +132,18 @@ def test_torques_are_those_of_the_motion(case: Case) -> None:
     """At every node, friction included, from SciPy's spline in real time."""
     curve, t = motion(case), case.program.basis.nodes * case.duration
     q, v, a = curve(t), curve(t, 1), curve(t, 2)
-    friction = replace(case.task.friction, knee=KNEE)
+    friction = replace(case.task.friction, knee=SMOOTHING.knee)
     expected = torques(case.task.problem, q, v, a) + friction.torque(v)
     tau = case.program.value(case.free, case.duration)[1].copy()
-    assert np.abs(tau - expected).max() < TORQUE
+    assert np.abs(tau - expected).max() < TORQUE_TOLERANCE
     line = case.program.derivatives(case.free, case.duration, case.multiplier)
-    assert np.abs(line.tau - expected).max() < TORQUE
-    assert line.cost == pytest.approx(case.program.value(case.free, case.duration)[0], rel=EXACT)
+    assert np.abs(line.tau - expected).max() < TORQUE_TOLERANCE
+    cost = case.program.value(case.free, case.duration)[0]
+    assert line.cost == pytest.approx(cost, rel=LINEAR_TOLERANCE)
 
 
 def shifted(case: Case, i: int, by: float) -> tuple[Array, float]:
-    """The point with its i-th unknown shifted; the last one is the duration."""
+    """The point with variable i shifted; the last variable is the duration."""
     x = np.append(case.free.ravel(), case.duration)
     x[i] += by
     return x[:-1].reshape(case.free.shape), float(x[-1])
@@ -148,21 +152,19 @@ def shifted(case: Case, i: int, by: float) -> tuple[Array, float]:
 def test_gradient_is_the_slope_of_the_cost(case: Case) -> None:
     n = case.free.size + 1
     up, down = (
-        [case.program.value(*shifted(case, i, by))[0] for i in range(n)] for by in (STEP, -STEP)
+        [case.program.value(*shifted(case, i, by))[0] for i in range(n)] for by in (EPS, -EPS)
     )
-    slope = (np.array(up) - np.array(down)) / (2 * STEP)
+    slope = (np.array(up) - np.array(down)) / (2 * EPS)
     gradient = case.program.derivatives(case.free, case.duration, case.multiplier).gradient
     assert gradient.shape == (n,)
-    assert np.abs(gradient - slope).max() < FIRST * np.abs(slope).max()
+    assert np.abs(gradient - slope).max() < GRADIENT_TOLERANCE * np.abs(slope).max()
     assert gradient[-1] == pytest.approx(
-        slope[-1], rel=FIRST
+        slope[-1], rel=GRADIENT_TOLERANCE
     )  # small beside those by control points
 
 
 def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
-    """Of cost + multiplier · tau_motor, in all unknowns; the last row, by the duration, on its own
-    scale too.
-    """
+    """Hessian of cost + multiplier · tau in all variables; the row of the duration also alone."""
     program, n = without_dry_friction(case.program), case.free.size + 1
     k, j = (index.ravel() for index in np.indices(case.multiplier.shape))
 
@@ -172,11 +174,11 @@ def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
         rows = program.torque_rows(line, T, k, j)
         return np.asarray(line.gradient + case.multiplier.ravel() @ rows)
 
-    slope = np.array([gradient(i, STEP) - gradient(i, -STEP) for i in range(n)]) / (2 * STEP)
+    slope = np.array([gradient(i, EPS) - gradient(i, -EPS) for i in range(n)]) / (2 * EPS)
     hessian = program.derivatives(case.free, case.duration, case.multiplier).hessian
-    assert np.abs(hessian - hessian.T).max() < EXACT * np.abs(hessian).max()
-    assert np.abs(hessian - slope).max() < SECOND * np.abs(slope).max()
-    assert np.abs(hessian[-1] - slope[-1]).max() < SECOND * np.abs(slope[-1]).max()
+    assert np.abs(hessian - hessian.T).max() < LINEAR_TOLERANCE * np.abs(hessian).max()
+    assert np.abs(hessian - slope).max() < HESSIAN_TOLERANCE * np.abs(slope).max()
+    assert np.abs(hessian[-1] - slope[-1]).max() < HESSIAN_TOLERANCE * np.abs(slope[-1]).max()
 
 
 def test_torque_rows_are_the_slopes_of_torques(case: Case) -> None:
@@ -186,13 +188,13 @@ def test_torque_rows_are_the_slopes_of_torques(case: Case) -> None:
     n = case.free.size + 1
     up, down = (
         np.array([case.program.value(*shifted(case, i, by))[1][k, j] for i in range(n)])
-        for by in (STEP, -STEP)
+        for by in (EPS, -EPS)
     )
-    slope = (up - down).T / (2 * STEP)
+    slope = (up - down).T / (2 * EPS)
     line = case.program.derivatives(case.free, case.duration, case.multiplier)
     rows = case.program.torque_rows(line, case.duration, k, j)
     assert rows.shape == (40, n)
-    assert np.abs(rows - slope).max() < FIRST * np.abs(slope).max()
+    assert np.abs(rows - slope).max() < GRADIENT_TOLERANCE * np.abs(slope).max()
 
 
 def test_rates_are_those_of_the_motion(case: Case) -> None:
@@ -211,20 +213,18 @@ def test_rates_are_those_of_the_motion(case: Case) -> None:
 
 
 def test_points_of_the_motion(case: Case) -> None:
-    """Three equal ones at either end, the free ones in between; back from joints to coordinates."""
+    """Three equal control points at either end; from joints back to coordinates."""
     program = case.program
     q = program.joint_points(case.free)
-    assert q[:3] == pytest.approx(np.tile(START, (3, 1)), rel=EXACT)
-    assert q[-3:] == pytest.approx(np.tile(GOAL, (3, 1)), rel=EXACT)
+    assert q[:3] == pytest.approx(np.tile(START, (3, 1)), rel=LINEAR_TOLERANCE)
+    assert q[-3:] == pytest.approx(np.tile(GOAL, (3, 1)), rel=LINEAR_TOLERANCE)
     assert program.coordinates.from_joints(q[3:-3]) == pytest.approx(
         case.free, rel=1e-10, abs=1e-12
     )
 
 
 def test_a_line_is_limited_by_its_slowest_joint() -> None:
-    """Fractions of the line per second: each joint's limit over its displacement; joints that stay
-    set no limit.
-    """
+    """The limit of a fraction of the line is the least joint limit over its displacement."""
     goal = START + np.array([1.0, -0.5, 0.0, 0.0, 0.0, 0.0])
     own = limits(
         v_max=[3.0, 0.6, 1, 1, 1, 1], a_max=[2.0, 5.0, 1, 1, 1, 1], j_max=[90.0, 50.0, 1, 1, 1, 1]
@@ -236,7 +236,7 @@ def test_a_line_is_limited_by_its_slowest_joint() -> None:
         90.0,
     ]
     assert line.to_joints(np.array([[0.0], [0.5], [1.0]])) == pytest.approx(
-        np.array([START, (START + goal) / 2, goal]), rel=EXACT
+        np.array([START, (START + goal) / 2, goal]), rel=LINEAR_TOLERANCE
     )
     off_line = START + np.array(
         [0.5, 0.25, 0.3, 0.0, 0.0, 0.0]

@@ -1,6 +1,4 @@
-"""Passes of an NLP: every iterate is on them, and their curvature is that of the curves that stay
-on them.
-"""
+"""Passes of an NLP: iterates pass through them, and their curvature is exact."""
 
 from __future__ import annotations
 
@@ -14,13 +12,14 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.passing import Passes
-from joulepath.optimizer.solve.nlp.sqp import SqpStatus, solve
+from joulepath.optimizer.solve.nlp.sqp import solve
+from joulepath.optimizer.solve.nlp.sqp_state import SqpStatus
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
 from tests.optimizer.solve.nlp.second_differences import assert_curvature, without_dry_friction
 
 ROUNDING = 1e-12
-# relative; of second differences with steps of 1e-3
-DIFFERENCES = 2e-3
+# relative tolerance of second differences with steps of 1e-3
+DIFFERENCE_TOLERANCE = 2e-3
 PASSES = np.array(
     [START + 0.4 * (GOAL - START) + [0.1, -0.2, 0.1, 0, 0.1, 0], START + 0.7 * (GOAL - START)]
 )
@@ -86,7 +85,13 @@ def test_the_curvature_is_that_of_the_cost_along_the_curves_that_pass() -> None:
         return float(gradient.ravel() @ (kept @ (kept.T @ drift.ravel())))
 
     assert_curvature(
-        own, free, at, lambda moved: passes.put(moved, at)[0], drifted, list(steps), DIFFERENCES
+        own,
+        free,
+        at,
+        lambda moved: passes.put(moved, at)[0],
+        drifted,
+        list(steps),
+        DIFFERENCE_TOLERANCE,
     )
 
 

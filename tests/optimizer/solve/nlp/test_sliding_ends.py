@@ -1,6 +1,4 @@
-"""Ends of an NLP that slide: every iterate holds the poses, and the curvature is that of the
-curves.
-"""
+"""Sliding ends of an NLP: poses of the iterates, curvature of the curves, and solves."""
 
 from __future__ import annotations
 
@@ -12,8 +10,8 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.kinematics.tool_path.held_pose import HeldPose
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
@@ -21,16 +19,17 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide, SlidingEnds
-from joulepath.optimizer.solve.nlp.sqp import SqpStatus, solve
+from joulepath.optimizer.solve.nlp.sqp import solve
+from joulepath.optimizer.solve.nlp.sqp_state import SqpStatus
 from tests.optimizer.solve.nlp.second_differences import assert_curvature, without_dry_friction
 
 PANDA = load_robot("panda")
 START = np.array([0.3, -0.6, 0.2, -2.0, 0.3, 1.8, 0.4])
 GOAL = np.array([-0.5, 0.2, -0.3, -1.4, -0.4, 1.6, 0.9])
-# m, rad
-HELD = 1e-9
-# relative; of second differences with steps of 1e-3
-DIFFERENCES = 5e-3
+# tolerance of poses [m, rad]
+POSE_TOLERANCE = 1e-9
+# relative tolerance of second differences with steps of 1e-3
+DIFFERENCE_TOLERANCE = 5e-3
 
 
 def curve(q: Array) -> HeldPose:
@@ -63,7 +62,7 @@ def put(own: NonlinearProgram, free: Array, near: Slide | None = None) -> tuple[
 
 
 def missed(points: Array) -> float:
-    """How far the poses of both ends are from those asked for."""
+    """Largest difference of a pose of the ends from the pose asked for."""
     arm = Arm(robot=PANDA)
     ends = zip(points[[0, -1]], (START, GOAL), strict=True)
     return max(float(np.abs(tcp_pose(arm, q) - tcp_pose(arm, asked)).max()) for q, asked in ends)
@@ -91,13 +90,11 @@ def test_steps_in_the_null_space_keep_the_poses_to_second_order() -> None:
     errors = [missed(own.points(free + size * step)) for size in (1e-2, 1e-3)]
     assert errors[1] < 0.02 * errors[0]
     back, _ = put(own, free + 0.1 * step, at)
-    assert missed(own.points(back)) < HELD
+    assert missed(own.points(back)) < POSE_TOLERANCE
 
 
 def test_the_curvature_is_that_of_the_cost_along_the_curves() -> None:
-    """In steps of the ends alone: beside those of the other points, what the curves bend by is
-    lost.
-    """
+    """In steps of the ends alone: steps of other points would hide the curvature of the curves."""
     own = without_dry_friction(program())
     free, at = put(own, straight(own))
     steps = [np.zeros_like(free) for _ in range(3)]
@@ -106,7 +103,7 @@ def test_the_curvature_is_that_of_the_cost_along_the_curves() -> None:
             step[row] = length * tangent
 
     def drifted(gradient: Array, drift: Array) -> float:
-        # what the ends are put back by along their curves
+        # displacement of the ends along their curves when they are put back
         ends = zip(at.rows, at.shares, at.tangents, strict=True)
         return sum(
             float(share @ gradient @ tangent) * float(drift[row] @ tangent)
@@ -114,7 +111,7 @@ def test_the_curvature_is_that_of_the_cost_along_the_curves() -> None:
         )
 
     assert_curvature(
-        own, free, at, lambda moved: put(own, moved, at)[0], drifted, steps, DIFFERENCES
+        own, free, at, lambda moved: put(own, moved, at)[0], drifted, steps, DIFFERENCE_TOLERANCE
     )
 
 
@@ -125,7 +122,7 @@ def test_the_solver_slides_the_ends_and_needs_less(start: bool, goal: bool) -> N
     found = solve(own, straight(own), 2.0)
     assert found.status is SqpStatus.SOLVED and found.feasible
     points = own.points(found.free)
-    assert missed(points) < HELD
+    assert missed(points) < POSE_TOLERANCE
     assert found.cost < least.cost
     moved = np.abs(points[[0, -1]] - [START, GOAL]).max(axis=1) > 1e-3
     assert moved.tolist() == [start, goal]
@@ -135,5 +132,5 @@ def test_a_guess_far_from_its_curve_is_refused() -> None:
     unreachable = curve(GOAL)
     unreachable.T[:3, 3] *= 5.0
     own = replace(program(False, True), goal_curve=unreachable)
-    with pytest.raises(ValueError, match="not near the curve"):
+    with pytest.raises(ValueError, match="not near its curve"):
         solve(own, straight(own), 2.0)

@@ -1,6 +1,4 @@
-"""The solver against IPOPT, against first-order conditions worked out anew, and against the limits
-it was given.
-"""
+"""The SQP compared with IPOPT, with first-order conditions, and with its limits."""
 
 from __future__ import annotations
 
@@ -20,7 +18,8 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from joulepath.optimizer.solve.nlp.sqp import PROGRESS, Result, SqpStatus, solve
+from joulepath.optimizer.solve.nlp.sqp import solve
+from joulepath.optimizer.solve.nlp.sqp_state import SQP, SqpResult, SqpStatus
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,
@@ -35,19 +34,20 @@ from tests.optimizer.moves import (
 from tests.optimizer.solve.nlp.ipopt_peer import Peer
 from tests.selection import long_but
 
-# relative; the peer's grid of limits is eight times coarser, which lets its peaks rise between the
-# points by some 1e-3 of the limit, and costs bend little with limits
-PEER = 5e-4
-# relative; what IPOPT may still find from where the optimiser stopped: along the flat valleys of
-# mechanical energy a step that promises less than 5e-5 may be the first of a long way
-REST = 1e-3
-# share of the cost per greatest displacement, or per doubling of the time, that no multiplier
-# accounts for. The solver stops where a further step promises TO_THE_END of the cost: with a
-# curvature h of the cost, (2 h · TO_THE_END)^½ may be left, and h is some tens along the softest
-# directions. Where it usually stops, the processor's rounding decides how much is left
-STATIONARY, TO_THE_END = 0.04, PROGRESS / 10
-SAME = 1e-4  # relative; cost at one optimum reached along different ways
-GRID = 1e-3  # relative; a rate's peak between the points of the grid
+# relative tolerance of IPOPT's cost: the peer's grid of limits is eight times coarser, so that
+# rates exceed their limits between the points by some 1e-3, and the cost depends little on limits
+PEER_TOLERANCE = 5e-4
+# relative decrease of the cost that IPOPT may still find from the optimum: along the flat valleys
+# of mechanical energy a step that promises less than 5e-5 may be the first of many
+REMAINING = 1e-3
+# progress at which a solve stops in the test of first-order conditions
+FINE_PROGRESS = SQP.progress / 10
+# share of the cost, per largest displacement or per doubling of the time, not explained by
+# multipliers. With a curvature h of the cost, (2 h · FINE_PROGRESS)^½ may remain, and h is some
+# tens along the softest directions. At the usual progress, rounding would decide
+STATIONARITY = 0.04
+# relative tolerance of the cost of one optimum reached from different guesses
+SAME_COST = 1e-4
 COARSE = bspline.uniform(11)
 
 
@@ -111,7 +111,7 @@ def test_electrical_optimum_is_ipopts(peer: Peer, k: int) -> None:
     guess = quintic(mine), 1.4 * shortest(start, goal, given["own"])
     ours, theirs = solve(mine, *guess), peer.solve(mine, *guess)
     assert ours.status is SqpStatus.SOLVED and theirs.converged
-    assert ours.cost == pytest.approx(theirs.cost, rel=PEER)
+    assert ours.cost == pytest.approx(theirs.cost, rel=PEER_TOLERANCE)
     # the optimum is flat in the duration: a thousandth of the cost is some percent of the time
     assert ours.duration == pytest.approx(theirs.duration, rel=0.02)
     if k == WEAK:
@@ -122,9 +122,7 @@ def test_electrical_optimum_is_ipopts(peer: Peer, k: int) -> None:
 
 @pytest.mark.parametrize("k", long_but([1], [0, 1, 3]))
 def test_mechanical_optimum_leaves_ipopt_little(peer: Peer, k: int) -> None:
-    """Mechanical energy has many local optima: IPOPT starts from ours, and finds next to nothing
-    nearby.
-    """
+    """Mechanical energy has many local optima: IPOPT starts from ours, and gains almost nothing."""
     start, goal = list(random_moves(11, 4))[k]
     mine = program(
         start,
@@ -136,15 +134,14 @@ def test_mechanical_optimum_leaves_ipopt_little(peer: Peer, k: int) -> None:
     ours = solve(mine, quintic(mine), mine.t_max)
     theirs = peer.solve(mine, ours.free, ours.duration)
     assert ours.status is SqpStatus.SOLVED and theirs.converged
-    assert theirs.cost > ours.cost * (1 - REST)
+    assert theirs.cost > ours.cost * (1 - REMAINING)
     assert ours.cost < mine.value(quintic(mine), mine.t_max)[0]
 
 
-def unexplained(of: NonlinearProgram, found: Result) -> float:
-    """What is left of the cost's gradient, over the cost, when active limits take what nonnegative
-    multipliers can.
+def unexplained(of: NonlinearProgram, found: SqpResult) -> float:
+    """Part of the cost's gradient, relative to the cost, not balanced by nonnegative multipliers.
 
-    Gradients of active rows by the definition of each limit: rates at the grid, torques at the
+    The gradients of active limits follow from their definitions: rates at the grid, torques at the
     nodes, positions of control points, duration.
     """
     m, r, T = of.free_count, of.r, found.duration
@@ -181,30 +178,29 @@ def unexplained(of: NonlinearProgram, found: Result) -> float:
 @pytest.mark.parametrize("kind", ["joints", "line"])
 @pytest.mark.parametrize("objective", ["electrical", "mechanical"])
 def test_active_limits_explain_the_gradient(objective: str, kind: str) -> None:
-    """The conditions of Karush, Kuhn and Tucker, for moves of which each is held back by
-    something."""
+    """The conditions of Karush, Kuhn and Tucker, for moves with active limits."""
     for k, (start, goal) in enumerate(random_moves(12, 6)):
         given = conditions(k)
         longest = None if objective == "electrical" else 1.5 * shortest(start, goal, given["own"])
         mine = program(start, goal, kind=kind, objective=objective, duration_max=longest, **given)
         found = solve(
-            mine, quintic(mine), 1.5 * shortest(start, goal, given["own"]), progress=TO_THE_END
+            mine, quintic(mine), 1.5 * shortest(start, goal, given["own"]), progress=FINE_PROGRESS
         )
         assert found.status is SqpStatus.SOLVED
-        assert unexplained(mine, found) < STATIONARY
+        assert unexplained(mine, found) < STATIONARITY
 
 
 def test_the_conditions_are_not_met_elsewhere() -> None:
-    """The measure above does tell: a straight quintic at leisure is far from optimal."""
+    """A slow straight quintic is far from optimal, so that the measure above discriminates."""
     mine = program(START, GOAL)
-    guess = Result(
+    guess = SqpResult(
         SqpStatus.SOLVED, quintic(mine), 1.5, 0.0, 0, 0.0, 0.0, np.zeros((len(COARSE.nodes), 6))
     )
     assert unexplained(mine, guess) > 0.5
 
 
 def test_positions_stay_inside_a_narrow_range() -> None:
-    """Mechanical energy would swing the arm far out; the elbow may not."""
+    """Mechanical energy would swing the arm far out, beyond the limits of the elbow."""
     given: dict[str, Any] = {"objective": "mechanical", **fixed(2.5)}
     free = solve(wide := program(START, GOAL, **given), quintic(wide), 2.5)
     points = wide.joint_points(free.free)
@@ -231,9 +227,7 @@ def test_positions_stay_inside_a_narrow_range() -> None:
 
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.99])
 def test_too_little_time_is_told(share: float) -> None:
-    """Less than the limits on speed, acceleration and jerk allow: no motion, and the excess is
-    reported.
-    """
+    """In less time than the limits on rates allow, the excess is reported."""
     own = limits(v_max=1.5)
     mine = program(START, GOAL, own=own, **fixed(share * shortest(START, GOAL, own)))
     found = solve(mine, quintic(mine), mine.t_max)
@@ -250,9 +244,7 @@ def test_too_little_torque_is_told() -> None:
 
 @pytest.mark.parametrize("ticks", [0, 1, 3])
 def test_the_deadline_is_checked_in_every_iteration(ticks: int) -> None:
-    """A clock that reaches the deadline after a number of readings; what has been found so far is
-    returned.
-    """
+    """The clock reaches the deadline after some readings; the last iterate is returned."""
     mine = program(START, GOAL)
     readings = iter(range(1000))
     found = solve(
@@ -266,19 +258,17 @@ def test_the_deadline_is_checked_in_every_iteration(ticks: int) -> None:
 
 
 def test_an_optimum_is_left_alone() -> None:
-    """Started from its own answer, the solver sees that there is nothing to do."""
+    """Started from its own optimum, the solver stops at once."""
     for start, goal in random_moves(14, 4):
         mine = program(start, goal)
         first = solve(mine, quintic(mine), 1.5 * shortest(start, goal))
         again = solve(mine, first.free, first.duration, first.multiplier)
         assert again.status is SqpStatus.SOLVED and again.iterations <= 3
-        assert again.cost == pytest.approx(first.cost, rel=SAME)
+        assert again.cost == pytest.approx(first.cost, rel=SAME_COST)
 
 
 def test_a_valley_is_followed_to_its_end() -> None:
-    """Mechanical work falls along a valley by steps that each keep their promise: the first of them
-    is not the last.
-    """
+    """Mechanical work falls along a valley by many steps that keep their promises."""
     start, goal = list(random_moves(12, 29))[28]
     mine = program(
         start,
@@ -290,7 +280,7 @@ def test_a_valley_is_followed_to_its_end() -> None:
     found = solve(mine, quintic(mine), mine.t_max)
     again = solve(mine, found.free, found.duration, found.multiplier)
     assert found.status is again.status is SqpStatus.SOLVED
-    assert again.cost > found.cost * (1 - REST)
+    assert again.cost > found.cost * (1 - REMAINING)
 
 
 @pytest.mark.parametrize("ratio", [0.5, 0.9, 1.02, 1.5])
@@ -325,13 +315,11 @@ def test_electrical_optimum_does_not_depend_on_the_guess() -> None:
         found = solve(mine, free, stretch * shortest(START, GOAL))
         assert found.status is SqpStatus.SOLVED
         costs.append(found.cost)
-    assert np.ptp(costs) < SAME * min(costs)
+    assert np.ptp(costs) < SAME_COST * min(costs)
 
 
 def test_in_minimum_time_a_joint_moves_as_its_seven_segments() -> None:
-    """With time as the cost, a space whose knots hold jerk's jumps gives the shortest duration
-    there is.
-    """
+    """With knots at the jumps of jerk, the duration is the shortest possible."""
     goal = START + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0])
     least = shortest(START, goal)
     v, a, j = np.pi, 10.0, 200.0

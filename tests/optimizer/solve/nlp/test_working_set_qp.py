@@ -1,4 +1,4 @@
-"""The QP of a step against every limit on rates, by a prediction of its own."""
+"""The QP of a step, compared with predictions of all rates."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.solve.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from joulepath.optimizer.solve.nlp.qp_rows import ROOM, QPRows
-from joulepath.optimizer.solve.nlp.working_set_qp import MOST_ROUNDS, NEAR, QPInputs, WorkingSetQP
+from joulepath.optimizer.solve.nlp.qp_data import QPInputs
+from joulepath.optimizer.solve.nlp.qp_rows import QP_ROWS, QPRows
+from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET, WorkingSetQP
 from tests.optimizer.moves import GOAL, START
 from tests.optimizer.solve.nlp.test_sqp import program, quintic, shortest
 
-# of promises of about 0.1, by DAQP
-ROUNDING = 1e-8
+# tolerance of promised decreases of about 0.1 by DAQP
+PROMISE_TOLERANCE = 1e-8
 
 
 def of_duration(share: float) -> NonlinearProgram:
-    """The program of a move whose duration is fixed, at this share of the shortest one."""
+    """The program of a move with a fixed duration, as a share of the shortest."""
     duration = share * shortest(START, GOAL)
     return program(START, GOAL, duration_max=duration, duration_min=duration)
 
@@ -27,8 +28,7 @@ def of_duration(share: float) -> NonlinearProgram:
 def inputs_at(
     p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random.Generator
 ) -> QPInputs:
-    """A QP with the identity as its Hessian and a random gradient, at free control points (m,
-    r)."""
+    """A QP at free control points (m, r) with Hessian 1 and a random gradient."""
     one, duration = np.eye(qp.n), qp.time_scale
     line = p.derivatives(free, duration, np.zeros((len(p.basis.nodes), p.kernel.nq)))
     values = p.path_rows.values(p.points(free), duration)
@@ -38,9 +38,7 @@ def inputs_at(
 
 
 def test_a_step_breaks_no_limit_on_the_other_side() -> None:
-    """Of motions near their limits on one side, steps far to the other: linear predictions keep
-    every limit.
-    """
+    """Steps from near one limit far to the opposite limit: linear predictions keep all limits."""
     p = of_duration(2.5)
     rng = np.random.default_rng(7)
     turned = 0
@@ -53,25 +51,26 @@ def test_a_step_breaks_no_limit_on_the_other_side() -> None:
             scale *= 0.9
         free = free + scale * noise
         inputs = inputs_at(p, qp, free, rng)
-        ratio, step = inputs.ratio, qp.solve(inputs, MOST_ROUNDS)
+        ratio, step = inputs.ratio, qp.solve(inputs, WORKING_SET.max_rounds)
         assert step is not None
         assert not step.relaxed
         after = p.kinematics(free + step.x.reshape(free.shape)) / rates
         assert np.abs(after).max() <= 1 + FEASIBILITY
-        turned += int(((np.abs(ratio) > NEAR) & (-np.sign(ratio) * after > 0.99)).any())
+        near = np.abs(ratio) > WORKING_SET.near_rate
+        turned += int((near & (-np.sign(ratio) * after > 0.99)).any())
     assert turned
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 2.5])
 def test_no_limit_has_two_rows(share: float) -> None:
-    """Also where the limits cannot be kept: a relaxed step breaks limits whose rows are there."""
+    """A relaxed step, too, violates only limits with a row."""
     p = of_duration(share)
     rng = np.random.default_rng(8)
     for _ in range(10):
         qp = WorkingSetQP(p, p.t_max)
         step = qp.solve(
             inputs_at(p, qp, quintic(p) + 0.05 * rng.normal(size=(p.free_count, p.r)), rng),
-            MOST_ROUNDS,
+            WORKING_SET.max_rounds,
         )
         assert step is not None and (share > 1 or step.relaxed)
         # the lower and the upper one of a point
@@ -79,8 +78,7 @@ def test_no_limit_has_two_rows(share: float) -> None:
 
 
 def test_further_constraints_let_a_step_promise_less() -> None:
-    """So that a QP may end with its first solution if even this promises too little, and only
-    then."""
+    """A QP ends with its first solution if, and only if, that promises too little."""
     p = of_duration(1.2)
     rng = np.random.default_rng(9)
     ended = 0
@@ -95,17 +93,22 @@ def test_further_constraints_let_a_step_promise_less() -> None:
             assert step is not None and not step.relaxed
             return -float(inputs.gradient @ step.x) - 0.5 * float(step.x @ inputs.hessian(step.x))
 
-        first, last = promised(1), promised(MOST_ROUNDS)
-        assert last <= first + ROUNDING
-        assert promised(MOST_ROUNDS, enough=last - ROUNDING) == pytest.approx(last, abs=ROUNDING)
-        assert promised(MOST_ROUNDS, enough=first + ROUNDING) == pytest.approx(first, abs=ROUNDING)
+        most = WORKING_SET.max_rounds
+        first, last = promised(1), promised(most)
+        assert last <= first + PROMISE_TOLERANCE
+        assert promised(most, enough=last - PROMISE_TOLERANCE) == pytest.approx(
+            last, abs=PROMISE_TOLERANCE
+        )
+        assert promised(most, enough=first + PROMISE_TOLERANCE) == pytest.approx(
+            first, abs=PROMISE_TOLERANCE
+        )
         ended += last < 0.9 * first
     assert ended
 
 
 def test_rows_added_one_by_one_are_those_added_at_once() -> None:
-    """Several times as many as there is room for at first; half of them before a first solve."""
-    rng, n, count = np.random.default_rng(6), 12, 3 * ROOM
+    """Several times the initial number of rows; half of the rows before a first solve."""
+    rng, n, count = np.random.default_rng(6), 12, 3 * QP_ROWS.initial_rows
     A, most, gradient = (
         rng.normal(size=(count, n)),
         rng.uniform(0.05, 1.0, count),
@@ -121,6 +124,6 @@ def test_rows_added_one_by_one_are_those_added_at_once() -> None:
         rows.solve(gradient, relax=False) for rows in (at_once, one_by_one)
     )
     assert found and other_found
-    assert others == pytest.approx(y, abs=ROUNDING)
-    assert (A @ y <= most + ROUNDING).all() and (price >= 0).all()
-    assert y == pytest.approx(-gradient - price @ A, abs=ROUNDING)
+    assert others == pytest.approx(y, abs=PROMISE_TOLERANCE)
+    assert (A @ y <= most + PROMISE_TOLERANCE).all() and (price >= 0).all()
+    assert y == pytest.approx(-gradient - price @ A, abs=PROMISE_TOLERANCE)

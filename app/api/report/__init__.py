@@ -1,0 +1,1 @@
+"""`/report`: one page on a motion or a cycle, as HTML or PDF."""

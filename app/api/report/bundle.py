@@ -1,0 +1,96 @@
+"""What a report is made of and has attached: request, answer and costs, as JSON."""
+
+from __future__ import annotations
+
+import base64
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import orjson
+
+from joulepath.app.api.report.request import Kind
+
+NAME = "joulepath-report.json"
+"""Name of the attachment."""
+MARK = "joulepath_report"
+"""A field of the document, by which it is known among others."""
+MOST_BYTES = 1 << 28
+"""Largest document [byte] that is unpacked."""
+_SCRIPT = re.compile(rb'<script type="application/json" id="%s">([^<]*)</script>' % MARK.encode())
+_STREAM = re.compile(rb"stream\r?\n")
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """The documents of a report: `answer` is that of the `request` to the endpoint `kind`, and
+    `moves` are the answers of a cycle's moves, in their order."""
+
+    kind: Kind
+    request: dict[str, Any]
+    answer: dict[str, Any]
+    moves: list[dict[str, Any]]
+    title: str | None
+    costs: dict[str, Any]
+    made: str
+    """Day on which the report was made, as YYYY-MM-DD."""
+    version: str
+    """Version of the service that made it."""
+
+    def packed(self) -> bytes:
+        """The document."""
+        return orjson.dumps({MARK: 1, **asdict(self)}, option=orjson.OPT_SERIALIZE_NUMPY)
+
+    @property
+    def motions(self) -> list[dict[str, Any]]:
+        """The answers of `POST /optimize` in it."""
+        return self.moves if self.kind == "cycle" else [self.answer]
+
+
+class NoReport(Exception):
+    """The file is no report, or has nothing attached."""
+
+
+def in_html(packed: bytes) -> str:
+    """The element that holds a document in a page. Base64 needs no escaping."""
+    text = base64.b64encode(zlib.compress(packed, 9)).decode()
+    return f'<script type="application/json" id="{MARK}">{text}</script>'
+
+
+def attached_to(file: bytes) -> Bundle:
+    """The documents in a report, HTML or PDF. Raises NoReport."""
+    for content in _candidates(file):
+        try:
+            document = orjson.loads(content)
+        except orjson.JSONDecodeError:
+            continue
+        if isinstance(document, dict) and document.pop(MARK, None) == 1:
+            try:
+                return Bundle(**document)
+            except TypeError:
+                break
+    raise NoReport
+
+
+def _candidates(file: bytes) -> Iterator[bytes]:
+    """What may be the document."""
+    if not file.startswith(b"%PDF"):
+        yield from (_unpacked(base64.b64decode(each)) for each in _SCRIPT.findall(file))
+        return
+    # an embedded file is a stream whose dictionary stands directly before it
+    for begin in _STREAM.finditer(file):
+        head = file[max(begin.start() - 400, 0) : begin.start()].rpartition(b" obj")[2]
+        if b"/EmbeddedFile" in head:
+            end = file.find(b"endstream", begin.end())
+            content = file[begin.end() : end]
+            yield _unpacked(content) if b"/FlateDecode" in head else content
+
+
+def _unpacked(content: bytes) -> bytes:
+    """The content of a zlib stream; empty if it is none."""
+    try:
+        return zlib.decompressobj().decompress(content, MOST_BYTES)
+    except zlib.error:
+        return b""

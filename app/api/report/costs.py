@@ -1,0 +1,142 @@
+"""What a motion or a cycle costs per shift and year. What is not given is not counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from joulepath.app.api.report.bundle import Bundle
+from joulepath.app.api.report.numbers import JOULES_PER_KWH, digits, down, up
+from joulepath.app.api.report.report import Cost, Fact
+
+SHIFT = 8 * 3600.0
+"""Length [s] of a shift that is filled with cycles, if their number is not given."""
+
+
+@dataclass(frozen=True)
+class Money:
+    """The numbers by which joules become costs; None where they are not given."""
+
+    energy: float
+    """Of a cycle [J], the control box included if it is counted."""
+    likely: tuple[float, float] | None
+    """5th and 95th percentile of it [J]."""
+    cycles: float
+    """Per shift."""
+    filled: bool
+    """Whether cycles follow one another for a whole shift, because their number is not given."""
+    shifts: float | None
+    price: float | None
+    currency: str
+    carbon: float | None
+    box: float | None
+
+    @classmethod
+    def of(cls, bundle: Bundle) -> Money:
+        """The numbers of a report."""
+        costs, answer = bundle.costs, bundle.answer
+        electrical, box = answer["energy"]["electrical"], _value(costs, "control_box")
+        length = cycle_time(bundle)
+        more = (box or 0.0) * length
+        known = electrical.get("interval")
+        cycles = _value(costs, "cycles_per_shift")
+        return cls(
+            energy=electrical["total"] + more,
+            likely=None if known is None else (known["p5"] + more, known["p95"] + more),
+            cycles=SHIFT / length if cycles is None else cycles,
+            filled=cycles is None,
+            shifts=_value(costs, "shifts_per_year"),
+            price=_value(costs, "price"),
+            currency=costs.get("currency") or "€",
+            carbon=_value(costs, "carbon"),
+            box=box,
+        )
+
+
+def cycle_time(bundle: Bundle) -> float:
+    """Time [s] from one start to the next: the dwell's, or the duration."""
+    dwell = (bundle.request.get("dwell") or {}).get("time")
+    return max(float(bundle.answer["duration"]), float(dwell or 0.0))
+
+
+def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
+    """The figures that are read first: of one cycle, a shift, a year, and money."""
+    word = "cycle" if bundle.kind == "cycle" else "motion"
+    known = bundle.answer["energy"]["electrical"].get("interval")
+    likely = "" if known is None else f", likely {down(known['p5'])} to {up(known['p95'])}"
+    total = bundle.answer["energy"]["electrical"]["total"]
+    found = [
+        Fact(digits(total), "J", f"a {word}{likely}"),
+        Fact(
+            digits(_kwh(money, money.cycles), 2),
+            "kWh",
+            f"a shift of {'8 h, ' if money.filled else ''}{digits(money.cycles, 4)} {word}s",
+        ),
+    ]
+    if money.shifts is None:
+        return tuple(found)
+    yearly = money.cycles * money.shifts
+    range_ = (
+        ""
+        if money.likely is None
+        else f", likely {down(money.likely[0] * yearly / JOULES_PER_KWH)} to "
+        f"{up(money.likely[1] * yearly / JOULES_PER_KWH)}"
+    )
+    found.append(Fact(digits(_kwh(money, yearly)), "kWh", f"a year{range_}"))
+    if money.price is not None:
+        carbon = (
+            ""
+            if money.carbon is None
+            else f"and {digits(_kwh(money, yearly) * money.carbon)} kg CO2e "
+        )
+        cost = digits(_kwh(money, yearly) * money.price, 2)
+        found.append(Fact(cost, money.currency, f"{carbon}a year"))
+    elif money.carbon is not None:
+        found.append(Fact(digits(_kwh(money, yearly) * money.carbon), "kg", "CO2e a year"))
+    return tuple(found)
+
+
+def cost_table(bundle: Bundle, money: Money) -> tuple[Cost, ...]:
+    """A row for a cycle, a shift, and a year if its shifts are given."""
+    word = "cycle" if bundle.kind == "cycle" else "motion"
+    rows = [(f"1,000 {word}s", 1000.0), ("a shift", money.cycles)]
+    if money.shifts is not None:
+        rows.append(("a year", money.cycles * money.shifts))
+    return tuple(
+        Cost(
+            period,
+            digits(_kwh(money, count)),
+            "–" if money.price is None else digits(_kwh(money, count) * money.price),
+            "–" if money.carbon is None else digits(_kwh(money, count) * money.carbon),
+        )
+        for period, count in rows
+    )
+
+
+def costs_note(money: Money) -> str:
+    """What is not in the table, and why."""
+    missing = [
+        words
+        for words, value in (
+            ("price", money.price),
+            ("carbon intensity", money.carbon),
+            ("shifts per year", money.shifts),
+        )
+        if value is None
+    ]
+    given = f"Not given: {', '.join(missing)}. " if missing else ""
+    box = (
+        "The control box itself and the loss of the mains are not counted: no reading is given."
+        if money.box is None
+        else f"The control box is counted with {digits(money.box)} W."
+    )
+    return given + box
+
+
+def _kwh(money: Money, cycles: float) -> float:
+    return money.energy * cycles / JOULES_PER_KWH
+
+
+def _value(costs: dict[str, Any], name: str) -> float | None:
+    given = costs.get(name)
+    return None if given is None else float(given["value"])

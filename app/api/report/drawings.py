@@ -1,0 +1,147 @@
+"""The course of a motion or a cycle as SVG: its legs, and power over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import escape
+
+from joulepath.app.api.report.numbers import digits
+
+_WIDTH, _LEFT, _RIGHT = 1000.0, 52.0, 6.0
+_LEGS, _POWER, _FOOT = 118.0, 92.0, 24.0
+_INK, _GREY, _LINE = "#17202b", "#616d79", "#e2e7ec"
+_LOADED, _EMPTY, _REST = "#14805f", "#e6f2ee", "#c3cbd3"
+_MOST_POINTS = 600
+_TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A move or a rest: from `t0` [s], for `duration` [s], with `energy` [J]."""
+
+    t0: float
+    duration: float
+    energy: float
+    rests: bool
+    loaded: bool
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A stop by its number, at `t` [s]; `takes`: a part is taken up."""
+
+    t: float
+    number: int
+    takes: bool
+
+
+@dataclass(frozen=True)
+class Course:
+    """A motion or a cycle over time: `power` [W] at times `t` [s]."""
+
+    duration: float
+    t: Sequence[float]
+    power: Sequence[float]
+    legs: Sequence[Leg] = ()
+    stops: Sequence[Stop] = ()
+
+
+def drawn(course: Course) -> str:
+    """The course, with a row of legs above the power if there is more than one."""
+    top = _LEGS if len(course.legs) > 1 else 8.0
+    height = top + _POWER + _FOOT
+    parts = [*(_legs(course) if len(course.legs) > 1 else ()), *_power(course, top)]
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {height:g}" '
+        f'font-family="Inter, DejaVu Sans, sans-serif" font-size="12.5">{"".join(parts)}</svg>'
+    )
+
+
+def _x(course: Course, t: float) -> float:
+    return _LEFT + (_WIDTH - _LEFT - _RIGHT) * t / course.duration
+
+
+def _legs(course: Course) -> Iterator[str]:
+    """Each leg as wide as its time and as high as its mean power, with its joules."""
+    mean = [leg.energy / leg.duration for leg in course.legs]
+    most, low, high = max(mean), _LEGS - 18.0, 34.0
+    yield from _grid([(0.0, low), (_round_below(most), low - (low - high) * _of(most))])
+    for leg, power in zip(course.legs, mean, strict=True):
+        left, right = _x(course, leg.t0), _x(course, leg.t0 + leg.duration)
+        tall = max((low - high) * power / most, 2.0)
+        fill = _REST if leg.rests else (_LOADED if leg.loaded else _EMPTY)
+        edge = "" if leg.rests or leg.loaded else f' stroke="{_LOADED}" stroke-width="1.2"'
+        wide = max(right - left - 1.6, 1.0)
+        yield (
+            f'<rect x="{left + 0.8:.1f}" y="{low - tall:.1f}" width="{wide:.1f}" '
+            f'height="{tall:.1f}" rx="3" fill="{fill}"{edge}/>'
+        )
+        text = digits(leg.energy)
+        if not leg.rests and right - left > 9 * len(text) + 8:
+            ink = "#ffffff" if leg.loaded else _INK
+            y = low - tall / 2 + 4.5
+            yield _text((left + right) / 2, y, text, ink, "middle", 600)
+    for stop in course.stops:
+        x = _x(course, stop.t)
+        fill, ink, edge = (_LOADED, "#fff", _LOADED) if stop.takes else ("#fff", _INK, _INK)
+        yield f'<path d="M{x:.1f} 24V{low:.1f}" stroke="{_REST}"/>'
+        yield f'<circle cx="{x:.1f}" cy="14" r="11" fill="{fill}" stroke="{edge}"/>'
+        yield _text(x, 18.4, str(stop.number), ink, "middle", 600)
+
+
+def _power(course: Course, top: float) -> Iterator[str]:
+    most = max(max(course.power), 1.0)
+    low, step = top + _POWER, _tick(most / 2)
+
+    def y(power: float) -> float:
+        return low - (_POWER - 12) * power / most
+
+    levels = [k * step for k in range(int(most / step) + 1)]
+    yield from _grid([(level, y(level)) for level in levels])
+    each = max(len(course.t) // _MOST_POINTS, 1)
+    points = [
+        f"{_x(course, t):.1f} {y(power):.1f}"
+        for t, power in list(zip(course.t, course.power, strict=True))[::each]
+    ]
+    line = "M" + "L".join(points)
+    ends = _x(course, course.t[0]), _x(course, course.t[-1])
+    area = f"{line}L{ends[1]:.1f} {y(0.0):.1f}L{ends[0]:.1f} {y(0.0):.1f}Z"
+    yield f'<path d="{area}" fill="{_LOADED}" opacity="0.14"/>'
+    yield f'<path d="{line}" fill="none" stroke="{_LOADED}" stroke-width="1.8"/>'
+    step = _tick(course.duration / 8)
+    for k in range(int(course.duration / step) + 1):
+        last = (k + 1) * step > course.duration
+        text = f"{k * step:g}" + (" s" if last else "")
+        x = _x(course, k * step)
+        anchor = "end" if x > _WIDTH - 3 * _RIGHT else "middle"
+        yield _text(x, low + 17, text, _GREY, anchor)
+
+
+def _grid(levels: Sequence[tuple[float, float]]) -> Iterator[str]:
+    """Lines at heights, each with the power [W] that it stands for."""
+    for level, y in levels:
+        yield f'<path d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}" stroke="{_LINE}"/>'
+        unit = " W" if level and level == levels[-1][0] else ""
+        yield _text(_LEFT - 7, y + 4.3, f"{level:g}{unit}", _GREY, "end")
+
+
+def _tick(least: float) -> float:
+    """The least distance of ticks that is at least this."""
+    return next((tick for tick in _TICKS if tick >= least), _TICKS[-1])
+
+
+def _round_below(value: float) -> float:
+    """The greatest tick that is at most the value, or the value itself."""
+    return max((tick for tick in _TICKS if tick <= value), default=value)
+
+
+def _of(value: float) -> float:
+    return _round_below(value) / value
+
+
+def _text(x: float, y: float, text: str, ink: str, anchor: str, weight: int = 400) -> str:
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" fill="{ink}" text-anchor="{anchor}" '
+        f'font-weight="{weight}">{escape(text)}</text>'
+    )

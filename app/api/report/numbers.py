@@ -1,0 +1,53 @@
+"""Numbers of a report in digits: bounds round down, gaps and intervals outwards."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+
+JOULES_PER_KWH = 3.6e6
+SPACE = "\u00a0"
+"""A space at which no line ends."""
+_UNIT = re.compile(r"(?<=\d) (?=(?:J|s|h|W|mm|kg|kWh|%)(?!\w))")
+_ROUNDINGS: dict[str, Callable[[float], int]] = {
+    "nearest": round,
+    "up": math.ceil,
+    "down": math.floor,
+}
+
+
+def digits(value: float, count: int = 3) -> str:
+    """A number with this many significant digits, or all digits before the point, and commas
+    between thousands.
+    """
+    return _written(value, count, round)
+
+
+def down(value: float, count: int = 3) -> str:
+    """The number rounded down."""
+    return _written(value, count, math.floor)
+
+
+def up(value: float, count: int = 3) -> str:
+    """The number rounded up."""
+    return _written(value, count, math.ceil)
+
+
+def percent(share: float, rounding: str = "nearest") -> str:
+    """A share with one digit after the point."""
+    whole = _ROUNDINGS[rounding](1000 * share)
+    return f"{whole / 10:.1f}{SPACE}%".replace("-", "−")
+
+
+def unbroken(text: str) -> str:
+    """The text, in which no line ends between a number and its unit."""
+    return _UNIT.sub(SPACE, text)
+
+
+def _written(value: float, count: int, rounding: Callable[[float], int]) -> str:
+    if value == 0 or not math.isfinite(value):
+        return "0" if value == 0 else "–"
+    places = max(count - 1 - math.floor(math.log10(abs(value))), 0)
+    found = rounding(value * 10**places) / 10**places
+    return f"{found:,.{places}f}".replace("-", "−")

@@ -1,0 +1,89 @@
+"""A report: everything that its page says, as data. Templates only lay it out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A figure of the first row, in words and digits."""
+
+    value: str
+    unit: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another way to do the same, and what is saved against it."""
+
+    name: str
+    time: str
+    energy: str
+    share: float
+    """Its energy as a share of the largest one [1]."""
+    verdict: str
+    """The saving, or why none is claimed."""
+    claimed: bool
+    ours: bool = False
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the energy."""
+
+    name: str
+    colour: str
+    energy: str
+    share: str
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a cycle, a shift or a year costs; empty where it is not known."""
+
+    period: str
+    energy: str
+    money: str
+    carbon: str
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """What the figures rest on, with its trust letter."""
+
+    letter: str
+    """A, B, C, T or E; Y: yours; –: not counted."""
+    what: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """One page on a motion or a cycle."""
+
+    title: str
+    subtitle: str
+    """Day and robot."""
+    lead: tuple[str, ...]
+    """The sentences at the top; what is between asterisks is important."""
+    facts: tuple[Fact, ...]
+    picture: str
+    """The cell, as SVG."""
+    caption: str
+    rivals: tuple[Rival, ...]
+    rivals_note: str
+    parts: tuple[Part, ...]
+    course_title: str
+    course_note: str
+    course: str
+    """Power over time, and the legs of a cycle, as SVG."""
+    costs: tuple[Cost, ...]
+    currency: str
+    costs_note: str
+    proven: str
+    check: str
+    assumptions: tuple[Assumption, ...]
+    assumptions_note: str
+    foot: str

@@ -1,0 +1,66 @@
+"""POST /report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+
+from joulepath.app.api.report.request import ReportRequest
+from joulepath.app.api.report.task import ReportTask
+from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.api.shared.large_bodies import LargeBodyRoute
+from joulepath.app.api.shared.problem_lists import CYCLE_PROBLEMS, MOTION_PROBLEMS
+from joulepath.app.exceptions.report import NoTypst
+from joulepath.app.exceptions.stored import UnknownAnswer
+from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.http.openapi import problem_responses
+from joulepath.optimizer.evaluate.errors import NotCertified
+
+router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
+
+_FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The report.",
+        "content": {
+            "text/html": {"schema": {"type": "string"}},
+            "application/pdf": {"schema": {"type": "string", "format": "binary"}},
+        },
+        "headers": {
+            "Content-Disposition": {
+                "description": "`inline`, with a name for the file.",
+                "schema": {"type": "string"},
+            }
+        },
+    }
+}
+
+
+@router.post(
+    "/report",
+    summary="One page on a motion or a cycle",
+    response_class=Response,
+    responses={
+        **_FILE,
+        **problem_responses(
+            *dict.fromkeys((*MOTION_PROBLEMS, *CYCLE_PROBLEMS)),
+            UnknownAnswer,
+            NotCertified,
+            NoTypst,
+        ),
+    },
+)
+async def report(
+    request: Request, body: ReportRequest, settings: ServiceSettings, engine: ServiceArmEngine
+) -> Response:
+    """Writes a page that says what a motion or a cycle needs, where it goes, what it saves against
+    ways that keep every limit, and what it costs per shift and year. Request and answer are
+    attached, so that `joulepath check` can compute both again."""
+    task = ReportTask(body, request.state.id)
+    result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+    name = f"joulepath-report.{body.format}"
+    return Response(
+        result.document,
+        media_type=result.media_type,
+        headers={"Content-Disposition": f'inline; filename="{name}"'},
+    )

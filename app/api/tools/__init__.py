@@ -1,0 +1,1 @@
+"""`/tools`: grippers by name."""

@@ -1,0 +1,53 @@
+"""What `GET /tools` and `GET /tools/{name}` answer."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from joulepath.app.schemas.common import Response, described, part
+
+_SOURCE = "github.com/google-deepmind/mujoco_menagerie, robotiq_2f85/2f85.xml"
+
+
+class ToolFigure(Response):
+    """A figure of a tool, in the flange frame."""
+
+    value: float | list[float] | list[list[float]] = described("Value of the figure.", None, 0.9)
+    unit: str = described("Unit.", None, "kg")
+    source: str = described("Source of the value; `none` with the letter E.", None, _SOURCE)
+    trust: Literal["A", "B", "C", "E"] = described(
+        "Quality of the source: see `trust` of the tool.", None, "C"
+    )
+    note: str = described("Remarks.", None, "Sum of the bodies; without an adapter plate.")
+
+
+class ToolSummary(Response):
+    """A tool."""
+
+    name: str = described("Name in requests.", None, "robotiq_2f_85")
+    title: str = described("Manufacturer and model.", None, "Robotiq 2F-85")
+
+
+class ToolList(Response):
+    """All tools."""
+
+    tools: list[ToolSummary] = part("The tools.")
+
+
+class ToolDetail(ToolSummary):
+    """The figures of a tool, each with its source and trust letter."""
+
+    trust: dict[str, str] = described(
+        "Meaning of the trust letters.", None, {"A": "maker's own file or data packet"}
+    )
+    mass: ToolFigure = part("Mass.")
+    center_of_mass: ToolFigure = part("Centre of mass: [x, y, z].")
+    inertia: ToolFigure = part(
+        "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, "
+        "iyz, izz]."
+    )
+    tcp: ToolFigure = part("Pose of the TCP: [x, y, z, roll, pitch, yaw].")
+    capsules: ToolFigure = part(
+        "Shape for collision checking: capsules [x1, y1, z1, x2, y2, z2, radius], both ends of the "
+        "axis."
+    )

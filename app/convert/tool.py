@@ -1,0 +1,35 @@
+"""From the tool in a request, given by its name or its shape, to that of the library."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from joulepath.app.convert.pose import to_matrix
+from joulepath.app.convert.scene import to_capsules
+from joulepath.app.schemas import scene as asked
+from joulepath.app.schemas.common import Pose
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.scene import Attachment
+from joulepath.optimizer.problem.tool import load_tool
+
+
+def to_tool(tool: str | asked.Tool) -> tuple[Attachment, ...]:
+    """The capsules of a tool, in the flange frame. Raises UnknownTool."""
+    return load_tool(tool).shape if isinstance(tool, str) else tuple(to_capsules(tool))
+
+
+def to_tcp(tcp: Pose | None, tool: str | asked.Tool | None = None) -> Array:
+    """Pose (4, 4) of the TCP in the flange frame: the given one, that of a tool with a name, or the
+    flange.
+
+    Raises UnknownTool.
+    """
+    if tcp is not None:
+        return to_matrix(tcp)
+    return load_tool(tool).T_flange_tcp if isinstance(tool, str) else np.eye(4)
+
+
+def with_tool(tool: str | asked.Tool, part: Payload) -> Payload:
+    """What the flange carries: the part, and the mass of a tool with a name. Raises UnknownTool."""
+    return load_tool(tool).carrying(part) if isinstance(tool, str) else part

@@ -1,0 +1,17 @@
+"""Errors of reports."""
+
+from __future__ import annotations
+
+from joulepath.app.exceptions.base import ServiceError
+
+
+class NoTypst(ServiceError):
+    """The package that lays out PDFs is not installed."""
+
+    status = 501
+    title = "No PDF here"
+    remedy = (
+        "Ask for `html`, whose page prints well; or install Typst by `pip install "
+        "'joulepath[report]'`."
+    )
+    detail = "PDFs need the extra `report` of the package: ask for `html`, or install it."

@@ -1,0 +1,216 @@
+"""The links and joints of a URDF: a checked tree by name, and the attributes of its joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NoReturn
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
+from joulepath.models.own_arm.robot_xml import number, numbers, robot_element
+from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import Checkpoint
+
+CONTINUOUS = 2 * math.pi
+"""Range of a continuous joint to either side [rad]: one turn."""
+
+
+@dataclass(frozen=True)
+class ChainSettings:
+    """Ceilings and tolerances of a URDF."""
+
+    joints: int = 16
+    """Most moving joints from base to tip."""
+    elements: int = 5_000
+    """Most links and joints of the document."""
+    listed_names: int = 12
+    """Most names listed in a message."""
+    rounded_angle: float = 5e-6
+    """Deviation from a quarter turn [rad] due to rounding: five digits of an angle."""
+    rounded_length: float = 1e-9
+    """Deviation from zero [m] due to rounding: eleven digits of a length."""
+
+
+CHAIN = ChainSettings()
+
+
+@dataclass(frozen=True)
+class UrdfTree:
+    """Links and joints by name, and the parent joint of every link."""
+
+    links: tuple[str, ...]
+    joints: Mapping[str, Element]
+    above: Mapping[str, Element]
+    root: str
+
+    @staticmethod
+    def of(robot: Element) -> UrdfTree:
+        """The tree of a <robot>. Raises InvalidArm for duplicate names, loops or several roots."""
+        links = tuple(name_of(each) for each in robot.findall("link"))
+        joints = {name_of(each): each for each in robot.findall("joint")}
+        for kind, names, count in (
+            ("link", links, len(set(links))),
+            ("joint", joints, len(robot.findall("joint"))),
+        ):
+            if count != len(names):
+                refuse(
+                    "urdf", f"Two {kind}s of the URDF have one name: give each a name of its own."
+                )
+        above: dict[str, Element] = {}
+        for name, joint in joints.items():
+            parent, child = (joint_end(joint, side) for side in ("parent", "child"))
+            for link in (parent, child):
+                if link not in links:
+                    refuse(
+                        "urdf", f"Joint {name!r} is at a link {link!r} that the URDF does not have."
+                    )
+            if child in above:
+                refuse("urdf", f"Link {child!r} hangs on two joints: a URDF is a tree.")
+            above[child] = joint
+        if not links:
+            refuse("urdf", "The URDF has no <link>.")
+        roots = [each for each in links if each not in above]
+        if len(roots) != 1:
+            refuse("urdf", f"A URDF has one root link, not {len(roots)}: {listed(roots)}.")
+        reached, front = {roots[0]}, [roots[0]]
+        below: dict[str, list[str]] = {}
+        for link, joint in above.items():
+            below.setdefault(joint_end(joint, "parent"), []).append(link)
+        while front:
+            front = [child for link in front for child in below.get(link, ())]
+            reached.update(front)
+        if loose := [link for link in links if link not in reached]:
+            refuse(
+                "urdf", f"Links hang on each other in a loop: {listed(loose)}. A URDF is a tree."
+            )
+        return UrdfTree(links, joints, above, roots[0])
+
+    def path(self, base: str, tip: str) -> list[Element]:
+        """Joints from base to tip."""
+        found, link = list[Element](), tip
+        while link != base:
+            if link not in self.above:
+                refuse(
+                    "tip",
+                    f"The tip {tip!r} is not carried by the base {base!r}: name a base that it "
+                    "hangs on.",
+                )
+            found.append(self.above[link])
+            link = joint_end(found[-1], "parent")
+        return found[::-1]
+
+    def carrier(self, link: str, moving: Mapping[str, int]) -> int:
+        """Number of the moving joint carrying a link, 0 for the base."""
+        while link in self.above:
+            joint = self.above[link]
+            if name_of(joint) in moving:
+                return moving[name_of(joint)]
+            link = joint_end(joint, "parent")
+        return 0
+
+
+def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
+    """The root element of a URDF."""
+    root = robot_element(text, "urdf", checkpoint)
+    # Comments are not in the tree: generated files quote their macros there.
+    if any(_is_xacro(each) for each in root.iter()):
+        refuse(
+            "urdf", "This is xacro: make a URDF of it first, by `xacro arm.urdf.xacro > arm.urdf`."
+        )
+    if sum(1 for _ in root) > CHAIN.elements:
+        refuse("urdf", f"The URDF has more than {CHAIN.elements} links and joints.")
+    return root
+
+
+def _is_xacro(element: Element) -> bool:
+    """Whether an element still has a macro or an expression."""
+    texts = (*element.attrib.values(), element.text or "", element.tail or "")
+    return element.tag.startswith("xacro:") or any("${" in text for text in texts)
+
+
+def restore_rounded(joint: Element) -> None:
+    """Restore rounded figures: a quarter turn written as 1.5708, a zero as 2e-11.
+
+    Otherwise rounded axes would not have the geometry required by closed-form inverse kinematics.
+    """
+    origin = joint.find("origin")
+    for part, unit, near in (
+        ("rpy", math.pi / 2, CHAIN.rounded_angle),
+        ("xyz", math.inf, CHAIN.rounded_length),
+    ):
+        if origin is None or part not in origin.attrib:
+            continue
+        values = numbers(origin, part, f"Joint {name_of(joint)!r} has an <origin>").tolist()
+        snapped = [0.0 if math.isinf(unit) else round(value / unit) * unit for value in values]
+        kept = (
+            there if abs(there - value) < near else value
+            for value, there in zip(values, snapped, strict=True)
+        )
+        origin.set(part, " ".join(map(repr, kept)))
+
+
+def joint_range(joint: Element) -> tuple[float, float, float, float]:
+    """Least and greatest position, greatest speed and torque; 0 without a limit."""
+    ends = (-CONTINUOUS, CONTINUOUS)
+    if joint.get("type") == "revolute":
+        ends = joint_limit(joint, "lower"), joint_limit(joint, "upper")
+    speed, torque = (abs(joint_limit(joint, part)) for part in ("velocity", "effort"))
+    return *ends, speed, torque
+
+
+def joint_axis(joint: Element) -> Array:
+    """Unit axis (3,) of a joint in its frame; x without an <axis>."""
+    element = joint.find("axis")
+    axis = numbers(
+        element,
+        "xyz",
+        f"Joint {name_of(joint)!r} has an <axis>",
+        "1 0 0" if element is None else "",
+    )
+    if not np.linalg.norm(axis) > 0:
+        refuse("urdf", f"Joint {name_of(joint)!r} has an <axis> of no length.")
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def joint_limit(joint: Element, part: str) -> float:
+    """A number of the <limit> of a joint; 0 without it. Raises InvalidArm."""
+    return number(joint.find("limit"), part, f"Joint {name_of(joint)!r} has a <limit>", "0")
+
+
+def joint_end(joint: Element, side: str) -> str:
+    """The `parent` or `child` link of a joint. Raises InvalidArm."""
+    end = joint.find(side)
+    link = None if end is None else end.get("link")
+    if not link or len(link) > PLAUSIBLE.name:
+        refuse(
+            "urdf",
+            f"Joint {name_of(joint)!r} has no <{side}> link of up to {PLAUSIBLE.name} characters.",
+        )
+    return link
+
+
+def name_of(element: Element) -> str:
+    """The name of a link or joint. Raises InvalidArm."""
+    name = element.get("name")
+    if not name or len(name) > 100 or not name.isprintable():
+        refuse(
+            "urdf", f"A {element.tag} of the URDF has no name of up to 100 printable characters."
+        )
+    return name
+
+
+def listed(names: Iterable[str]) -> str:
+    """The first names, separated by commas, and the number of the others."""
+    found = list(names)
+    return ", ".join(found[: CHAIN.listed_names]) + (
+        f" and {len(found) - CHAIN.listed_names} others" if len(found) > CHAIN.listed_names else ""
+    )
+
+
+def refuse(field: str, message: str) -> NoReturn:
+    """Raises InvalidArm at a field of the description."""
+    raise InvalidArm(field, message)

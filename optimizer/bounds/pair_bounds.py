@@ -1,0 +1,75 @@
+"""Data and effort that the dual bounds of all pairs of a problem share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.bounds.cruise import copper_loss
+from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
+from joulepath.optimizer.bounds.grid_cells import Spacing
+from joulepath.optimizer.prepared_problem import PreparedProblem
+
+GRID_JOINTS = 2
+"""Joints with a grid: those with the greatest copper loss of holding against gravity."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How finely a pair is bounded."""
+
+    steps: int
+    """Number of steps of the path."""
+    cell_ratio: float
+    """Ratio of the longest to the shortest duration of a cell."""
+    cells_per_group: int
+    """Number of cells of durations that share their boxes."""
+    spacing: Spacing
+    """Spacing of the grid around the path."""
+    loaded_joints: tuple[int, ...]
+    """Numbers of joints with multipliers among those that carry gravity, tried one by one."""
+    weight_rounds: int
+    """Number of rounds of the search for weights."""
+    time: float
+    """Longest time [s] for a group of an arm with six joints on an idle machine."""
+
+    def time_for(self, joints: int) -> float:
+        """Time [s] without which a group of an arm is not begun.
+
+        It grows with joints⁵, the number of bounds on third derivatives of the inertia.
+        """
+        return self.time * max(joints / 6, 1) ** 5
+
+
+@dataclass(frozen=True)
+class PairBounds:
+    """Data that the dual bounds of all pairs of a problem share."""
+
+    prepared: PreparedProblem
+    chain: ChainDerivatives
+    friction: FrictionConjugate
+    loss: Array
+    """Copper loss c, shape (nq,) [W/(N·m)²]."""
+    stiffness: Array
+    """Unit of κ + μ, shape (nq,) [N·m·s/rad]."""
+
+    @classmethod
+    def of(cls, prepared: PreparedProblem) -> PairBounds | None:
+        """The data; None where the dual bound does not hold or cannot be higher than the plain one.
+
+        It needs the electrical objective, a concave friction law, and at least two joints. Friction
+        of the same torque at every speed has no convexity to spare for the confinement.
+        """
+        arm = prepared.arm
+        friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)
+        if (
+            prepared.problem.objective != "electrical"
+            or friction is None
+            or arm.robot.nq < GRID_JOINTS
+        ):
+            return None
+        stiffness = friction.stiffness(arm.friction_law)
+        if stiffness.min() <= 0:
+            return None
+        return cls(prepared, ChainDerivatives.of(arm), friction, copper_loss(arm), stiffness)

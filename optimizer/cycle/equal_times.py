@@ -1,0 +1,123 @@
+"""Savings of a cycle against other cycles in the same time, with the energy of waiting."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from joulepath.optimizer.cycle.cycle_baselines import cycle_baseline
+from joulepath.optimizer.cycle.cycle_solution import (
+    CycleBaseline,
+    CycleEnergies,
+    CycleMove,
+    CycleSolution,
+)
+from joulepath.optimizer.cycle.rest_energy import rest_energy, rest_sensitivity
+from joulepath.optimizer.dynamics.dwell import holding_power
+from joulepath.optimizer.dynamics.interval import MotionEnergy
+from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.result.energy import Sensitivity
+from joulepath.optimizer.result.solution import Baseline, Solution
+
+OTHER_MOTIONS: tuple[Literal["ruckig_slowed", "straight"], ...] = ("ruckig_slowed", "straight")
+
+
+def in_equal_times(cycle: Cycle, found: CycleSolution) -> CycleSolution:
+    """The cycle with savings in equal cycle times, and with further baselines of the same times.
+
+    A baseline beyond a limit has no saving. Without a requested `time`, cycles differ in duration:
+    the shorter one then waits for the end of the longer one at the cheapest stop of the answer.
+    """
+    if not found.baselines:
+        return found
+    others = [_by_motions(cycle, found, name) for name in OTHER_MOTIONS]
+    table = [*found.baselines, *(each for each in others if each is not None)]
+    return replace(found, baselines=[_priced(cycle, found, each) for each in table])
+
+
+def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBaseline:
+    """The baseline with the saving in the time of the longer cycle."""
+    if not each.within_limits:
+        return replace(each, saving=None, saving_interval=None)
+    wait = each.duration - found.duration
+    if cycle.objective != "electrical" or abs(wait) <= RATIO_TOLERANCE * found.duration:
+        return each
+    stops = [move for move in found.moves if move.planned.at_stop]
+    more = min(
+        (_rest(cycle, move, abs(wait)) for move in stops or found.moves[-1:]),
+        key=lambda rest: rest.energy,
+    )
+    ours, theirs = found.energies, each.energies
+    if wait > 0:
+        ours = replace(ours, electrical=_sum(ours.electrical, more))
+    else:
+        theirs = replace(theirs, electrical=_sum(theirs.electrical, more))
+    again = cycle_baseline(cycle, each.name, each.duration, theirs, True, ours)
+    return replace(each, saving=again.saving, saving_interval=again.saving_interval)
+
+
+def _rest(cycle: Cycle, move: CycleMove, length: float) -> MotionEnergy:
+    """A wait of `length` [s] after a move."""
+    q, arm = move.solution.goal.q, move.planned.arm_after
+    still = np.zeros((1, len(q)))
+    hold = float(holding_power(arm, Plant(arm).torques(q[None], still, still)[0]))
+    energy = rest_energy(cycle, move.planned, length, hold)
+    return MotionEnergy(energy, rest_sensitivity(cycle, move.planned, length, q), 0.0)
+
+
+def _sum(first: MotionEnergy, second: MotionEnergy) -> MotionEnergy:
+    return MotionEnergy(
+        first.energy + second.energy,
+        first.sensitivity + second.sensitivity,
+        first.duration + second.duration,
+    )
+
+
+def _by_motions(
+    cycle: Cycle, found: CycleSolution, name: Literal["ruckig_slowed", "straight"]
+) -> CycleBaseline | None:
+    """Baseline with other motions between the same configurations in the same times.
+
+    Lines and paths keep the motions of the answer.
+
+    Returns:
+        The baseline; None if a free move has no such motion, or an energy storage couples the
+        moves.
+    """
+    if found.storage is not None:
+        return None
+    parts = list[Baseline | None]()
+    for move in found.moves:
+        known = [each for each in move.solution.baselines if each.name == name]
+        same = [each for each in known if np.array_equal(each.at_goal.q, move.solution.goal.q)]
+        if not same and move.planned.tool_path is None:
+            return None
+        parts.append(same[0] if same else None)
+    ours, energies = found.energies, found.energies
+    for move, part in zip(found.moves, parts, strict=True):
+        if part is not None:
+            energies = _with_motion(energies, move.solution, part)
+    changed = [part for part in parts if part is not None]
+    if not changed:
+        return None
+    held = all(part.within_limits for part in changed)
+    return cycle_baseline(cycle, name, found.duration, energies, held, ours)
+
+
+def _with_motion(energies: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:
+    """Energies of a cycle with one motion replaced."""
+    known, gone = energies.electrical, own.sensitivity
+    return CycleEnergies(
+        replace(
+            known,
+            energy=known.energy + other.electrical - own.energy.electrical.total,
+            sensitivity=known.sensitivity
+            + other.sensitivity
+            + Sensitivity(-gone.gradient, -gone.shift),
+        ),
+        energies.mechanical + other.mechanical - own.energy.mechanical.total,
+    )

@@ -1,0 +1,100 @@
+"""Requirements of an identification on its logs, and the advice if they are not met."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from joulepath.models.robot import Robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, PayloadUnknown
+from joulepath.optimizer.identify.fits.block import terms_of
+from joulepath.optimizer.identify.fits.payload_fit import joints_without_gravity
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.results import Parameter
+from joulepath.optimizer.identify.rows.fit_rows import Rows
+
+
+def check_logs(
+    robot: Robot, rows: Rows, logs: Sequence[Log], options: IdentificationOptions
+) -> None:
+    """Check that the logs contain the channels and motions of the requested figures.
+
+    Raises:
+        EffortNotUsable: the efforts of a log exclude gravity.
+        InvalidProblem: the requested figures exclude each other or need other channels.
+        PayloadUnknown: torque constants are requested, and the payload is not known.
+        NoPowerChannel: power is requested, and no log has it.
+        NotExcited: the logs have no motion, or neither torques nor power.
+    """
+    if any(log.effort_meaning == "external" for log in logs):
+        raise EffortNotUsable(
+            "The efforts of these logs are without gravity and identify nothing: log motor "
+            "currents or torques.",
+            "external",
+            {},
+        )
+    if "torque_constant" in options.fit and (
+        not rows.current or options.needs_regressor or options.couplings
+    ):
+        raise InvalidProblem(
+            "fit",
+            "torque_constant needs motor currents, and links that are known: leave it out, or keep "
+            "the inertials.",
+        )
+    if "torque_constant" in options.fit and (
+        "payload" in options.fit or not all(log.payload_known for log in logs)
+    ):
+        raise PayloadUnknown(joints_without_gravity(robot, rows, logs))
+    if "payload" in options.fit and (options.needs_regressor or options.couplings):
+        raise InvalidProblem(
+            "fit", "A payload needs links that are known, and no couplings: leave it out."
+        )
+    power = bool(np.isfinite(rows.power).any())
+    if "power" in options.fit and not power:
+        raise NoPowerChannel
+    if options.held_out and rows.rest.all():
+        raise not_excited(terms_of(options), logs, options)
+    efforts = bool(np.isfinite(rows.effort).any())
+    if not power and not efforts and options.method != "base_wrench":
+        raise not_excited(options.fit, logs, options)
+    if "payload" in options.fit and not efforts:
+        raise not_excited(["payload"], logs, options)
+
+
+def check_identified(
+    parameters: Sequence[Parameter], logs: Sequence[Log], options: IdentificationOptions
+) -> None:
+    """Check that at least one requested figure is identified.
+
+    Raises:
+        NotExcited: the logs identify none of them.
+    """
+    requested = [
+        each
+        for each in parameters
+        if set(options.fit) != {"payload"} or each.figure.startswith("payload")
+    ]
+    if not any(each.identified for each in requested):
+        raise not_excited([each.figure for each in requested], logs, options)
+
+
+def not_excited(
+    parameters: Sequence[str], logs: Sequence[Log], options: IdentificationOptions
+) -> NotExcited:
+    """The error, with a request for an excitation that identifies the parameters.
+
+    Friction is always excited, and links if their torques are needed.
+    """
+    links = options.needs_regressor or {"torque_constant", "payload"} & set(options.fit)
+    excite = [
+        *(["inertials"] if links else []),
+        *(["rotor"] if "rotor" in options.targets else []),
+        "friction",
+    ]
+    load = logs[0].payload
+    payload = {"payload": {"mass": load.mass, "com": load.com.tolist()}} if load.mass > 0 else {}
+    return NotExcited(list(parameters), {"robot": logs[0].robot, "parameters": excite, **payload})

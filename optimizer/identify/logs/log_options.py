@@ -1,0 +1,33 @@
+"""Options of the reading of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.identify.logs.file_rows import FILE
+from joulepath.optimizer.identify.logs.log import EffortMeaning
+from joulepath.optimizer.problem.arm import Payload
+
+
+@dataclass(frozen=True)
+class LogOptions:
+    """Information that the file of a log does not contain."""
+
+    payload: Payload | None = None
+    """Payload of the arm; None for the logged payload, or none if it was not logged."""
+    gravity: Sequence[float] | Array = (0.0, 0.0, -9.81)
+    """Gravity (3,) in the base frame [m/s²]."""
+    columns: Mapping[str, str | Sequence[str]] | None = None
+    """Names of the columns of each channel; None for a header with known names."""
+    units: Literal["rad", "deg"] = "rad"
+    """Unit of positions, and of the angle in speeds and accelerations."""
+    current_units: Literal["A", "mA"] = "A"
+    effort: EffortMeaning | Literal["auto"] | None = "auto"
+    """Meaning of the efforts; `auto` determines it from the log, and None leaves them out."""
+    name: str | None = None
+    tags: tuple[str, ...] = ()
+    max_bytes: int = FILE.max_bytes
+    """Largest size of the file after unpacking [bytes]."""

@@ -1,0 +1,237 @@
+"""Traced curves of one pose, stacked in one array: points with cubics between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.seven.curve_tracing import TracedPath
+from joulepath.optimizer.kinematics.seven.hermite import hermite
+
+
+@dataclass(frozen=True)
+class StackSettings:
+    """Parameters of open curves, and the search across cubics."""
+
+    open_half: float = 3.0
+    """Half the range of the parameter of an open curve: less than π, so that its ends differ."""
+    steps: int = 8
+    """Largest number of Newton steps towards the point of a cubic across from a configuration."""
+    beyond: float = 0.25
+    """Largest share beyond the ends of a segment in this search."""
+    tolerance: float = 1e-8
+    """Step at which the search ends, relative to the segment; its square is negligible."""
+    beside: float = 0.15
+    """Largest distance of a curve from the segment between two of its points [rad]."""
+    least_length: float = 1e-300
+    """Smallest length that divides [rad]."""
+
+
+SETTINGS = StackSettings()
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class TracedCurveStack:
+    """Traced curves of one pose, one after the other.
+
+    `nodes` (n, nq) [rad] are points along the curves, `tangents` (n, nq) the unit tangents there.
+    `first` (m,) is the row of the first point of each curve. `half` (m,) is half the range of its
+    parameter, which is proportional to the arc length: π for a closed curve, `open_half` for an
+    open one, 0 for a single point.
+    """
+
+    nodes: Array
+    tangents: Array
+    first: Rows
+    half: Array
+
+    @classmethod
+    def of(cls, paths: Sequence[TracedPath]) -> TracedCurveStack:
+        """Stack of the curves along paths."""
+        if not paths:
+            return cls(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0, dtype=np.intp), np.zeros(0))
+        counts = [len(path.q) for path in paths]
+        half = [
+            np.pi if path.closed else SETTINGS.open_half if count > 1 else 0.0
+            for path, count in zip(paths, counts, strict=True)
+        ]
+        nodes = np.concatenate([path.q for path in paths])
+        tangents = np.concatenate([path.tangents for path in paths])
+        return cls(nodes, tangents, np.cumsum([0, *counts[:-1]]), np.array(half))
+
+    def joined(self, paths: Sequence[TracedPath]) -> TracedCurveStack:
+        """This stack, extended by the curves along paths."""
+        if not paths:
+            return self
+        others = TracedCurveStack.of(paths)
+        if not len(self.first):
+            return others
+        return TracedCurveStack(
+            np.concatenate([self.nodes, others.nodes]),
+            np.concatenate([self.tangents, others.tangents]),
+            np.concatenate([self.first, others.first + len(self.nodes)]),
+            np.concatenate([self.half, others.half]),
+        )
+
+    @cached_property
+    def last(self) -> Rows:
+        """Row (m,) of the last point of each curve."""
+        return np.append(self.first[1:], len(self.nodes)) - 1
+
+    @cached_property
+    def segment_lengths(self) -> Array:
+        """Lengths (n,) [rad] of the segments from each point to the next of its curve; 0 at the
+        last point.
+        """
+        lengths = np.zeros(len(self.nodes))
+        lengths[:-1] = np.linalg.norm(self.nodes[1:] - self.nodes[:-1], axis=1)
+        lengths[self.last] = 0.0
+        return lengths
+
+    @cached_property
+    def curve_lengths(self) -> Array:
+        """Lengths (m,) [rad] of the curves."""
+        return np.add.reduceat(self.segment_lengths, self.first)
+
+    @cached_property
+    def knots(self) -> Array:
+        """Parameters (n,) of the points."""
+        counts = self.last - self.first + 1
+        along = np.append(0.0, np.cumsum(self.segment_lengths[:-1]))
+        along -= np.repeat(along[self.first], counts)
+        scale = np.repeat(
+            2 * self.half / np.maximum(self.curve_lengths, SETTINGS.least_length), counts
+        )
+        return np.asarray(scale * along - np.repeat(self.half, counts))
+
+    def locate(self, u: Array, curves: Rows) -> tuple[Rows, Array]:
+        """Segments at parameters u (n,) of the curves in rows (n,).
+
+        Returns:
+            The rows (n,) of the points that begin the segments, and the shares (n,) of the
+            segments.
+        """
+        wide = 4 * SETTINGS.open_half
+        turn = 2 * np.pi * np.round(u / (2 * np.pi))
+        u = np.where(self.half[curves] == np.pi, u - turn, u)
+        shifted = self.knots + wide * np.repeat(
+            np.arange(len(self.first)), self.last - self.first + 1
+        )
+        k = np.searchsorted(shifted, u + wide * curves, side="right") - 1
+        k = np.minimum(
+            np.maximum(k, self.first[curves]), np.maximum(self.last[curves] - 1, self.first[curves])
+        )
+        after = np.minimum(k + 1, self.last[curves])
+        gap = self.knots[after] - self.knots[k]
+        return k, (u - self.knots[k]) / np.where(gap > 0, gap, 1.0)
+
+    def _after(self, k: Rows) -> Rows:
+        """Next points of points k (n,); the last point of a curve is its own successor."""
+        return np.asarray(k + (self.segment_lengths[k] > 0))
+
+    def at(self, k: Rows, share: Array) -> Array:
+        """Points (n, nq) [rad] at shares (n,) of the segments that begin at points k (n,)."""
+        after, length = self._after(k), self.segment_lengths[k][:, None]
+        return hermite(
+            share,
+            self.nodes[k],
+            self.nodes[after],
+            length * self.tangents[k],
+            length * self.tangents[after],
+        )
+
+    def at_each(self, k: Rows, weights: Array, joints: Rows) -> Array:
+        """Angles (n, m, j) [rad] of joints (j,) at m shares of each segment.
+
+        Args:
+            k: points that begin the segments, shape (n,).
+            weights: `hermite_weights` of the shares, shape (4, m).
+            joints: indices of the joints, shape (j,).
+        """
+        after, length = self._after(k), self.segment_lengths[k][:, None]
+        ends = np.empty((len(k), 4, self.nodes.shape[1]))
+        ends[:, 0], ends[:, 1] = self.nodes[k], self.nodes[after]
+        ends[:, 2], ends[:, 3] = length * self.tangents[k], length * self.tangents[after]
+        return np.asarray(weights.T @ ends[:, :, joints])
+
+    def along(self, k: Rows, share: Array) -> Array:
+        """Approximate directions (n, nq) of the curves there, across which members are sought."""
+        before = self.tangents[k]
+        return before + share[:, None] * (self.tangents[self._after(k)] - before)
+
+    def shares_across(self, k: Rows, share: Array, q: Array) -> Array:
+        """Shares (n,) at which configurations q (n, nq) [rad] are across from the curves, next to
+        given shares.
+
+        A configuration is across from a point if their difference is perpendicular to the direction
+        `along` there. Shares of segments of length zero do not change.
+        """
+        length, after = self.segment_lengths[k], self._after(k)
+        sides = np.empty((4, *q.shape))
+        t, bend, chord, away = sides
+        t[:], bend[:] = self.tangents[k], self.tangents[after]
+        bend -= t
+        np.subtract(self.nodes[after], self.nodes[k], out=chord)
+        np.subtract(q, self.nodes[k], out=away)
+        (tt, _), (tb, bb), (tc, bc), (e0, e1) = np.einsum("xij,yij->xyi", sides, sides[:2])
+        # The cubic is node + a s + b s² + c s³ with a = length · t, b = 3 chord - length (3 t +
+        # bend) and c = length (2 t + bend) - 2 chord; the condition is a quartic in s.
+        e1 = e1 - length * tt
+        e2 = length * (3 * tt) - 3 * tc
+        e3 = length * (2 * tb + bb - 2 * tt) + 2 * tc - 3 * bc
+        e4 = 2 * bc - length * (2 * tb + bb)
+        moving = length > 0
+        least = -np.maximum(length, SETTINGS.least_length)
+        for _ in range(SETTINGS.steps):
+            value = e0 + share * (e1 + share * (e2 + share * (e3 + share * e4)))
+            slope = e1 + share * (2 * e2 + share * (3 * e3 + share * (4 * e4)))
+            step = value / np.where(slope < 0, slope, least)
+            share = np.where(
+                moving,
+                np.minimum(np.maximum(share - step, -SETTINGS.beyond), 1 + SETTINGS.beyond),
+                share,
+            )
+            if np.abs(step).max(initial=0.0) < SETTINGS.tolerance:
+                break
+        return np.asarray(share)
+
+    def order_and_neighbours(self) -> tuple[Array, Mask]:
+        """Numbers that order the curves, and the curves near the first point of each.
+
+        The number is the mean of a sum of sines along the curve. It depends neither on full turns
+        nor on the starting point of a closed curve.
+
+        Returns:
+            The numbers (m,), and a mask (m, m) of the curves that may pass the first point of each
+            curve.
+        """
+        # One phase per joint, so that mirrored curves differ.
+        m, nq = self.nodes.shape
+        phases, cosines_and_sines = self.nodes + np.arange(1.0, nq + 1), np.empty((m, 2 * nq))
+        c = np.cos(phases, out=cosines_and_sines[:, :nq])
+        s = np.sin(phases, out=cosines_and_sines[:, nq:])
+        sine_sum, slope = s.sum(axis=1), np.einsum("ij,ij->i", c, self.tangents)
+        # Trapezoidal rule with its end correction.
+        parts, length = np.zeros(len(sine_sum)), self.segment_lengths[:-1]
+        parts[:-1] = length / 2 * (sine_sum[1:] + sine_sum[:-1]) - length**2 / 12 * (
+            slope[1:] - slope[:-1]
+        )
+        total = np.add.reduceat(parts, self.first)
+        order = np.where(
+            self.curve_lengths > 0,
+            total / np.maximum(self.curve_lengths, SETTINGS.least_length),
+            sine_sum[self.first],
+        )
+        # At a distance d, the sum of the cosines of all joint distances is at least nq - d²/2.
+        cosine_sums = np.maximum.reduceat(
+            cosines_and_sines[self.first] @ cosines_and_sines.T, self.first, axis=1
+        )
+        far = np.maximum.reduceat(self.segment_lengths, self.first) + SETTINGS.beside
+        return order, cosine_sums >= nq - far**2 / 2

@@ -1,0 +1,162 @@
+"""Inverse kinematics of any six-joint arm by Newton's method from many starts: the last resort.
+
+Starts are drawn uniformly over all joint positions, with a fixed seed, in rounds until several
+consecutive rounds find nothing new. A branch with a small basin of attraction may still be missed,
+so the result is never `complete`. A general arm has at most sixteen branches (E. J. F. Primrose,
+"On the input-output equation of the general 7R-mechanism", 1986).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.exceptions import SingularPose
+from joulepath.optimizer.kinematics.angles import wrapped
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.isolated import ISOLATED, distinct, lies_on_a_curve
+from joulepath.optimizer.kinematics.newton import solved
+from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.six.named_branches import in_order, numbered
+from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
+
+
+@dataclass(frozen=True)
+class MultiStartSettings:
+    """Settings of the multi-start search."""
+
+    most_branches: int = 16
+    """Number of branches at which the search ends (Primrose 1986)."""
+    round_size: int = 64
+    """Number of uniformly drawn starts per round."""
+    rounds: int = 16
+    """Largest number of rounds."""
+    idle_rounds: int = 3
+    """Number of consecutive rounds without a new solution that ends the search."""
+    steps: int = 45
+    """Newton steps per start."""
+    hopeless: float = 0.5
+    """Pose error above which a start is given up after a third of the steps [m, rad]."""
+    solved: float = 1e-11
+    """Largest pose error of a solution [m, rad], far below the promised accuracy."""
+    strides: tuple[float, ...] = (0.05, 0.3, 1.0, 2.0, 3.0)
+    """Steps from a nearly singular solution along its null direction to the branch on the other
+    side of the singularity [rad].
+    """
+    nearly_singular: float = 0.1
+    """Smallest singular value below which another branch is probably near."""
+    cached_poses: int = 256
+    """Number of poses with cached configurations."""
+
+
+MULTI_START = MultiStartSettings()
+
+
+class MultiStart:
+    """`PoseSolver` of a six-joint arm without a closed form."""
+
+    complete, confirmed = False, False
+
+    def __init__(self, chain: Chain) -> None:
+        self._chain = chain
+        self._found = lru_cache(maxsize=MULTI_START.cached_poses)(self._solve)
+
+    @classmethod
+    def of(cls, model: pin.Model) -> MultiStart | None:
+        """Inverse kinematics of a Pinocchio model with a frame `flange`; None unless it has six
+        joints.
+        """
+        return cls(Chain.of(model)) if model.nq == 6 else None
+
+    def label(self, q: Array) -> BranchLabel:
+        """Branch of a configuration (6,) [rad]: the number of the nearest solution, 1 on a
+        self-motion.
+        """
+        try:
+            return numbered(q, self.solve(self._chain.flange(q[None])[0])[0])
+        except SingularPose:
+            return NumberedBranch(1)
+
+    def singular_parts(self, q: Array) -> tuple[str, ...]:
+        """Always empty: numbered branches have no parts."""
+        return ()
+
+    def solve(self, T: Array) -> tuple[Array, list[BranchLabel]]:
+        """Configurations (n, 6) [rad] in [-pi, pi] that put the flange at T (4, 4), and their
+        labels.
+
+        Raises:
+            SingularPose: a solution lies on a self-motion.
+        """
+        q = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
+        return q, [numbered(each, q) for each in q]
+
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[SelfMotion]:
+        """Always empty: no self-motion is known."""
+        return []
+
+    def distance_to_reach(self, T: Array) -> None:
+        """Always None: the distance is unknown."""
+        return
+
+    def _solve(self, matrix: bytes) -> Array:
+        T = np.frombuffer(matrix).reshape(4, 4)
+        rng, found, idle = np.random.default_rng(0), np.zeros((0, 6)), 0
+        starts = rng.uniform(-np.pi, np.pi, (MULTI_START.round_size, 6))
+        for _ in range(MULTI_START.rounds):
+            checkpoint()
+            fresh = self._joined(found, starts, T)
+            idle = idle + 1 if len(fresh) == len(found) else 0
+            if idle == MULTI_START.idle_rounds or len(fresh) >= MULTI_START.most_branches:
+                found = fresh
+                break
+            starts = np.vstack(
+                [
+                    rng.uniform(-np.pi, np.pi, (MULTI_START.round_size, 6)),
+                    self._beside(fresh[len(found) :]),
+                ]
+            )
+            found = fresh
+        singular = self._smallest(found)
+        for k in np.flatnonzero(singular < ISOLATED.singular_value):
+            if lies_on_a_curve(self._chain, found[k], T):
+                raise SingularPose("goal", float(singular[k]))
+        found = in_order(found)
+        found.setflags(write=False)
+        return found
+
+    def _joined(self, found: Array, starts: Array, T: Array) -> Array:
+        """The known solutions (n, 6) [rad], and the distinct new ones found from starts (m, 6)."""
+        q, residual = solved(self._chain, starts, T, MULTI_START.steps, MULTI_START.hopeless)
+        singular = self._smallest(q) < REACH.singular
+        done = (residual < MULTI_START.solved) | ((residual < REACH.beyond) & singular)
+        q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
+        smallest = self._smallest(q)
+        return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), residual[done]), smallest)])
+
+    def _smallest(self, q: Array) -> Array:
+        """Smallest singular values (n,) of the Jacobian at configurations (n, 6) [rad]."""
+        return np.asarray(
+            np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1]
+        )
+
+    def _beside(self, found: Array) -> Array:
+        """Starts (n, 6) on both sides of nearly singular solutions (m, 6), along their null
+        directions.
+        """
+        _, s, vt = np.linalg.svd(self._chain.flange_and_jacobian(found)[1])
+        weak = s[:, -1] < MULTI_START.nearly_singular
+        null = vt[weak, -1]
+        return np.vstack(
+            [
+                found[weak] + side * stride * null
+                for stride in MULTI_START.strides
+                for side in (1, -1)
+            ]
+        )

@@ -1,0 +1,32 @@
+"""The error of a search without a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from joulepath.optimizer.exceptions import NoTrajectory
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
+
+
+def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:
+    """The error for no motion, with the collision that stopped the best candidate, if any."""
+    reports = [candidate.report() for candidate in candidates]
+    hits = [
+        (each, each.attempt.collision)
+        for each in candidates
+        if each.attempt and each.attempt.collision
+    ]
+    if not hits:
+        return NoTrajectory(reports)
+    candidate, hit = max(hits, key=lambda each: each[1].min_clearance)
+    cut_short = any(each.attempt is not None and each.attempt.cut_short for each in candidates)
+    return NoCollisionFreeTrajectory(
+        reports,
+        pair=hit.pair,
+        depth=max(-hit.min_clearance, 0.0),
+        time=hit.time,
+        start=candidate.start.label,
+        goal=candidate.goal.label,
+        cut_short=cut_short,
+    )

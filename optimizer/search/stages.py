@@ -1,0 +1,248 @@
+"""Stages of a search, each a function that changes the state; `METHOD` lists them in order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from joulepath.optimizer.bounds.missed_branches import all_branches_known
+from joulepath.optimizer.deadline import DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.candidates import CandidateStatus
+from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search import free_goal, self_motions
+from joulepath.optimizer.search.answer import answer
+from joulepath.optimizer.search.baseline_comparison import baselines_of, compare_with_baselines
+from joulepath.optimizer.search.candidates import Reason, bound, pairs
+from joulepath.optimizer.search.ends import ends
+from joulepath.optimizer.search.errors import DurationTooShort
+from joulepath.optimizer.search.exploration import explore
+from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
+from joulepath.optimizer.search.freed_duration import start_from_free_duration
+from joulepath.optimizer.search.no_trajectory import no_trajectory
+from joulepath.optimizer.search.other_starts import start_beside
+from joulepath.optimizer.search.path_ends import path_candidates
+from joulepath.optimizer.search.refinement import refine, refine_rivals
+from joulepath.optimizer.search.sampled_ends import between
+from joulepath.optimizer.search.state import FoundMotion, SearchState
+from joulepath.optimizer.search.tightened_limits import retry_within_tighter_limits
+from joulepath.optimizer.search.warm_start import warm_start
+from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
+
+Stage = Callable[[SearchState], None]
+
+STORAGE_SHARE = 0.5
+"""Share of the time left for the search without energy storage."""
+
+
+def find_candidates(state: SearchState) -> None:
+    """Find all pairs of start and goal configurations."""
+    prepared = state.prepared
+    if state.problem.tool_path is not None:
+        state.candidates = path_candidates(prepared)
+        return
+    (starts, no_starts), (goals, no_goals) = (ends(prepared, name) for name in ("start", "goal"))
+    state.unreachable = no_starts + no_goals
+    state.candidates = pairs(prepared, starts, goals)
+
+
+def bound_candidates(state: SearchState) -> None:
+    """Rule out candidates with infeasible ends, and give each candidate its lower bound."""
+    problem = state.problem
+    bound(state.prepared, state.candidates)
+    checkpoint()
+    least = min(candidate.shortest for candidate in state.candidates)
+    state.longest = max(least, problem.duration_min or 0.0)
+    problem.arm.check_rating("payload.mass", problem.arm.payload.mass)
+    is_complete = all_branches_known(problem) and not any(each.sampled for each in state.candidates)
+    if is_complete and not problem.tool_path:
+        state.proven = min(each.lower_bound for each in state.candidates)
+    state.tell_candidates()
+
+
+def start_from_known_motions(state: SearchState) -> None:
+    """Solve the candidates of known motions from these motions."""
+    for spline in state.known:
+        warm_start(state, spline)
+
+
+def solve_without_storage(state: SearchState) -> None:
+    """Solve the problem without energy storage: with it, no motion needs more energy."""
+    if state.uses_storage:
+        arm = replace(state.problem.arm, bus=Bus())
+        state.without_storage = solve_related(
+            state, replace(state.problem, arm=arm), share=STORAGE_SHARE
+        )
+
+
+def explore_candidates(state: SearchState) -> None:
+    """Solve candidates by their bounds; take the fastest motion if no motion is short enough."""
+    problem = state.problem
+    # rest does no work: any motion may rest for the time that is left
+    state.may_rest = (
+        problem.objective == "mechanical" and problem.duration_min != problem.duration_max
+    )
+    explore_or_find_fastest(state, lambda: explore(state), state.known, state.without_storage)
+
+
+def refine_sampled_ends(state: SearchState) -> None:
+    """Move the ends of the best samples over their targets."""
+    if state.method.most_solved is None:
+        state.candidates += free_goal.refine_goals(state) + self_motions.refine(state)
+        state.tell_candidates()
+        state.tell_best()
+
+
+def refine_best(state: SearchState) -> None:
+    """Refine the best motion, and motions of candidates that may come below it."""
+    best = state.best()
+    if best is None or best.refused:
+        return
+    best = start_beside(state, best)
+    coarse = best.energy or 0.0
+    refine(state, best)
+    refine_rivals(state, best, coarse)
+    start_from_free_duration(state, state.best() or best)
+
+
+def solve_longest_duration(state: SearchState) -> None:
+    """Compare with the motion of the longest duration, once."""
+    longest = None
+    if state.may_rest:
+        longest = solve_related(
+            state, replace(state.problem, duration_min=state.problem.duration_max)
+        )
+    if longest is not None:
+        state.accept_if_better(longest.candidate, longest.result, longest.energy)
+    state.may_rest = False
+
+
+def compare_best_with_baselines(state: SearchState) -> None:
+    """Compute the baselines of the best motion, and start solves from cheaper baselines."""
+    best = state.best()
+    assert best is not None
+    state.baselines = compare_with_baselines(state, best)
+    # a coarse motion that was not refined is no optimum
+    state.cut_short |= state.deadline.passed
+
+
+def confirm_best(state: SearchState) -> None:
+    """Make the answer of the best motion; if its certificate fails, solve other candidates."""
+    best = state.best()
+    assert best is not None
+    state.answer = answer(state, best, state.baselines)
+    if state.answer is None:
+        retry_within_tighter_limits(state, best)
+        explore(state)
+
+
+def until_confirmed(*stages: Stage) -> Stage:
+    """A stage that repeats stages until there is an answer, or no motion is left."""
+
+    def repeat(state: SearchState) -> None:
+        while state.answer is None and state.best() is not None:
+            for stage in stages:
+                stage(state)
+
+    return repeat
+
+
+def confirm_fastest(state: SearchState) -> None:
+    """Take the fastest motion if the certificate confirmed no other motion."""
+    if state.answer is not None or not any(
+        each.reason is Reason.NOT_CONFIRMED for each in state.candidates
+    ):
+        return
+    find_fastest(state, state.known, improve=False)
+    best = state.best()
+    if best is not None:
+        state.answer = answer(state, best, baselines_of(state, best))
+
+
+PREPARATION: tuple[Stage, ...] = (find_candidates, bound_candidates)
+"""Stages before any motion is computed."""
+
+SEARCH: tuple[Stage, ...] = (
+    solve_without_storage,
+    explore_candidates,
+    refine_sampled_ends,
+    until_confirmed(
+        refine_best,
+        solve_longest_duration,
+        compare_best_with_baselines,
+        confirm_best,
+    ),
+    confirm_fastest,
+)
+"""Stages after the candidates are prepared, of which some may be solved."""
+
+METHOD: tuple[Stage, ...] = (*PREPARATION, start_from_known_motions, *SEARCH)
+"""All stages of a search, in order."""
+
+
+def prepare(state: SearchState) -> None:
+    """Run the stages before any motion is computed.
+
+    Raises:
+        DeadlineExceeded: the deadline passed.
+        JoulepathError: the errors of `optimize` that need no search.
+    """
+    try:
+        with watch(state.end):
+            for stage in PREPARATION:
+                stage(state)
+    except DeadlinePassed:
+        raise state.too_late() from None
+
+
+def search(state: SearchState) -> Solution:
+    """Run the stages after the preparation; raises the errors of `optimize`."""
+    for stage in SEARCH:
+        stage(state)
+    if state.answer is not None:
+        return state.answer
+    if any(candidate.status is CandidateStatus.UNVISITED for candidate in state.candidates):
+        raise state.too_late()
+    raise no_trajectory(state.candidates)
+
+
+def solve_related(state: SearchState, problem: Problem, share: float = 1.0) -> FoundMotion | None:
+    """The answer to a related problem, whose motions are allowed in the own problem at no more
+    energy.
+
+    Args:
+        state: state of the search.
+        problem: the related problem.
+        share: share of the time left for the related search.
+
+    Returns:
+        The motion with its energy in the own problem; None if there is none in time.
+    """
+    left = state.deadline.left
+    if left <= 0:
+        return None
+    other = SearchState.of(
+        replace(problem, bound="normal", deadline=share * left), clock=state.clock
+    )
+    try:
+        prepare(other)
+        found = search(other)
+    except (DeadlineExceeded, DurationTooShort, NoTrajectory):
+        return None
+    state.iterations += found.solver.iterations
+    state.solves += found.solver.nlp_solves
+    targets = found.start.target, found.goal.target
+    same_targets = [
+        each for each in state.candidates if (each.start.target, each.goal.target) == targets
+    ]
+    candidate = between(state.prepared, state.candidates, found.start.q, found.goal.q, same_targets)
+    spline = found.trajectory.spline
+    result = SolveResult(
+        SolveStatus.SOLVED,
+        SolveReason.CONVERGED,
+        spline=spline,
+        stationarity=found.solver.stationarity,
+    )
+    return FoundMotion(candidate, result, state.prepared.energy(spline))

@@ -1,0 +1,148 @@
+"""POST /report: what the page says, what is attached to it, and what a check of it finds."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from joulepath.app.api.report.bundle import Bundle, NoReport, attached_to, in_html
+from joulepath.app.api.report.check import checked
+from joulepath.app.api.report.numbers import digits, down, percent, up
+from tests.app.requests import HOME, NEAR, move
+
+Json = dict[str, Any]
+COSTS = {
+    "cycles_per_shift": {"value": 2000, "source": "line plan"},
+    "shifts_per_year": {"value": 200},
+    "price": {"value": 0.25, "source": "contract"},
+    "currency": "CHF",
+    "carbon": {"value": 0.4},
+}
+CYCLE = {
+    "start": {"q": HOME},
+    "stops": [
+        {"name": "pick", "target": {"q": NEAR}, "payload": {"mass": 1.0, "com": [0, 0, 0.1]}},
+        {"name": "place", "target": {"q": [0.5, -1.3, 1.3, -1.5, -1.57, 0.2]}, "payload": None},
+    ],
+    "deadline": 100.0,
+}
+JOULES_PER_KWH = 3.6e6
+
+
+def reported(client: TestClient, **body: Any) -> bytes:
+    answer = client.post("/report", json=body)
+    assert answer.status_code == 200, answer.text
+    return answer.content
+
+
+def altered(file: bytes, **answer: Any) -> bytes:
+    """The page with another answer in it."""
+    bundle = attached_to(file)
+    changed = Bundle(**{**vars(bundle), "answer": bundle.answer | answer})
+    return file.replace(in_html(bundle.packed()).encode(), in_html(changed.packed()).encode())
+
+
+@pytest.fixture(scope="module")
+def html(client: TestClient) -> bytes:
+    return reported(client, optimize=move(), costs=COSTS, title="Lift & <turn>")
+
+
+def test_the_page_says_what_its_documents_say(html: bytes) -> None:
+    bundle, text = attached_to(html), html.decode()
+    assert bundle.request["goal"] == move()["goal"] and bundle.kind == "optimize"
+    electrical = bundle.answer["energy"]["electrical"]
+    yearly = electrical["total"] * 2000 * 200 / JOULES_PER_KWH
+    for words in (
+        f"<strong>{digits(electrical['total'])}</strong> J",
+        f"likely {down(electrical['interval']['p5'])} to {up(electrical['interval']['p95'])}",
+        f"<td>{digits(yearly)}</td><td>{digits(yearly * 0.25)}</td><td>{digits(yearly * 0.4)}</td>",
+        "Lift &amp; &lt;turn&gt;",
+        "line plan",
+        "not counted: no reading",
+    ):
+        assert words in text
+    claimed = [each for each in bundle.answer["baselines"] if each["saving"] is not None]
+    assert claimed and text.count('class="claimed"') == len(claimed)
+    least = min(each["saving"] for each in claimed)
+    assert f"<b>{percent(least)} less</b>" in text
+
+
+def test_a_report_agrees_with_itself_and_with_its_request_answered_anew(html: bytes) -> None:
+    found = checked(html, again=True, request_id="test")
+    assert found.agrees
+    assert [line.what for line in found.lines][-2:] == ["page", "request answered anew"]
+
+
+def test_what_was_changed_is_found(html: bytes) -> None:
+    bundle = attached_to(html)
+    energy = bundle.answer["energy"]
+    cheaper = energy["electrical"] | {"total": 0.9 * energy["electrical"]["total"]}
+    found = checked(altered(html, energy=energy | {"electrical": cheaper}), False, "test")
+    assert {line.what for line in found.lines if not line.agrees} == {
+        "energy of move",
+        "sum of the parts",
+        "page",
+    }
+    page = checked(html.replace(b"not counted", b"counted too"), False, "test")
+    assert [line.what for line in page.lines if not line.agrees] == ["page"]
+
+
+def test_a_kept_answer_is_reported_on_by_its_id(client: TestClient) -> None:
+    answer = client.post("/optimize", json=move()).json()
+    bundle = attached_to(reported(client, optimize=move(), answer=answer["id"]))
+    assert bundle.answer["id"] == answer["id"]
+    assert bundle.answer["energy"] == answer["energy"]
+    refused = client.post("/report", json={"cycle": CYCLE, "answer": answer["id"]})
+    assert refused.status_code == 422 and "another request" in refused.json()["errors"][0]["msg"]
+
+
+def test_a_cycle_shows_its_legs(client: TestClient) -> None:
+    page = reported(client, cycle=CYCLE)
+    bundle, text = attached_to(page), page.decode()
+    assert len(bundle.moves) == 3 and checked(page, False, "test").agrees
+    assert "One cycle of 2 stops needs" in text
+    assert not re.search(r"\d (J|s)\b", text.partition("</p>")[0].rpartition("lead")[2])
+    for leg in bundle.answer["legs"]:
+        assert digits(leg["electrical"]) in text
+    # no price is given
+    assert "Not given: price, carbon intensity, shifts per year." in text
+
+
+def test_a_pdf_has_the_same_documents(client: TestClient) -> None:
+    pytest.importorskip("typst")
+    file = reported(client, optimize=move(), costs=COSTS, format="pdf")
+    assert file.startswith(b"%PDF") and len(re.findall(rb"/Type ?/Page\b", file)) == 1
+    bundle = attached_to(file)
+    assert bundle.costs["price"] == {"value": 0.25, "source": "contract"}
+    assert checked(file, again=False, request_id="test").agrees
+
+
+def test_where_nothing_keeps_every_limit_no_saving_is_claimed(client: TestClient) -> None:
+    # faster than any of the usual ways can be, but for what the search finds
+    body = move(limits={"tcp_speed": 0.05})
+    page = reported(client, optimize=body).decode()
+    bundle = attached_to(page.encode())
+    assert all(each["saving"] is None for each in bundle.answer["baselines"])
+    assert "no saving is claimed" in page and 'class="claimed"' not in page
+
+
+@pytest.mark.parametrize(
+    "body", [{}, {"optimize": move(), "cycle": CYCLE}, {"optimize": move(), "format": "doc"}]
+)
+def test_other_bodies_are_refused(recorded: TestClient, body: Json) -> None:
+    assert recorded.post("/report", json=body).status_code == 422
+
+
+def test_a_file_without_documents_is_no_report(html: bytes) -> None:
+    for file in (b"", b"%PDF-1.7\n", html.replace(b"joulepath_report", b"other")):
+        with pytest.raises(NoReport):
+            attached_to(file)
+
+
+def test_numbers_are_rounded_to_the_safe_side() -> None:
+    assert (digits(755.7), down(697.96), up(58.11), up(5.861)) == ("756", "697", "58.2", "5.87")
+    assert (digits(1239.4), digits(0.0420), digits(-18.4)) == ("1,239", "0.0420", "−18.4")
+    assert (percent(0.0482), percent(0.0769, "up")) == ("4.8\u00a0%", "7.7\u00a0%")

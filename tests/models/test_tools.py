@@ -1,0 +1,105 @@
+"""Figures of tools: every one has a source or says that it has none, and together they are bodies
+that can be built.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.tools.registry import FIGURES, tool_figures, tool_names
+from joulepath.models.trust import TRUST
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.exceptions import UnknownTool
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.tool import load_tool
+
+# of sums of a few numbers in double precision
+ROUNDING = 1e-12
+# m: the TCP lies between fingers, or on the rim of a cup
+BETWEEN_FINGERS = 0.06
+CONFIGURATIONS = 20
+
+
+@pytest.mark.parametrize("name", tool_names())
+def test_every_figure_has_a_letter_and_a_source(name: str) -> None:
+    figures = tool_figures(name)
+    assert set(figures) == {"title", *FIGURES}
+    for each in FIGURES:
+        figure = figures[each]
+        assert figure["trust"] in TRUST and figure["unit"] and figure["note"]
+        # a letter for a source has one
+        assert figure["trust"] == "E" or figure["source"] != "none"
+
+
+@pytest.mark.parametrize("name", tool_names())
+def test_the_mass_lies_within_the_shape_and_the_tcp_at_its_tip(name: str) -> None:
+    tool = load_tool(name)
+    rows = np.array(tool_figures(name)["capsules"]["value"])
+
+    def nearest(point: np.ndarray) -> float:
+        first, way = rows[:, :3], rows[:, 3:6] - rows[:, :3]
+        along = np.clip(np.einsum("ij,ij->i", point - first, way) / (way**2).sum(axis=1), 0, 1)
+        gaps = np.linalg.norm(first + along[:, None] * way - point, axis=1) - rows[:, 6]
+        return float(gaps.min())
+
+    tcp = tool.T_flange_tcp[:3, 3]
+    assert nearest(tool.body.com) < 0
+    assert nearest(tcp) < BETWEEN_FINGERS
+    assert tcp[2] > tool.body.com[2] > 0
+
+
+@pytest.mark.parametrize("name", tool_names())
+@pytest.mark.parametrize("robot", robot_names())
+def test_a_tool_leaves_the_arm_room_to_move(name: str, robot: str) -> None:
+    arm = Arm(robot=load_robot(robot), tool=load_tool(name).shape)
+    limits = arm.robot.limits
+    q = np.random.default_rng(1).uniform(
+        np.maximum(limits.q_min, -3.0),
+        np.minimum(limits.q_max, 3.0),
+        (CONFIGURATIONS, arm.robot.nq),
+    )
+
+    def free(model: CollisionModel) -> int:
+        return sum(model.least_distance(each[None], 1.0) > 0 for each in q)
+
+    # a tool that touched the link before the last would leave none
+    assert free(CollisionModel(arm)) > free(CollisionModel(Arm(robot=arm.robot))) / 2
+
+
+def test_tool_and_part_are_one_body() -> None:
+    tool = load_tool("onrobot_rg2")
+    part = Payload(1.5, np.array([0.02, -0.01, 0.25]), np.diag([0.004, 0.003, 0.002]))
+    whole = tool.carrying(part)
+    assert whole.mass == pytest.approx(tool.body.mass + part.mass, rel=ROUNDING)
+
+    # the second moments of mass about the flange add up
+    def moment(body: Payload) -> np.ndarray:
+        c = body.com
+        return body.inertia + body.mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+    np.testing.assert_allclose(moment(whole), moment(tool.body) + moment(part), rtol=ROUNDING)
+    np.testing.assert_allclose(
+        whole.mass * whole.com, tool.body.mass * tool.body.com + part.mass * part.com, rtol=ROUNDING
+    )
+    assert tool.carrying().mass == tool.carrying(Payload()).mass == tool.body.mass
+
+
+def test_an_unknown_tool_is_told_with_the_known_ones() -> None:
+    with pytest.raises(UnknownTool) as caught:
+        load_tool("hook")
+    assert caught.value.known == list(tool_names())
+
+
+def test_the_table_of_the_page_is_that_of_the_figures() -> None:
+    page = Path("docs/robots.md").read_text(encoding="utf-8")
+    for name in tool_names():
+        figures = tool_figures(name)
+        mass, tcp = figures["mass"], figures["tcp"]
+        letters = mass["trust"], tcp["trust"], figures["capsules"]["trust"]
+        assert figures["center_of_mass"]["trust"] == mass["trust"]
+        row = f"| `{name}` | {mass['value']:.3g} | {tcp['value'][2]:.3g} | {' | '.join(letters)} |"
+        assert row in page

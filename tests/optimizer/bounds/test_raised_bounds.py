@@ -1,0 +1,136 @@
+"""Bounds raised by the copper loss of holding: where it pays, never above an energy, and only as
+far as it matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.bounds.raised_bounds import RAISING, raised_bounds
+from joulepath.optimizer.deadline import NEVER, Deadline
+from joulepath.optimizer.kinematics.tcp import tcp_pose as tcp_pose_of
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.branches import BranchFilter
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search import candidates as search
+from joulepath.optimizer.search.ends import ends
+from tests.optimizer.moves import GOAL, START, problem, tcp_pose
+from tests.selection import long_but
+
+# the arm stretched out sideways at both ends: it holds its weight all the way
+OUT = np.array([0.0, -0.3, 0.4, -1.5, -1.57, 0.0])
+TURNED = OUT + np.array([1.2, 0.1, -0.1, 0.0, 0.0, 0.5])
+# of a heavy arm's gap that is to be gone at least
+SHARE = 0.3
+# rounding
+AGAIN = 1e-9
+# more than any motion here needs [J]
+ENOUGH = 500.0
+# by how much a joint has less than half a turn to go [rad]
+HALF_TURN_LESS = 0.01
+BRANCH = BranchFilter("left", "up", "no_flip")
+
+
+def bounded(asked: Problem) -> tuple[PreparedProblem, list[search.Candidate]]:
+    """The problem's candidates with their plain bounds."""
+    made = PreparedProblem.of(asked)
+    found = search.pairs(made, ends(made, "start")[0], ends(made, "goal")[0])
+    search.bound(made, found)
+    return made, found
+
+
+def raise_all(
+    made: PreparedProblem, found: list[search.Candidate], energy: float, deadline: Deadline
+) -> None:
+    """Raise the bounds of candidates as a search does."""
+    for candidate, value in zip(found, raised_bounds(made, found, energy, deadline), strict=True):
+        candidate.lower_bound = value
+
+
+def test_a_heavy_arm_that_holds_its_weight_gains_much() -> None:
+    asked = problem(OUT, TURNED, robot=load_robot("ur20"))
+    _, (plain,) = bounded(asked)
+    found = optimize(asked)
+    energy = found.energy.electrical.total
+    assert plain.lower_bound < found.lower_bound <= energy
+    assert energy - found.lower_bound < (1 - SHARE) * (energy - plain.lower_bound)
+    # nor does a motion of another duration spend less
+    for factor in (1.0, 1.2, 1.6):
+        duration = factor * found.duration
+        slower = optimize(replace(asked, duration_min=duration, duration_max=duration))
+        assert found.lower_bound <= slower.energy.electrical.total
+
+
+def test_the_lowest_are_raised_until_the_least_is() -> None:
+    """No bound falls or goes beyond the target, and the least one is that of a pair that was
+    raised.
+    """
+    made, found = bounded(problem(OUT, tcp_pose(TURNED)))
+    energy = optimize(made.problem).energy.electrical.total
+    before = {each: each.lower_bound for each in found}
+    raise_all(made, found, energy, NEVER)
+    raised = [each for each in found if each.lower_bound != before[each]]
+    assert all(
+        before[each] < each.lower_bound <= (1 - RAISING.least_gap) * energy for each in raised
+    )
+    assert min(found, key=lambda each: each.lower_bound) in raised
+    assert len(raised) < len(found)
+    # a second time, nothing is left to be raised
+    least = min(each.lower_bound for each in found)
+    raise_all(made, found, energy, NEVER)
+    assert min(each.lower_bound for each in found) == pytest.approx(least, rel=AGAIN)
+
+
+@pytest.mark.parametrize("bound", long_but(["normal"], ["normal", "tight"]))
+def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
+    """Without full turns, a joint that has half a turn to go has about as far the other way
+    around."""
+    arm = problem(robot=load_robot("ur20")).arm
+    goal = TURNED + (np.pi - HALF_TURN_LESS - TURNED[5]) * np.eye(6)[5]
+    asked = problem(
+        OUT,
+        Pose(tcp_pose_of(arm, goal)),
+        robot=arm.robot,
+        windings=False,
+        bound=bound,
+        branch=BRANCH,
+    )
+    other = problem(OUT, goal - 2 * np.pi * np.eye(6)[5], robot=arm.robot)
+    _, (around,) = bounded(other)
+    assert optimize(asked).lower_bound <= around.lower_bound
+
+
+def test_nothing_changes_where_it_does_not_apply() -> None:
+    for given, deadline, energy in (
+        ({"objective": "mechanical", "duration_max": 3.0}, NEVER, ENOUGH),
+        ({}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
+        ({"bound": "tight"}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
+        ({}, NEVER, -1.0),
+    ):
+        made, found = bounded(problem(START, tcp_pose(GOAL), **given))
+        before = [each.lower_bound for each in found]
+        raise_all(made, found, energy, deadline)
+        assert [each.lower_bound for each in found] == before
+
+
+def test_no_bound_is_begun_that_would_end_late() -> None:
+    """With many joints it takes several times as long."""
+    made, found = bounded(problem(OUT, TURNED, robot=load_robot("ur20")))
+    plain, left = found[0].lower_bound, 2 * RAISING.quick.effort.time
+    raise_all(made, found, ENOUGH, Deadline.after(RAISING.quick.effort.time / 2))
+    assert found[0].lower_bound == plain
+    raise_all(made, found, ENOUGH, Deadline.after(left, lambda: 0.0))
+    assert found[0].lower_bound > plain
+    assert (
+        RAISING.quick.effort.time_for(6)
+        == RAISING.quick.effort.time
+        < left
+        < RAISING.quick.effort.time_for(7)
+        < RAISING.quick.effort.time_for(8)
+    )
