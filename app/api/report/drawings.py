@@ -152,8 +152,9 @@ def _power(course: Course, top: float) -> Iterator[str]:
 
 def _grid(levels: Sequence[tuple[float, float]]) -> Iterator[str]:
     """Horizontal lines with their powers [W]."""
+    end = DRAWING.width - DRAWING.right
     for level, y in levels:
-        yield f'<path d="M{DRAWING.left} {y:.1f}H{DRAWING.width - DRAWING.right}" stroke="{DRAWING.line}"/>'
+        yield f'<path d="M{DRAWING.left} {y:.1f}H{end}" stroke="{DRAWING.line}"/>'
         unit = " W" if level and level == levels[-1][0] else ""
         yield _text(DRAWING.left - 7, y + 4.3, f"{level:g}{unit}", DRAWING.grey, "end")
 
