@@ -1,4 +1,4 @@
-"""Energy drawn while the arm holding_times at the goal until its dwell ends.
+"""Energy drawn while the arm waits at the goal until its dwell ends.
 
 After Meike, Ribickis 2011; Meike, Pellicciari, Berselli 2014. The motors hold the gravity torque of
 the goal configuration; static friction would carry part of it and is ignored. With the duration T

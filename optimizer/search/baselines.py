@@ -14,7 +14,7 @@ one. The acceleration of a trapezoid jumps: its jerk is unbounded, so it is neve
 limit.
 
 A saving is claimed only against a motion within every limit, in the same cycle time: without a
-dwell, the shorter of both motions holding_times at its goal until the longer one ends.
+dwell, the shorter of both motions waits at its goal until the longer one ends.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
@@ -255,3 +256,46 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
         page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()
         until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.trouble)")
         expect(page.locator("[data-row='/goal']")).to_contain_text("out of reach")
+
+
+def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:
+    """It brings its TCP, its shape and its mass, with the letters of their sources."""
+    fill_json(page, {"start": FIRST["start"], "goal": FIRST["goal"], "payload": FIRST["payload"]})
+    show_json(page, False)
+    page.locator("#tool-fold > summary").click()
+    page.locator("#tool").select_option(label="Robotiq 2F-85")
+    assert state(page, "request.tool") == "robotiq_2f_85"
+    expect(page.locator("#tool-figures")).to_contain_text("0.900 kg C")
+    expect(page.locator("[data-pointer='/tcp/position/2']")).to_have_value("142.0")
+    optimised(page)
+    flange = np.array(page.evaluate("() => studio.view.arms[0].frames.at(-1)")).reshape(4, 4)
+    tcp = np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
+    assert np.linalg.norm(tcp[:3, 3] - flange[:3, 3]) == pytest.approx(0.142)
+    meshes = "() => studio.view.arms[0].links.at(-1).children.length"
+    assert page.evaluate(meshes) == 2, "the tool and the part"
+    type_into(page, "/tcp/position/2", "150")
+    assert state(page, "request.tcp.position") == [0, 0, 0.15]
+    page.locator("#undo").click()
+    page.locator("#tool").select_option("")
+    assert state(page, "request.tool") is None
+
+
+def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:
+    """With the costs as they were set, as a page and as PDF."""
+    fill_json(page, FIRST)
+    show_json(page, False)
+    optimised(page)
+    page.locator("#costs").get_by_role("button", name="Assumptions").click()
+    page.get_by_label("Electricity in € per kWh").fill("0.31")
+    page.get_by_label("Electricity in € per kWh").blur()
+    expect(page.locator("#costs")).to_contain_text("0.31 € a kWh (yours)")
+    joules = page.locator("#joules").inner_text().split()[0]
+    found = {}
+    for kind, button in (("html", "Page (HTML)"), ("pdf", "PDF, to print")):
+        page.locator("#report > summary").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name=button).click()
+        found[kind] = Path(download.value.path()).read_bytes()
+    assert found["pdf"].startswith(b"%PDF")
+    text = found["html"].decode()
+    assert joules in text and "0.31" in text

@@ -7,6 +7,7 @@ import { answered, stale, type Answered } from "../store/state";
 import type { IkSolution, Solution } from "../store/types";
 
 const MOST = 8;
+const LETTERS = "ABCDEFGH";
 const PATIENCE = 4; // deadline of one motion [s]
 const MOST_TURNS = 64; // of a posture, that are compared
 
@@ -51,7 +52,7 @@ async function compute(shown: Answered, signal: AbortSignal): Promise<void> {
   const { start, goal } = shown.solution.branch;
   let all = distinct(solutions, start.q, goal.q).map(([{ label, q, collides, nearest }, own], k): Posture => ({
     turns: solutions.filter((each) => !apart(each.q, q)).map((each) => each.q).slice(0, MOST_TURNS),
-    letter: "ABCDEFGH"[k]!,
+    letter: LETTERS[k]!,
     label: own ? goal.label : label,
     q: own ? goal.q : q,
     state: own ? "shown" : collides ? "collides" : "computing",
@@ -67,6 +68,13 @@ async function compute(shown: Answered, signal: AbortSignal): Promise<void> {
     all = all.map((each) => (each.letter === posture.letter ? next : each));
     postures.value = all;
   }
+  postures.value = ordered(all);
+}
+
+/** That of the answer first, then by energy; those without a motion last. */
+function ordered([own, ...others]: Posture[]): Posture[] {
+  const rest = others.sort((a, b) => (a.energy ?? Infinity) - (b.energy ?? Infinity));
+  return [own!, ...rest].map((each, k) => ({ ...each, letter: LETTERS[k]! }));
 }
 
 /** One solution of each posture, the one nearest to the start; that of the answer first, those that collide last. */

@@ -1,10 +1,12 @@
 import { Button } from "../ui/Button";
+import { Menu } from "../ui/Menu";
 import { alone } from "../store/alone";
 import { link, presentCell } from "../store/share";
 import { answered, canRedo, canUndo, page, redo, saved, stale, toast, trouble, undo, type Page } from "../store/state";
 import { trying } from "../store/trouble";
 import { dialog } from "./dialog";
 import { ProjectMenu } from "./ProjectMenu";
+import { report } from "./report";
 
 const PAGES: { value: Page; text: string }[] = [
   { value: "cell", text: "Cell" },
@@ -69,6 +71,12 @@ export function TopBar() {
       {page.value === "cell" && (
         <>
           {!alone && <Button kind="quiet" icon="share" id="share" onClick={trying(share)}>Share</Button>}
+          {!alone && ready && (
+            <Menu label="Report" icon="file" id="report">
+              <Button kind="quiet" onClick={trying(() => report("pdf"))}>PDF, to print and send</Button>
+              <Button kind="quiet" onClick={trying(() => report("html"))}>Page (HTML), with request and answer</Button>
+            </Menu>
+          )}
           <Button kind={ready ? "primary" : undefined} icon="download" id="export" disabled={!ready} title={ready ? "Ctrl E" : "Optimise first"} onClick={() => (dialog.value = "export")}>
             Export…
           </Button>

@@ -10,6 +10,7 @@ import { followReach } from "../store/reach";
 import { knowMeshes, knowRobot } from "../store/service";
 import { fromBase64, shared } from "../store/share";
 import { answered, replaceCell } from "../store/state";
+import { followTool } from "../store/tools";
 import { tell } from "../store/trouble";
 
 /** Follows what changes, and shows the first cell. */
@@ -17,6 +18,7 @@ export async function start(): Promise<void> {
   if (alone) return showEmbedded();
   followRobot();
   followReach();
+  followTool();
   followChanges();
   followPostures();
   followWaits();

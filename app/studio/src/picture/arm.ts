@@ -90,7 +90,7 @@ export class Arm {
     this.drawn = drawn.slice(first).map((geometry, k) => put(k + first, geometry, own));
     this.seen = ghost ? [] : seen.map((geometry, link) => put(link, geometry, armMaterial(0x66aadd, 0.45, false)));
     for (const mesh of this.seen) mesh.castShadow = false;
-    const tool = (request.tool?.capsules ?? []).map(({ start, end, radius }) => capsule(start, end, radius, 16));
+    const tool = (typeof request.tool === "object" ? (request.tool.capsules ?? []) : []).map(({ start, end, radius }) => capsule(start, end, radius, 16));
     if (tool.length) put(drawn.length, merged(tool), of("tool"));
     this.loads = loads.map((payload) => {
       const part = payload?.mass ? placedShape(loadShape(payload), of("payload")) : new THREE.Group();

@@ -7,6 +7,7 @@ import { at, put } from "../store/pointer";
 import { solutionsOf } from "../store/reach";
 import { freshName, isObject, listOf, poseAt, rowsOf, targetAt, targetOf } from "../store/request";
 import { edit, request, selected, typed } from "../store/state";
+import { dressed, toolNow } from "../store/tools";
 import type { ApiRequest, Obstacle, Pose } from "../store/types";
 import { configurationOf, pictured, robotNow } from "./pictured";
 import { reachedGhost } from "./reachedGhost";
@@ -77,7 +78,7 @@ export class Drag {
       const target = targetAt(request.value, row);
       if (target.kind === "pose") return multiply(frameOf(robot, target.pose.frame), ofPose(target.pose));
       const q = configurationOf(row, null) ?? pictured.value?.start;
-      return q && this.view.content.chain ? this.view.content.chain.tcp(q, request.value.tcp) : null;
+      return q && this.view.content.chain ? this.view.content.chain.tcp(q, dressed(request.value, toolNow.value).tcp) : null;
     } catch {
       return null;
     }

@@ -4,7 +4,11 @@ import * as THREE from "three";
 interface Label {
   node: HTMLElement;
   at: THREE.Vector3;
+  /** How far below its point it stands [px]. */
+  below: number;
 }
+
+const BELOW: Record<string, number> = { near: -22, stop: 20, end: -38, hover: -20 };
 
 export class Labels {
   private readonly all = new Map<string, Label>();
@@ -21,7 +25,7 @@ export class Labels {
       const node = document.createElement("span");
       node.className = `label ${kind}`;
       this.layer.append(node);
-      label = { node, at: new THREE.Vector3() };
+      label = { node, at: new THREE.Vector3(), below: BELOW[kind.split(" ")[0]!] ?? 0 };
       this.all.set(name, label);
     }
     label.at.fromArray(at);
@@ -42,14 +46,14 @@ export class Labels {
   /** Puts every label where its point is seen; of those that would cover each other, later ones move down. */
   place({ width, height }: { width: number; height: number }): void {
     const taken: { left: number; right: number; top: number; bottom: number }[] = [];
-    for (const { node, at } of this.all.values()) {
+    for (const { node, at, below } of this.all.values()) {
       const point = at.clone().project(this.camera);
       node.hidden = Math.max(Math.abs(point.x), Math.abs(point.y), point.z) > 1;
       if (node.hidden) continue;
       // the words stay inside, where their point is
       const [half, tall] = [node.offsetWidth / 2, node.offsetHeight];
       const x = Math.max(half, Math.min(width - half, ((point.x + 1) * width) / 2));
-      let y = ((1 - point.y) * height) / 2;
+      let y = ((1 - point.y) * height) / 2 + below;
       const meets = () => taken.find((box) => x - half < box.right && x + half > box.left && y - tall / 2 < box.bottom && y + tall / 2 > box.top);
       for (let box = meets(), tries = 0; box && tries < 12; box = meets(), tries++) y = box.bottom + tall / 2 + 1;
       taken.push({ left: x - half, right: x + half, top: y - tall / 2, bottom: y + tall / 2 });

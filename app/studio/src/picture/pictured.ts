@@ -5,6 +5,7 @@ import { reached } from "../store/reach";
 import { robotName, rowsOf, targetAt, type Row } from "../store/request";
 import { robotOf } from "../store/service";
 import { answered, racers, request, stale, type Answered } from "../store/state";
+import { dressed, toolNow } from "../store/tools";
 import type { ApiRequest, Robot, Solution } from "../store/types";
 
 /** The robot of the request, when its figures have come. */
@@ -51,7 +52,7 @@ export const pictured = computed<Pictured | null>(() => {
   const old = shown?.robot.name === robot.name ? shown.solution.branch : null;
   const start = fits(configurationOf(rows[0], old?.start.q ?? null)) ?? fits(old?.start.q) ?? robot.joints.map(() => 0);
   const goal = fits(configurationOf(rows.at(-1), old?.goal.q ?? start));
-  return { robot, cell: stillCell(request.value, robot), motion: null, arms: [], start, goal: rows.length > 1 ? goal : null };
+  return { robot, cell: stillCell(dressed(request.value, toolNow.value), robot), motion: null, arms: [], start, goal: rows.length > 1 ? goal : null };
 });
 
 /** The cell of a request that is being edited; what is wrong with it, the service says. */

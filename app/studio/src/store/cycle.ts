@@ -3,6 +3,7 @@ import { obstaclesOf } from "./chain";
 import { get } from "./client";
 import { robotOf } from "./service";
 import type { Answered, CycleShown } from "./state";
+import { dressedLater } from "./tools";
 import type { ApiRequest, Configuration, Cycle, Leg, Solution, Trajectory } from "./types";
 
 const REST = 0.1; // time between the samples of a rest [s]
@@ -28,7 +29,7 @@ export async function cycleAnswered(cycle: Cycle, asked: ApiRequest | null, took
     certificate: { ...first.certificate, ...cycle.certificate, clearance },
     branch: { start: cycle.legs[0]!.start, goal: cycle.legs.at(-1)!.goal },
   };
-  const whole: ApiRequest = { ...first.arm, ...asked, robot: cycle.robot };
+  const whole = await dressedLater({ ...first.arm, ...asked, robot: cycle.robot });
   const shown: CycleShown = { ...cycle, loads: loadsOf(cycle.legs, moves, whole) };
   const cell = { ...whole, scene: { obstacles: obstaclesOf(whole, robot) } };
   return { asked, cell, solution, robot, cycle: shown, took };

@@ -4,6 +4,7 @@ import { obstaclesOf } from "./chain";
 import { Problem, stream } from "./client";
 import { cycleAnswered } from "./cycle";
 import { robotOf } from "./service";
+import { dressedLater } from "./tools";
 import { endpointOf } from "./request";
 import { answered, ghosts, racers, request, run, tab, time, toast, trouble, type Answered, type Run } from "./state";
 import type { ApiRequest, Cycle, Solution } from "./types";
@@ -37,7 +38,7 @@ export async function showAnswer(answer: unknown, asked: ApiRequest | null, took
 /** Without its request, the cell is what the answer says of its arm. */
 async function moveAnswered(solution: Solution, asked: ApiRequest | null, took: number | null): Promise<Answered> {
   const robot = await robotOf(solution.robot);
-  const whole: ApiRequest = { ...solution.arm, ...asked, robot: solution.robot };
+  const whole = await dressedLater({ ...solution.arm, ...asked, robot: solution.robot });
   const cell = { ...whole, scene: { obstacles: obstaclesOf(whole, robot) } };
   return { asked, cell, solution, robot, cycle: null, took };
 }

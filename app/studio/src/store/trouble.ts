@@ -11,6 +11,7 @@ const FIELDS: Record<string, Pointer> = {
   "goal-in-collision": "/goal",
   "unknown-robot": "/robot",
   "unknown-figures": "/figures",
+  "unknown-tool": "/tool",
   "torque-infeasible": "/payload/mass",
   "payload-too-heavy": "/payload/mass",
   "duration-too-short": "/duration",

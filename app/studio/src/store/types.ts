@@ -51,7 +51,7 @@ export interface ApiRequest {
   stops?: Stop[];
   path?: Record<string, unknown> | null;
   tcp?: Pose;
-  tool?: Tool;
+  tool?: Tool | string;
   payload?: Payload | null;
   scene?: { obstacles?: Obstacle[]; frame?: string };
   figures?: string | null;

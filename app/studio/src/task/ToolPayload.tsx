@@ -8,14 +8,18 @@ import { isObject, listOf, sixOf, withNumber } from "../store/request";
 import { edit, request } from "../store/state";
 import type { Payload, Pose, Shape, Tool } from "../store/types";
 import { figure } from "../store/units";
+import { dressed, toolNow } from "../store/tools";
 import { PoseCells } from "./PoseCells";
+import { ToolPicker } from "./ToolPicker";
 
 const NO_TURN: Pose = { position: [0, 0, 0], rotvec: [0, 0, 0] };
 
 /** What is on the flange: the tool with its TCP, and what the arm carries. */
 export function ToolPayload() {
   const asked = request.value;
-  const tcp = isObject(asked.tcp) ? (asked.tcp as Pose) : NO_TURN;
+  const named = typeof asked.tool === "string";
+  const own = dressed(asked, toolNow.value).tcp;
+  const tcp = isObject(own) ? (own as Pose) : NO_TURN;
   const [x = 0, y = 0, z = 0] = listOf<number>(tcp.position);
   const mass = at(asked, "/payload/mass");
   const count = listOf(at(asked, "/tool/capsules")).length;
@@ -24,11 +28,12 @@ export function ToolPayload() {
     <section class="section" aria-label="Tool and payload">
       <details class="fold" id="tool-fold">
         <summary>
-          <span class="fold-name">Tool</span> <b>TCP {figure(Math.hypot(x, y, z) * 1000)} mm</b>
-          <small>{count ? `${count} capsules` : "no shape"}</small>
+          <span class="fold-name">Tool</span> <b>{named ? (toolNow.value?.title ?? asked.tool as string) : `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm`}</b>
+          <small>{named ? `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm` : count ? `${count} capsules` : "no shape"}</small>
         </summary>
+        <ToolPicker />
         <TcpCells tcp={tcp} />
-        <Capsules />
+        {!named && <Capsules />}
       </details>
       <div class="field payload">
         <span class="fold-name">Payload</span>
@@ -72,7 +77,7 @@ function TcpCells({ tcp }: { tcp: Pose }) {
 
 function Capsules() {
   const capsules = listOf<NonNullable<Tool["capsules"]>[number]>(at(request.value, "/tool/capsules"));
-  const set = (next: unknown[]) => edit(put(request.value, "/tool", { ...request.value.tool, capsules: next }), untyped("/tool"));
+  const set = (next: unknown[]) => edit(put(request.value, "/tool", { ...(isObject(request.value.tool) ? request.value.tool : {}), capsules: next }), untyped("/tool"));
   const add = () => set([...capsules, { start: [0, 0, 0.02], end: [0, 0, 0.12], radius: 0.03 }]);
   return (
     <>

@@ -5,6 +5,7 @@ import { withStop } from "../store/edits";
 import { put } from "../store/pointer";
 import { rowsOf, type Row } from "../store/request";
 import { edit, request, selected, time } from "../store/state";
+import { dressed, toolNow } from "../store/tools";
 import type { Pose } from "../store/types";
 
 /** Joint positions of the arm in the picture. */
@@ -21,7 +22,7 @@ const rounded = (value: number) => Math.round(value * 1e6) / 1e6;
 export function poseAtJoints(q: number[]): Pose | null {
   const now = pictured.value;
   if (!now) return null;
-  const pose = poseOfMatrix(new Chain(now.robot).tcp(q, request.value.tcp));
+  const pose = poseOfMatrix(new Chain(now.robot).tcp(q, dressed(request.value, toolNow.value).tcp));
   return { position: pose.position.map(rounded), rotvec: pose.rotvec!.map(rounded) };
 }
 
