@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from joulepath.optimizer.declared import Internal, Joules, Ratio, Seconds
-from joulepath.optimizer.dynamics.interval import Known, with_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.result.cycle import (
     CycleCertificate,
@@ -41,7 +41,7 @@ from joulepath.optimizer.result.solution import Solution
 class CycleMove:
     """A move of the cycle with the rests after it.
 
-    Args:
+    Attributes:
         planned: the move as planned.
         solution: its motion.
         t0: start of the move in the cycle [s].
@@ -128,7 +128,7 @@ class CycleEnergies:
     moves.
     """
 
-    electrical: Known
+    electrical: MotionEnergy
     mechanical: float
 
     def of(self, objective: Objective) -> float:
@@ -298,7 +298,7 @@ class CycleSolution:
 def energies_of(moves: Sequence[CycleMove]) -> CycleEnergies:
     """Energies of moves and their rests."""
     sensitivity = reduce(add, [move.sensitivity for move in moves])
-    known = Known(
+    known = MotionEnergy(
         sum(move.energy for move in moves),
         sensitivity,
         sum(move.solution.duration for move in moves),

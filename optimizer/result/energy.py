@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
 
-# what is minimised: energy drawn from the supply, or mechanical work
+# minimised quantity: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
 
 JointJoules = Annotated[PerJoint, Unit("J")]
@@ -32,7 +32,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class EnergyInterval:
-    """How well the energy is known, from the errors that the figures of the arm may have."""
+    """Uncertainty of the energy from the errors of the arm's figures."""
 
     p5: Joules
     """The energy is above this with 95 % probability."""
