@@ -1,4 +1,4 @@
-"""What the figures of a report rest on, each with its trust letter."""
+"""Assumptions behind the figures of a report, with their trust letters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from joulepath.models.tools.registry import tool_figures
 from joulepath.models.trust import figures_by_letter, worst_letter
 from joulepath.optimizer.export.program import Program
 
-YOURS, NOT_COUNTED = "Y", "–"
+YOURS = "Y"
+NOT_COUNTED = "–"
 _LETTERS = {
     "A": "the maker's files",
     "B": "fitted to measured data",
@@ -40,7 +41,7 @@ _LARGE = 0.9
 
 
 def assumptions(bundle: Bundle, program: Program) -> tuple[Assumption, ...]:
-    """The robot's figures by letter, then the tool's, then what was given, then what is missing."""
+    """Figures of the robot by letter, of the tool, given numbers, and missing numbers."""
     return (*_of_robot(bundle, program), *_of_request(bundle, program), *_of_costs(bundle))
 
 
@@ -83,7 +84,7 @@ def _sentence(names: list[str]) -> str:
 
 
 def interval_note(interval: dict[str, Any] | None) -> str:
-    """What the width of the interval comes from: the fewest sources that make nearly all of it."""
+    """Main sources of the interval: the fewest sources with nearly all of its width."""
     if interval is None:
         return ""
     made, names = 0.0, list[str]()

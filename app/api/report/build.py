@@ -41,7 +41,7 @@ _RIVALS = {
     "without_storage": "Without the storage",
 }
 _LEAST_PART = 0.003
-"""Least share of the energy with which a part has a line of its own."""
+"""Least share of the energy of a part with a line of its own."""
 _FULLY = 0.99
 _LIMITS = {
     "velocity": "speed",
@@ -54,7 +54,7 @@ _LIMITS = {
 
 
 def report_of(bundle: Bundle, program: Program) -> Report:
-    """The report of documents whose motions are those of `program`."""
+    """The report of documents with the motions of `program`."""
     answer, made = bundle.answer, date.fromisoformat(bundle.made)
     money, robot = Money.of(bundle), program.robot
     course = _course(bundle, program)
@@ -97,7 +97,7 @@ def _caption(program: Program) -> str:
 
 
 def what(bundle: Bundle) -> str:
-    """The thing that the report is on, in a word."""
+    """The subject of the report in one word."""
     return "cycle" if bundle.kind == "cycle" else "motion"
 
 
@@ -141,13 +141,13 @@ def _words(rival: dict[str, Any]) -> str:
 
 
 def _nearest_rival(answer: dict[str, Any]) -> dict[str, Any] | None:
-    """The rival within the limits against which least is saved."""
+    """The rival within the limits with the least saving."""
     claimed = [each for each in answer["baselines"] if each["saving"] is not None]
     return min(claimed, key=lambda each: float(each["saving"]), default=None)
 
 
 def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
-    """The answer, then what it is compared with, those within the limits first."""
+    """The answer, then its rivals, those within the limits first."""
     answer = bundle.answer
     objective = answer["objective"]
     total = answer["energy"][objective]["total"]

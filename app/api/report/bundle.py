@@ -1,4 +1,4 @@
-"""What a report is made of and has attached: request, answer and costs, as JSON."""
+"""The attached documents of a report: request, answer and costs as JSON."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ from joulepath.app.api.report.request import Kind
 NAME = "joulepath-report.json"
 """Name of the attachment."""
 MARK = "joulepath_report"
-"""A field of the document, by which it is known among others."""
+"""Field identifying the document."""
 MOST_BYTES = 1 << 28
-"""Largest document [byte] that is unpacked."""
+"""Largest unpacked document [byte]."""
 _SCRIPT = re.compile(rb'<script type="application/json" id="%s">([^<]*)</script>' % MARK.encode())
 _STREAM = re.compile(rb"stream\r?\n")
 
 
 @dataclass(frozen=True)
 class Bundle:
-    """The documents of a report: `answer` is that of the `request` to the endpoint `kind`, and
-    `moves` are the answers of a cycle's moves, in their order."""
+    """The documents of a report.
+
+    `answer` is the answer to the `request` to the endpoint `kind`; `moves` are the answers of the
+    moves of a cycle, in order.
+    """
 
     kind: Kind
     request: dict[str, Any]
@@ -35,9 +38,9 @@ class Bundle:
     title: str | None
     costs: dict[str, Any]
     made: str
-    """Day on which the report was made, as YYYY-MM-DD."""
+    """Date of the report, as YYYY-MM-DD."""
     version: str
-    """Version of the service that made it."""
+    """Version of the service."""
 
     def packed(self) -> bytes:
         """The document."""
@@ -54,7 +57,7 @@ class NoReport(Exception):
 
 
 def in_html(packed: bytes) -> str:
-    """The element that holds a document in a page. Base64 needs no escaping."""
+    """The element of a page with a document. Base64 needs no escaping."""
     text = base64.b64encode(zlib.compress(packed, 9)).decode()
     return f'<script type="application/json" id="{MARK}">{text}</script>'
 
@@ -75,11 +78,11 @@ def attached_to(file: bytes) -> Bundle:
 
 
 def _candidates(file: bytes) -> Iterator[bytes]:
-    """What may be the document."""
+    """Possible documents in a file."""
     if not file.startswith(b"%PDF"):
         yield from (_unpacked(base64.b64decode(each)) for each in _SCRIPT.findall(file))
         return
-    # an embedded file is a stream whose dictionary stands directly before it
+    # An embedded file is a stream directly after its dictionary.
     for begin in _STREAM.finditer(file):
         head = file[max(begin.start() - 400, 0) : begin.start()].rpartition(b" obj")[2]
         if b"/EmbeddedFile" in head:

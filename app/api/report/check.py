@@ -1,6 +1,4 @@
-"""What `joulepath check` finds out about a report: whether its documents agree with themselves and
-with an answer that is computed anew.
-"""
+"""The checks of `joulepath check`: consistency of a report, and agreement with a new answer."""
 
 from __future__ import annotations
 
@@ -19,13 +17,13 @@ from joulepath.optimizer.export.certified import certified
 ENERGY_TOLERANCE = 1e-3
 """Relative difference of an energy and the same one computed from its motion."""
 ANSWER_TOLERANCE = 5e-3
-"""Relative difference of an energy and that of the request answered anew, on another machine."""
+"""Relative difference of the energies of two answers on different machines."""
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Line:
-    """One thing that was checked."""
+    """One check."""
 
     what: str
     found: str
@@ -34,7 +32,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Checked:
-    """What was found out; `agrees` if all of it does."""
+    """All checks; `agrees` if all of them passed."""
 
     lines: tuple[Line, ...]
 
@@ -45,9 +43,9 @@ class Checked:
 
 
 def checked(file: bytes, again: bool, request_id: str) -> Checked:
-    """The checks of a report, HTML or PDF; with `again`, the request is answered anew.
+    """The checks of a report in HTML or PDF; with `again`, the request is answered anew.
 
-    Raises NoReport, NotCertified and what answering raises.
+    Raises NoReport, NotCertified, and the errors of answering.
     """
     bundle = attached_to(file)
     lines = [*_motions(bundle), _sum(bundle)]
@@ -74,7 +72,7 @@ def _motions(bundle: Bundle) -> list[Line]:
 
 
 def _sum(bundle: Bundle) -> Line:
-    """The total of a cycle is that of its legs, and theirs that of their answers."""
+    """Totals of the cycle, its legs and their answers agree."""
     total = bundle.answer["energy"]["electrical"]["total"]
     if bundle.kind == "optimize":
         parts = bundle.answer["energy"]["electrical"]

@@ -1,4 +1,4 @@
-"""What a motion or a cycle costs per shift and year. What is not given is not counted."""
+"""Costs of a motion or cycle per shift and year, from given numbers only."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from joulepath.app.api.report.numbers import JOULES_PER_KWH, digits, down, up
 from joulepath.app.api.report.report import Cost, Fact
 
 SHIFT = 8 * 3600.0
-"""Length [s] of a shift that is filled with cycles, if their number is not given."""
+"""Length of a shift filled with cycles [s], without a given number."""
 
 
 @dataclass(frozen=True)
 class Money:
-    """The numbers by which joules become costs; None where they are not given."""
+    """Given numbers for the conversion of joules into costs, or None."""
 
     energy: float
     """Of a cycle [J], the control box included if it is counted."""
@@ -60,7 +60,7 @@ def cycle_time(bundle: Bundle) -> float:
 
 
 def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
-    """The figures that are read first: of one cycle, a shift, a year, and money."""
+    """The leading figures: one cycle, a shift, a year, money."""
     word = "cycle" if bundle.kind == "cycle" else "motion"
     known = bundle.answer["energy"]["electrical"].get("interval")
     likely = "" if known is None else f", likely {down(known['p5'])} to {up(known['p95'])}"
@@ -114,7 +114,7 @@ def cost_table(bundle: Bundle, money: Money) -> tuple[Cost, ...]:
 
 
 def costs_note(money: Money) -> str:
-    """What is not in the table, and why."""
+    """Omitted costs, with the reasons."""
     missing = [
         words
         for words, value in (

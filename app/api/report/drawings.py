@@ -8,10 +8,38 @@ from xml.sax.saxutils import escape
 
 from joulepath.app.api.report.numbers import digits
 
-_WIDTH, _LEFT, _RIGHT = 1000.0, 52.0, 6.0
-_LEGS, _POWER, _FOOT = 118.0, 92.0, 24.0
-_INK, _GREY, _LINE = "#17202b", "#616d79", "#e2e7ec"
-_LOADED, _EMPTY, _REST = "#14805f", "#e6f2ee", "#c3cbd3"
+
+@dataclass(frozen=True)
+class DrawingSettings:
+    """Sizes [px] and colours of the drawings."""
+
+    width: float = 1000.0
+    """Width of a drawing."""
+    left: float = 52.0
+    """Left margin, with labels."""
+    right: float = 6.0
+    """Right margin."""
+    legs: float = 118.0
+    """Height of the legs."""
+    power: float = 92.0
+    """Height of the power curve."""
+    foot: float = 24.0
+    """Lower margin, with times."""
+    ink: str = "#17202b"
+    """Colour of text."""
+    grey: str = "#616d79"
+    """Colour of labels."""
+    line: str = "#e2e7ec"
+    """Colour of grid lines."""
+    loaded: str = "#14805f"
+    """Colour of moves with a payload."""
+    empty: str = "#e6f2ee"
+    """Colour of moves without a payload."""
+    rest: str = "#c3cbd3"
+    """Colour of rests."""
+
+
+DRAWING = DrawingSettings()
 _MOST_POINTS = 600
 _TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
@@ -49,29 +77,29 @@ class Course:
 
 def drawn(course: Course) -> str:
     """The course, with a row of legs above the power if there is more than one."""
-    top = _LEGS if len(course.legs) > 1 else 8.0
-    height = top + _POWER + _FOOT
+    top = DRAWING.legs if len(course.legs) > 1 else 8.0
+    height = top + DRAWING.power + DRAWING.foot
     parts = [*(_legs(course) if len(course.legs) > 1 else ()), *_power(course, top)]
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {height:g}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {DRAWING.width:g} {height:g}" '
         f'font-family="Inter, DejaVu Sans, sans-serif" font-size="12.5">{"".join(parts)}</svg>'
     )
 
 
 def _x(course: Course, t: float) -> float:
-    return _LEFT + (_WIDTH - _LEFT - _RIGHT) * t / course.duration
+    return DRAWING.left + (DRAWING.width - DRAWING.left - DRAWING.right) * t / course.duration
 
 
 def _legs(course: Course) -> Iterator[str]:
-    """Each leg as wide as its time and as high as its mean power, with its joules."""
+    """Legs with their joules: width by time, height by mean power."""
     mean = [leg.energy / leg.duration for leg in course.legs]
-    most, low, high = max(mean), _LEGS - 18.0, 34.0
+    most, low, high = max(mean), DRAWING.legs - 18.0, 34.0
     yield from _grid([(0.0, low), (_round_below(most), low - (low - high) * _of(most))])
     for leg, power in zip(course.legs, mean, strict=True):
         left, right = _x(course, leg.t0), _x(course, leg.t0 + leg.duration)
         tall = max((low - high) * power / most, 2.0)
-        fill = _REST if leg.rests else (_LOADED if leg.loaded else _EMPTY)
-        edge = "" if leg.rests or leg.loaded else f' stroke="{_LOADED}" stroke-width="1.2"'
+        fill = DRAWING.rest if leg.rests else (DRAWING.loaded if leg.loaded else DRAWING.empty)
+        edge = "" if leg.rests or leg.loaded else f' stroke="{DRAWING.loaded}" stroke-width="1.2"'
         wide = max(right - left - 1.6, 1.0)
         yield (
             f'<rect x="{left + 0.8:.1f}" y="{low - tall:.1f}" width="{wide:.1f}" '
@@ -79,23 +107,27 @@ def _legs(course: Course) -> Iterator[str]:
         )
         text = digits(leg.energy)
         if not leg.rests and right - left > 9 * len(text) + 8:
-            ink = "#ffffff" if leg.loaded else _INK
+            ink = "#ffffff" if leg.loaded else DRAWING.ink
             y = low - tall / 2 + 4.5
             yield _text((left + right) / 2, y, text, ink, "middle", 600)
     for stop in course.stops:
         x = _x(course, stop.t)
-        fill, ink, edge = (_LOADED, "#fff", _LOADED) if stop.takes else ("#fff", _INK, _INK)
-        yield f'<path d="M{x:.1f} 24V{low:.1f}" stroke="{_REST}"/>'
+        fill, ink, edge = (
+            (DRAWING.loaded, "#fff", DRAWING.loaded)
+            if stop.takes
+            else ("#fff", DRAWING.ink, DRAWING.ink)
+        )
+        yield f'<path d="M{x:.1f} 24V{low:.1f}" stroke="{DRAWING.rest}"/>'
         yield f'<circle cx="{x:.1f}" cy="14" r="11" fill="{fill}" stroke="{edge}"/>'
         yield _text(x, 18.4, str(stop.number), ink, "middle", 600)
 
 
 def _power(course: Course, top: float) -> Iterator[str]:
     most = max(max(course.power), 1.0)
-    low, step = top + _POWER, _tick(most / 2)
+    low, step = top + DRAWING.power, _tick(most / 2)
 
     def y(power: float) -> float:
-        return low - (_POWER - 12) * power / most
+        return low - (DRAWING.power - 12) * power / most
 
     levels = [k * step for k in range(int(most / step) + 1)]
     yield from _grid([(level, y(level)) for level in levels])
@@ -107,32 +139,33 @@ def _power(course: Course, top: float) -> Iterator[str]:
     line = "M" + "L".join(points)
     ends = _x(course, course.t[0]), _x(course, course.t[-1])
     area = f"{line}L{ends[1]:.1f} {y(0.0):.1f}L{ends[0]:.1f} {y(0.0):.1f}Z"
-    yield f'<path d="{area}" fill="{_LOADED}" opacity="0.14"/>'
-    yield f'<path d="{line}" fill="none" stroke="{_LOADED}" stroke-width="1.8"/>'
+    yield f'<path d="{area}" fill="{DRAWING.loaded}" opacity="0.14"/>'
+    yield f'<path d="{line}" fill="none" stroke="{DRAWING.loaded}" stroke-width="1.8"/>'
     step = _tick(course.duration / 8)
     for k in range(int(course.duration / step) + 1):
         last = (k + 1) * step > course.duration
         text = f"{k * step:g}" + (" s" if last else "")
         x = _x(course, k * step)
-        anchor = "end" if x > _WIDTH - 3 * _RIGHT else "middle"
-        yield _text(x, low + 17, text, _GREY, anchor)
+        anchor = "end" if x > DRAWING.width - 3 * DRAWING.right else "middle"
+        yield _text(x, low + 17, text, DRAWING.grey, anchor)
 
 
 def _grid(levels: Sequence[tuple[float, float]]) -> Iterator[str]:
-    """Lines at heights, each with the power [W] that it stands for."""
+    """Horizontal lines with their powers [W]."""
+    end = DRAWING.width - DRAWING.right
     for level, y in levels:
-        yield f'<path d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}" stroke="{_LINE}"/>'
+        yield f'<path d="M{DRAWING.left} {y:.1f}H{end}" stroke="{DRAWING.line}"/>'
         unit = " W" if level and level == levels[-1][0] else ""
-        yield _text(_LEFT - 7, y + 4.3, f"{level:g}{unit}", _GREY, "end")
+        yield _text(DRAWING.left - 7, y + 4.3, f"{level:g}{unit}", DRAWING.grey, "end")
 
 
 def _tick(least: float) -> float:
-    """The least distance of ticks that is at least this."""
+    """The next larger distance of ticks."""
     return next((tick for tick in _TICKS if tick >= least), _TICKS[-1])
 
 
 def _round_below(value: float) -> float:
-    """The greatest tick that is at most the value, or the value itself."""
+    """The next smaller tick, or the value itself."""
     return max((tick for tick in _TICKS if tick <= value), default=value)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 JOULES_PER_KWH = 3.6e6
 SPACE = "\u00a0"
-"""A space at which no line ends."""
+"""A no-break space."""
 _UNIT = re.compile(r"(?<=\d) (?=(?:J|s|h|W|mm|kg|kWh|%)(?!\w))")
 _ROUNDINGS: dict[str, Callable[[float], int]] = {
     "nearest": round,
@@ -41,7 +41,7 @@ def percent(share: float, rounding: str = "nearest") -> str:
 
 
 def unbroken(text: str) -> str:
-    """The text, in which no line ends between a number and its unit."""
+    """The text with no-break spaces between numbers and units."""
     return _UNIT.sub(SPACE, text)
 
 

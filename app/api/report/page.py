@@ -1,4 +1,4 @@
-"""A report as a page of HTML that stands alone."""
+"""A report as a stand-alone HTML page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from joulepath.app.api.report.bundle import Bundle, in_html
 from joulepath.app.api.report.report import Assumption, Cost, Fact, Part, Report, Rival
 
 MEDIA_TYPE = "text/html; charset=utf-8"
-_STRONG, _CODE = re.compile(r"\*([^*]+)\*"), re.compile(r"`([^`]+)`")
+_STRONG = re.compile(r"\*([^*]+)\*")
+_CODE = re.compile(r"`([^`]+)`")
 
 
 def page(report: Report, bundle: Bundle) -> bytes:

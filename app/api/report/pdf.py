@@ -17,7 +17,7 @@ MEDIA_TYPE = "application/pdf"
 
 
 def check_typst() -> None:
-    """Raises NoTypst if the package that makes PDFs is not installed."""
+    """Raises NoTypst without the package for PDFs."""
     if find_spec("typst") is None:
         raise NoTypst
 

@@ -1,4 +1,4 @@
-"""A report: everything that its page says, as data. Templates only lay it out."""
+"""The content of a report as data, for templates of the layout."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Fact:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another way to do the same, and what is saved against it."""
+    """Another way to do the same, and the saving against it."""
 
     name: str
     time: str
@@ -41,7 +41,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a cycle, a shift or a year costs; empty where it is not known."""
+    """Costs of a cycle, a shift or a year; empty if unknown."""
 
     period: str
     energy: str
@@ -51,7 +51,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Assumption:
-    """What the figures rest on, with its trust letter."""
+    """An assumption with its trust letter."""
 
     letter: str
     """A, B, C, T or E; Y: yours; –: not counted."""
@@ -67,7 +67,7 @@ class Report:
     subtitle: str
     """Day and robot."""
     lead: tuple[str, ...]
-    """The sentences at the top; what is between asterisks is important."""
+    """The leading sentences, with emphasis between asterisks."""
     facts: tuple[Fact, ...]
     picture: str
     """The cell, as SVG."""

@@ -1,4 +1,4 @@
-"""What `POST /report` takes."""
+"""Request of `POST /report`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Kind = Literal["optimize", "cycle"]
 
 
 class Sourced(Request):
-    """A number, and where it is from."""
+    """A number with its source."""
 
     value: float = described("The number.", "1", 0.2, ge=0, le=1e12)
     source: Text = described(
@@ -30,7 +30,8 @@ class Sourced(Request):
 
 
 class Costs(Request):
-    """What turns joules into costs. What is not given is not counted, and the report says so."""
+    """Numbers for the conversion of joules into costs. The report counts and names given ones
+    only."""
 
     cycles_per_shift: Sourced | None = described(
         "Motions or cycles per shift. Null: one directly after the other, for 8 hours.",
@@ -67,7 +68,7 @@ class Costs(Request):
 
 
 class ReportRequest(Request):
-    """A motion or a cycle, as exactly one of `optimize` and `cycle`, and what it costs."""
+    """A motion or a cycle, as exactly one of `optimize` and `cycle`, and the numbers for costs."""
 
     optimize: OptimizeRequest | None = described(
         "A body of `POST /optimize`.", None, OPTIMIZE, default=None
@@ -105,7 +106,7 @@ class ReportRequest(Request):
 
     @property
     def body(self) -> OptimizeRequest | CycleRequest:
-        """The request that is reported on."""
+        """The request behind the report."""
         body = self.optimize or self.cycle
         assert body is not None
         return body
@@ -122,7 +123,7 @@ class ReportRequest(Request):
 
     @property
     def deadline(self) -> float:
-        """Wall time [s] that the request allows."""
+        """Wall time of the request [s]."""
         return self.body.deadline
 
     @model_validator(mode="after")

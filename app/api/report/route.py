@@ -53,9 +53,9 @@ _FILE: dict[int | str, dict[str, Any]] = {
 async def report(
     request: Request, body: ReportRequest, settings: ServiceSettings, engine: ServiceArmEngine
 ) -> Response:
-    """Writes a page that says what a motion or a cycle needs, where it goes, what it saves against
-    ways that keep every limit, and what it costs per shift and year. Request and answer are
-    attached, so that `joulepath check` can compute both again."""
+    """Writes a page about a motion or a cycle: energy and its parts, savings against ways within
+    all limits, costs per shift and year. Request and answer are attached, so that `joulepath check`
+    can compute both again."""
     task = ReportTask(body, request.state.id)
     result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
     name = f"joulepath-report.{body.format}"

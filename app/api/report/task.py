@@ -33,8 +33,9 @@ class ReportTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The report, within about `deadline` seconds. Raises PartsNeeded, NoTypst, InvalidProblem,
-        and what answering the request raises.
+        """The report, within about `deadline` seconds.
+
+        Raises PartsNeeded, NoTypst, InvalidProblem, and the errors of answering the request.
         """
         asked = self.request
         if asked.format == "pdf":
@@ -62,15 +63,16 @@ class ReportTask:
         return TaskResult(page.page(report, bundle), page.MEDIA_TYPE)
 
     def _answered(self, deadline: float) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-        """The answer to the request, and those of its moves."""
+        """The answer to the request, and the answers of its moves."""
         result = answer_of(self.request, self.request_id, deadline)
         parts = {each.path: orjson.loads(each.body) for each in result.stored}
         answer = orjson.loads(result.not_kept().document)
         return answer, [parts[path] for path in paths_of_moves(answer)]
 
     def _kept(self, id: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-        """The kept answer of this id, and those of its moves. Raises InvalidProblem if it is of
-        another request.
+        """The kept answer with this id, and the answers of its moves.
+
+        Raises InvalidProblem for the answer to another request.
         """
         answer = kept_answers([id])[0]
         moves = kept_answers(paths_of_moves(answer))
@@ -96,7 +98,7 @@ class ReportTask:
 
 
 def answer_of(request: ReportRequest, request_id: str, deadline: float) -> TaskResult:
-    """The answer to the request that is reported on, within about `deadline` seconds."""
+    """The answer to the request behind the report, within about `deadline` seconds."""
     if request.cycle is not None:
         return CycleTask(request.cycle, request_id).run(deadline)
     assert request.optimize is not None
@@ -112,7 +114,7 @@ def program_of(bundle: Bundle) -> Program:
         if bundle.kind == "cycle"
         else ()
     )
-    # an arm that is too large to be repeated is in the request
+    # The request has an arm too large to be repeated.
     own = None
     if bundle.kind == "optimize" and bundle.answer.get("arm") is None:
         fields = {k: v for k, v in bundle.request.items() if k in ArmRequest.model_fields}

@@ -1,4 +1,4 @@
-"""What `GET /tools` and `GET /tools/{name}` answer."""
+"""Answers of `GET /tools` and `GET /tools/{name}`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class ToolList(Response):
 
 
 class ToolDetail(ToolSummary):
-    """The figures of a tool, each with its source and trust letter."""
+    """The figures of a tool with their sources and trust letters."""
 
     trust: dict[str, str] = described(
         "Meaning of the trust letters.", None, {"A": "maker's own file or data packet"}

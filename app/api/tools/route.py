@@ -21,7 +21,7 @@ Name = Annotated[
 
 @router.get("", summary="All tools", response_model=ToolList)
 async def list_tools() -> ToolList:
-    """Names and titles of the grippers that the field `tool` of a request can name."""
+    """Names and titles of the grippers for the field `tool` of requests."""
     return ToolList(
         tools=[ToolSummary(name=name, title=tool_figures(name)["title"]) for name in tool_names()]
     )
@@ -34,7 +34,7 @@ async def list_tools() -> ToolList:
     responses=problem_responses(UnknownTool),
 )
 async def show_tool(name: Name) -> ToolDetail:
-    """Mass, centre of mass, inertia, TCP and shape, each with its source and trust letter."""
+    """Mass, centre of mass, inertia, TCP and shape with sources and trust letters."""
     if name not in tool_names():
         raise UnknownTool(list(tool_names()))
     figures = tool_figures(name)
