@@ -223,6 +223,32 @@ class UnreachablePose(_TargetError):
 
 
 @dataclass(eq=False)
+class NoConfigurationFound(_TargetError):
+    """A numerical search found no arm configuration for the pose. The robot has no closed-form
+    inverse kinematics that finds every configuration: the pose may be out of reach, or the search
+    may have missed its configurations."""
+
+    title = "No configuration found"
+    remedy = (
+        "Give joint positions (`q`) if you know some that reach the pose. Otherwise check that "
+        "`position` is in metres and in the robot's base frame, and that `tcp` is right, or move "
+        "the pose."
+    )
+
+    within_limits: bool
+    """Whether configurations were found that violate a position limit, and none within all of
+    them."""
+
+    def __str__(self) -> str:
+        where = " within the position limits" if self.within_limits else ""
+        return (
+            f"No arm configuration{where} was found for the {self.target} pose. The search may "
+            "miss some, so this does not prove the pose out of reach: give joint positions if you "
+            "know them, or move the pose."
+        )
+
+
+@dataclass(eq=False)
 class SingularPose(_TargetError):
     """The arm reaches the pose only where it can turn about an axis of its own while the TCP stays,
     in a way that its inverse kinematics does not cover."""

@@ -104,6 +104,7 @@ def inverse_kinematics(
     Raises:
         InvalidProblem: there is no inverse kinematics for the robot.
         UnreachablePose: no configuration within the limits reaches the pose.
+        NoConfigurationFound: a search found no configuration of the pose.
         SingularPose: the pose is reached only on a self-motion of unknown form.
         DeadlineExceeded: the deadline passed first.
     """

@@ -32,6 +32,7 @@ def optimize(
 
     Raises:
         UnreachablePose: no configuration within the limits reaches a pose.
+        NoConfigurationFound: a search found no configuration of a pose.
         SingularPose: a pose is reached only on a self-motion of unknown form.
         UnreachableTargets: none of several targets can be reached.
         InCollision: every configuration at the start, or at the goal, collides.

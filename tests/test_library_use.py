@@ -59,6 +59,7 @@ ERRORS = {
     "NoCollisionFreeTrajectory",
     "NoPowerChannel",
     "UnreachableTargets",
+    "NoConfigurationFound",
     "NoSequence",
     "NoTrajectory",
     "NotCertified",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -41,14 +42,41 @@ PLAUSIBLE = PlausibleRanges()
 
 
 class InvalidArm(ValueError):
-    """An invalid description or URDF. `field` is the path in the description: `drives.copper`."""
+    """An invalid description or URDF. `field` is the path in the description: `drives.copper`.
 
-    def __init__(self, field: str, message: str) -> None:
-        super().__init__(message)
+    `problems` has all errors found together, each with its field and message; `field` is that of
+    the first, and the message has one line for each.
+    """
+
+    def __init__(self, field: str, message: str, *others: tuple[str, str]) -> None:
         self.field = field
+        self.problems = ((field, message), *others)
+        super().__init__("\n".join(text for _, text in self.problems))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.field, str(self))
+        (field, message), *others = self.problems
+        return type(self), (field, message, *others)
+
+
+class Problems:
+    """Errors of a description that are reported together."""
+
+    def __init__(self) -> None:
+        self._found = list[tuple[str, str]]()
+
+    @contextmanager
+    def noted(self) -> Iterator[None]:
+        """A context in which an InvalidArm is kept for `raise_any`."""
+        try:
+            yield
+        except InvalidArm as error:
+            self._found += error.problems
+
+    def raise_any(self) -> None:
+        """Raises InvalidArm with all errors kept so far, if there are any."""
+        if self._found:
+            (field, message), *others = dict.fromkeys(self._found)
+            raise InvalidArm(field, message, *others)
 
 
 @dataclass(frozen=True)
@@ -106,7 +134,8 @@ class Description:
     `acceleration` [rad/s²], `payload` [kg]. `base` is the link with the world frame (default: the
     root). `velocity` [rad/s] and `torque` [N·m] replace the limits of the URDF, `torque_side` says
     whether torque limits include friction and rotor; `jerk` [rad/s³]. `locked` has positions [rad]
-    or [m] of fixed joints. `source` is the origin of the URDF, `trust` its trust letter. `srdf` is
+    or [m] of fixed joints; "others" holds all joints that are not between base and tip, at zero or
+    the limit nearest to it. `source` is the origin of the URDF, `trust` its trust letter. `srdf` is
     the text of an SRDF with disabled collision checks. `meshes` has mesh files by path.
     """
 
@@ -122,7 +151,7 @@ class Description:
     torque: PerJoint | None = None
     torque_side: TorqueSide | None = None
     jerk: PerJoint | None = None
-    locked: Mapping[str, float] | None = None
+    locked: Mapping[str, float] | Literal["others"] | None = None
     drives: Drives = Drives()
     electronics: Electronics = Electronics()
     collision: Collision = Collision()

@@ -15,7 +15,7 @@ _PLAIN = "Behind the gear."
 
 
 def drives(description: Description, joints: tuple[str, ...], tau_max: Array) -> dict[str, Any]:
-    """Figures of the drives; `tau_max` (nq,) [N·m]."""
+    """Figures of the drives; the rules use the torques `tau_max` (nq,) [N·m]."""
     given, ones = description.drives, np.ones(len(joints))
     inertia = per_joint("drives.rotor_inertia", given.rotor_inertia, joints, zero=True)
     copper = per_joint("drives.copper", given.copper, joints)

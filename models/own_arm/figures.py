@@ -11,12 +11,22 @@ import pinocchio as pin
 
 from joulepath.models.from_figures import NO_LINKS
 from joulepath.models.own_arm.collision_figures import collision_figures
-from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm, Problems
 from joulepath.models.own_arm.energy_figures import drives, electronics, friction
 from joulepath.models.own_arm.figure import assumed, either, per_joint, stated
+from joulepath.models.own_arm.holding_torques import HoldingTorques
+from joulepath.models.own_arm.plausible_units import (
+    ACCELERATION,
+    MASS,
+    POSITION,
+    SPEED,
+    LinkBody,
+    check_bodies,
+)
 from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
+from joulepath.models.own_arm.urdf_tree import CHAIN, refuse
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
@@ -39,20 +49,33 @@ def own_figures(
     chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
     warnings = list[str]()
-    limits = _limits(description, chain)
-    tau_max = np.array(limits["torque"]["value"])
+    if chain.rounded > CHAIN.rounded_angle:
+        warnings.append(
+            "Angles of joint origins written with few decimals, such as 1.571, are read as the "
+            f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
+        )
+    problems = Problems()
+    with problems.noted():
+        inertials = _inertials(description, chain, upright, warnings)
+    with problems.noted():
+        limits = _limits(description, chain, warnings)
+    problems.raise_any()
+    acceleration, tau_max = (np.array(limits[each]["value"]) for each in ("acceleration", "torque"))
+    torques = HoldingTorques.of(chain, acceleration, description.payload)
+    warnings += torques.warnings(chain.joints, tau_max)
+    ruling = torques.ruling(tau_max)
     figures = {
         "title": description.title or name,
         "kinematics": _kinematics(description, chain, upright, links),
-        "inertials": _inertials(description, chain, upright, warnings),
+        "inertials": inertials,
         "limits": limits,
         "collision": collision_figures(description, chain, upright, links, warnings, checkpoint),
-        "drives": drives(description, chain.joints, tau_max),
+        "drives": drives(description, chain.joints, ruling),
         "electronics": electronics(description, chain.nq),
         "friction_table": {
             "knee": assumed(RULES.knee, "rad/s", "Coulomb friction is smoothed over this speed.")
         },
-        "friction_laws": {"coulomb_viscous": friction(description, chain.joints, tau_max)},
+        "friction_laws": {"coulomb_viscous": friction(description, chain.joints, ruling)},
     }
     if (motion := description.default_motion) is not None:
         if min(motion.velocity, motion.acceleration) <= 0:
@@ -117,9 +140,13 @@ def _inertials(
 ) -> dict[str, Any]:
     """Inertials of the moving links, with all bodies fixed to them."""
     ends = [*upright.placements[1:], upright.flange]
-    for link, body, end in zip(chain.links, upright.inertias, ends, strict=True):
-        _check_body(link, body, float(np.linalg.norm(end.translation)), warnings)
     bodies = upright.inertias
+    warnings += check_bodies(
+        [
+            LinkBody(link, body, float(np.linalg.norm(end.translation)))
+            for link, body, end in zip(chain.links, bodies, ends, strict=True)
+        ]
+    )
     tensors = [[float(body.inertia[i, j]) for i, j in _ENTRIES] for body in bodies]
     of_all = "Of the moving links, with what is fixed to them."
     in_link = "In the link frame: z along the joint."
@@ -139,75 +166,17 @@ def _inertials(
 _ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]) -> None:
-    """Raises InvalidArm for an impossible body; warns of an implausible one.
-
-    `length` is the distance [m] to the next joint.
-    """
-    if not body.mass > 0:
-        raise InvalidArm(
-            "urdf", f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>."
-        )
-    if (
-        not (np.abs([body.mass, *body.lever, *body.inertia.ravel()]) <= PLAUSIBLE.mass).all()
-        or not length <= PLAUSIBLE.length
-    ):
-        raise InvalidArm(
-            "urdf",
-            f"Link {link!r} must be lighter than {PLAUSIBLE.mass:g} kg and shorter than "
-            f"{PLAUSIBLE.length:g} m: are its units SI?",
-        )
-    moments = np.linalg.eigvalsh(body.inertia)
-    if moments[0] < -RULES.rounded * abs(moments[2]):
-        raise InvalidArm(
-            "urdf",
-            f"Link {link!r} has an inertia with a negative principal moment of {moments[0]:.3g}.",
-        )
-    excess = moments[2] / max(moments[0] + moments[1], 1e-300) - 1
-    if moments[2] > 0 and excess > RULES.impossible:
-        raise InvalidArm(
-            "urdf",
-            f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² "
-            f"is more than the sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
-        )
-    if moments[2] > 0 and excess > RULES.rounded:
-        warnings.append(
-            f"Link {link!r}: a principal moment is {excess:.1%} above the sum of the others."
-        )
-    least = RULES.least_gyration * length / np.sqrt(12)
-    gyration = float(np.sqrt(max(moments[2], 0.0) / body.mass))
-    if gyration < least:
-        warnings.append(
-            f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} "
-            "m, 0.7 of that of a rod to the next joint."
-        )
-
-
 _SIDE = "Whether the torque limit is for the motor, with friction and rotor, or for the link."
 
 
-def _limits(description: Description, chain: Chain) -> dict[str, Any]:
-    acceleration = per_joint("acceleration", description.acceleration, chain.joints)
-    assert acceleration is not None
-    jerk = per_joint("jerk", description.jerk, chain.joints)
-    found = {}
-    for field, given, of_urdf, part in (
-        ("velocity", description.velocity, chain.v_max, "velocity"),
-        ("torque", description.torque, chain.tau_max, "effort"),
-    ):
-        values = per_joint(field, given, chain.joints)
-        for joint, value in zip(chain.joints, of_urdf, strict=True):
-            if values is None and not value > 0:
-                raise InvalidArm(
-                    field,
-                    f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or "
-                    f"give `{field}`.",
-                )
-        found[field] = per_joint(field, tuple(of_urdf), chain.joints) if values is None else values
-    if not 0 <= description.payload <= PLAUSIBLE.mass:
-        raise InvalidArm("payload", f"payload must be a mass from 0 to {PLAUSIBLE.mass:g} kg.")
-    if max(np.abs([chain.q_min, chain.q_max]).ravel()) > PLAUSIBLE.angle:
-        raise InvalidArm("urdf", f"A joint's limits must be within {PLAUSIBLE.angle:g} rad.")
+def _limits(description: Description, chain: Chain, warnings: list[str]) -> dict[str, Any]:
+    found = _checked_limits(description, chain)
+    names = tuple(f"Joint {joint!r}" for joint in chain.joints)
+    warnings += POSITION.warnings(names, np.abs([chain.q_min, chain.q_max]).max(axis=0))
+    warnings += SPEED.warnings(names, found["velocity"])
+    warnings += ACCELERATION.warnings(names, found["acceleration"])
+    warnings += MASS.warnings(("payload",), np.array([description.payload]))
+    acceleration = found["acceleration"]
     return {
         "position_min": stated(
             description, chain.q_min, "rad", "A joint without end has one turn to either side."
@@ -219,7 +188,7 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
         "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
         "jerk": either(
             description,
-            jerk,
+            found["jerk"],
             RULES.jerk * acceleration,
             "rad/s³",
             ("Symmetric.", NOTES["jerk"]),
@@ -232,6 +201,52 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
         ),
         "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
     }
+
+
+def _checked_limits(description: Description, chain: Chain) -> dict[str, Any]:
+    """Limits on acceleration, jerk, velocity and torque (nq,); that on the jerk may be None.
+
+    Raises:
+        InvalidArm: limits are missing or impossible, or the payload is.
+    """
+    problems, found = Problems(), dict[str, Any]()
+    for field in ("acceleration", "jerk"):
+        with problems.noted():
+            found[field] = per_joint(field, getattr(description, field), chain.joints)
+    for field, given, of_urdf, part in (
+        ("velocity", description.velocity, chain.v_max, "velocity"),
+        ("torque", description.torque, chain.tau_max, "effort"),
+    ):
+        missing = [
+            joint
+            for joint, value in zip(chain.joints, of_urdf, strict=True)
+            if given is None and not value > 0
+        ]
+        for joint in missing:
+            with problems.noted():
+                refuse(
+                    field,
+                    f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or "
+                    f"give `{field}`.",
+                )
+        with problems.noted():
+            values = tuple(of_urdf) if given is None else given
+            found[field] = None if missing else per_joint(field, values, chain.joints)
+    with problems.noted():
+        if not 0 <= description.payload <= PLAUSIBLE.mass:
+            refuse("payload", f"payload must be a mass from 0 to {PLAUSIBLE.mass:g} kg.")
+    widest = np.abs([chain.q_min, chain.q_max]).max(axis=0)
+    for joint, angle in zip(chain.joints, widest, strict=True):
+        with problems.noted():
+            if angle > PLAUSIBLE.angle:
+                refuse(
+                    "urdf",
+                    f"Joint {joint!r} has a position limit of {angle:.4g} rad: limits must be "
+                    f"within {PLAUSIBLE.angle:g} rad. If they are in degrees, divide them by "
+                    "57.29578.",
+                )
+    problems.raise_any()
+    return found
 
 
 def _assumed(figures: dict[str, Any]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.own_arm.description import PLAUSIBLE, Description
+from joulepath.models.own_arm.description import PLAUSIBLE, Description, Problems
 from joulepath.models.own_arm.robot_xml import number, numbers
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
@@ -47,7 +47,8 @@ class Chain:
     pose of the tip in the frame of the last joint, `T_base_base_link` (4, 4) the pose of the link
     `base_link` in the base; None if it is the base or not fixed to it. Limits (nq,) are position
     [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of the URDF
-    links fixed to the base and to every moving link.
+    links fixed to the base and to every moving link. `rounded` [rad] is the largest change of a
+    rounded angle to the quarter turn that it stands for.
     """
 
     model: pin.Model
@@ -63,6 +64,7 @@ class Chain:
     v_max: Array
     tau_max: Array
     root: Element
+    rounded: float
 
     @property
     def nq(self) -> int:
@@ -73,32 +75,30 @@ class Chain:
 def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Chain:
     """The chain of a description. Raises InvalidArm with the name of the link or joint."""
     root = parsed_urdf(description.urdf, checkpoint)
-    tree = UrdfTree.of(root)
-    locked = dict(description.locked or {})
+    tree, problems, locked = UrdfTree.of(root), Problems(), description.locked
+    given = {} if isinstance(locked, str) else dict(locked or {})
     base = description.base or tree.root
     for field, link in (("base", base), ("tip", description.tip)):
-        if link not in tree.links:
-            refuse(
-                field,
-                f"There is no link {link!r} in the URDF: its links are {listed(tree.links)}.",
-            )
-    for name in locked:
-        if name not in tree.joints:
-            refuse(
-                "locked",
-                f"There is no joint {name!r} in the URDF: its joints are {listed(tree.joints)}.",
-            )
+        with problems.noted():
+            if link not in tree.links:
+                refuse(
+                    field,
+                    f"There is no link {link!r} in the URDF: its links are {listed(tree.links)}.",
+                )
+    for name in given:
+        with problems.noted():
+            if name not in tree.joints:
+                refuse(
+                    "locked",
+                    f"There is no joint {name!r} in the URDF: its joints are "
+                    f"{listed(tree.joints)}.",
+                )
+    problems.raise_any()
     path = tree.path(base, description.tip)
+    held = _others(tree, path) if isinstance(locked, str) else given
     moving = [
-        joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in locked
+        joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in held
     ]
-    _check_chain(moving)
-    _check_rest(tree, moving, locked)
-    return _merged(root, tree, moving, locked, base, description.tip)
-
-
-def _check_chain(moving: list[Element]) -> None:
-    """Raises InvalidArm unless all moving joints are revolute and have limits."""
     if not 1 <= len(moving) <= CHAIN.joints:
         refuse(
             "tip",
@@ -106,40 +106,77 @@ def _check_chain(moving: list[Element]) -> None:
             "possible.",
         )
     for joint in moving:
-        name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
-        if kind not in TURNING:
-            refuse(
-                "urdf",
-                f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in "
-                "`locked`.",
-            )
-        if joint.find("mimic") is not None:
-            refuse("urdf", f"Joint {name!r} mimics another one: give its position in `locked`.")
+        with problems.noted():
+            _check_moving(joint)
+    with problems.noted():
+        _check_rest(tree, moving, held)
+    names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
+    for element in root.findall("link"):
+        with problems.noted():
+            if tree.carrier(name_of(element), names):
+                _check_inertial(element)
+    problems.raise_any()
+    return _merged(root, tree, moving, held, base, description.tip)
+
+
+def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:
+    """Positions [rad] or [m] of all joints outside the path: zero, or the limit nearest to it."""
+    between, held = {name_of(joint) for joint in path}, dict[str, float]()
+    for name, joint in tree.joints.items():
         limit = joint.find("limit")
-        if kind == "revolute" and (
-            limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
-        ):
-            refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
-        if kind == "revolute" and not joint_limit(joint, "lower") < joint_limit(joint, "upper"):
-            refuse(
-                "urdf",
-                f"Joint {name!r} cannot move, its lower limit being no less than the upper: make "
-                "it fixed.",
-            )
+        if name in between or joint.get("type") == FIXED:
+            continue
+        bounded = joint.get("type") != "continuous" and limit is not None
+        lower, upper = (joint_limit(joint, each) for each in ("lower", "upper"))
+        held[name] = min(max(0.0, lower), upper) if bounded and lower < upper else 0.0
+    return held
+
+
+def _check_moving(joint: Element) -> None:
+    """Raises InvalidArm unless a moving joint is revolute and has limits."""
+    name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
+    if kind not in TURNING:
+        refuse(
+            "urdf",
+            f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in "
+            "`locked`.",
+        )
+    if joint.find("mimic") is not None:
+        refuse("urdf", f"Joint {name!r} mimics another one: give its position in `locked`.")
+    limit = joint.find("limit")
+    if kind == "revolute" and (
+        limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
+    ):
+        refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
+    if kind == "revolute" and not joint_limit(joint, "lower") < joint_limit(joint, "upper"):
+        refuse(
+            "urdf",
+            f"Joint {name!r} cannot move, its lower limit being no less than the upper: make it "
+            "fixed.",
+        )
 
 
 def _check_rest(tree: UrdfTree, moving: list[Element], locked: Mapping[str, float]) -> None:
-    """Raises InvalidArm if a joint beside the chain moves."""
+    """Raises InvalidArm if joints beside the chain move."""
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
-    for name, joint in tree.joints.items():
-        if name in names or name in locked or joint.get("type") == FIXED:
-            continue
-        if tree.carrier(joint_end(joint, "parent"), names):
-            refuse(
-                "locked",
-                f"Joint {name!r} moves a link beside those to the tip: give its position in "
-                "`locked`.",
-            )
+    loose = [
+        name
+        for name, joint in tree.joints.items()
+        if not (name in names or name in locked or joint.get("type") == FIXED)
+        and tree.carrier(joint_end(joint, "parent"), names)
+    ]
+    if len(loose) == 1:
+        refuse(
+            "locked",
+            f"Joint {loose[0]!r} moves a link beside those to the tip: give its position in "
+            '`locked`, or "others" to hold it at zero.',
+        )
+    if loose:
+        refuse(
+            "locked",
+            f"Joints move links beside those to the tip: {listed(loose)}. Give their positions in "
+            '`locked`, or "others" to hold them all at zero.',
+        )
 
 
 def _merged(
@@ -151,7 +188,7 @@ def _merged(
     tip: str,
 ) -> Chain:
     """The chain, read and reduced by Pinocchio."""
-    ranges, bare = [joint_range(joint) for joint in moving], _for_pinocchio(root)
+    ranges, (bare, rounded) = [joint_range(joint) for joint in moving], _for_pinocchio(root)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
     given = {f"joint {k}": name_of(joint) for k, joint in enumerate(bare.findall("joint"))}
     for unique, joint in zip(given, bare.findall("joint"), strict=True):
@@ -182,7 +219,6 @@ def _merged(
     rigid: list[list[str]] = [[] for _ in range(len(moving) + 1)]
     for name in tree.links:
         rigid[tree.carrier(name, names)].append(name)
-    _check_inertials(root, [name for names in rigid[1:] for name in names])
     q_min, q_max, v_max, tau_max = (np.array(column) for column in zip(*ranges, strict=True))
     axes = np.array([joint_axis(joint) for joint in moving])
     return Chain(
@@ -199,17 +235,21 @@ def _merged(
         v_max,
         tau_max,
         root,
+        rounded,
     )
 
 
-def _for_pinocchio(root: Element) -> Element:
-    """A copy of a URDF without shapes, with restored figures and complete limits.
+def _for_pinocchio(root: Element) -> tuple[Element, float]:
+    """A copy of a URDF without shapes, with restored figures and complete limits, and the largest
+    change of an angle [rad].
 
     Pinocchio gives a continuous joint two coordinates, and skips incomplete limits.
     """
-    bare = copy.deepcopy(root)
+    bare, rounded = copy.deepcopy(root), 0.0
+    # urdfdom, Pinocchio's reader, wants a name.
+    bare.attrib = {"name": "robot"}
     for joint in bare.findall("joint"):
-        restore_rounded(joint)
+        rounded = max(rounded, restore_rounded(joint))
         limit = joint.find("limit")
         if joint.get("type") in (FIXED, "floating", "planar"):
             continue
@@ -222,16 +262,15 @@ def _for_pinocchio(root: Element) -> Element:
             limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})
     for link in bare.findall("link"):
         link[:] = [each for each in link if each.tag not in ("visual", "collision")]
-    return bare
+    return bare, rounded
 
 
-def _check_inertials(root: Element, names: list[str]) -> None:
+def _check_inertial(link: Element) -> None:
     """Raises InvalidArm for an incomplete <inertial>, of which Pinocchio would read a part."""
-    for link in (each for each in root.findall("link") if name_of(each) in names):
-        for inertial in link.findall("inertial"):
-            what = f"The <inertial> of link {name_of(link)!r} has"
-            for part, attributes in (("mass", ("value",)), ("inertia", TENSOR)):
-                for attribute in attributes:
-                    number(inertial.find(part), attribute, f"{what} a <{part}>")
-            for part in ("xyz", "rpy"):
-                numbers(inertial.find("origin"), part, f"{what} an <origin>", ORIGIN)
+    for inertial in link.findall("inertial"):
+        what = f"The <inertial> of link {name_of(link)!r} has"
+        for part, attributes in (("mass", ("value",)), ("inertia", TENSOR)):
+            for attribute in attributes:
+                number(inertial.find(part), attribute, f"{what} a <{part}>")
+        for part in ("xyz", "rpy"):
+            numbers(inertial.find("origin"), part, f"{what} an <origin>", ORIGIN)

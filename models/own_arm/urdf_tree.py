@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import NoReturn
 from xml.etree.ElementTree import Element
 
@@ -14,6 +15,9 @@ from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
 from joulepath.models.own_arm.robot_xml import number, numbers, robot_element
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint
+
+DEFINITIONS = ("xacro:property", "xacro:arg", "xacro:macro")
+"""Elements of xacro that add nothing to an arm that does not use them."""
 
 CONTINUOUS = 2 * math.pi
 """Range of a continuous joint to either side [rad]: one turn."""
@@ -30,7 +34,9 @@ class ChainSettings:
     listed_names: int = 12
     """Most names listed in a message."""
     rounded_angle: float = 5e-6
-    """Deviation from a quarter turn [rad] due to rounding: five digits of an angle."""
+    """Deviation from a quarter turn [rad] due to rounding, however many digits an angle has."""
+    least_decimals: int = 3
+    """Decimals from which on one unit of the last one is a deviation due to rounding."""
     rounded_length: float = 1e-9
     """Deviation from zero [m] due to rounding: eleven digits of a length."""
 
@@ -116,6 +122,8 @@ class UrdfTree:
 def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
     """The root element of a URDF."""
     root = robot_element(text, "urdf", checkpoint)
+    for unused in [each for each in root if each.tag in DEFINITIONS]:
+        root.remove(unused)
     # Comments are not in the tree: generated files quote their macros there.
     if any(_is_xacro(each) for each in root.iter()):
         refuse(
@@ -129,28 +137,42 @@ def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
 def _is_xacro(element: Element) -> bool:
     """Whether an element still has a macro or an expression."""
     texts = (*element.attrib.values(), element.text or "", element.tail or "")
-    return element.tag.startswith("xacro:") or any("${" in text for text in texts)
+    return element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in texts)
 
 
-def restore_rounded(joint: Element) -> None:
-    """Restore rounded figures: a quarter turn written as 1.5708, a zero as 2e-11.
+def restore_rounded(joint: Element) -> float:
+    """Restore rounded figures: a quarter turn written as 1.571 or 1.5708, a zero as 2e-11.
 
     Otherwise rounded axes would not have the geometry required by closed-form inverse kinematics.
+    An angle stands for a quarter turn within one unit of its last decimal, of at least three.
+
+    Returns:
+        The largest change of an angle [rad].
     """
-    origin = joint.find("origin")
-    for part, unit, near in (
-        ("rpy", math.pi / 2, CHAIN.rounded_angle),
-        ("xyz", math.inf, CHAIN.rounded_length),
-    ):
-        if origin is None or part not in origin.attrib:
-            continue
-        values = numbers(origin, part, f"Joint {name_of(joint)!r} has an <origin>").tolist()
-        snapped = [0.0 if math.isinf(unit) else round(value / unit) * unit for value in values]
-        kept = (
-            there if abs(there - value) < near else value
-            for value, there in zip(values, snapped, strict=True)
-        )
-        origin.set(part, " ".join(map(repr, kept)))
+    origin, changed = joint.find("origin"), 0.0
+    if origin is None:
+        return changed
+    where = f"Joint {name_of(joint)!r} has an <origin>"
+    if "xyz" in origin.attrib:
+        place = numbers(origin, "xyz", where)
+        kept = np.where(np.abs(place) < CHAIN.rounded_length, 0.0, place)
+        origin.set("xyz", " ".join(map(repr, kept.tolist())))
+    if "rpy" in origin.attrib:
+        angles = numbers(origin, "rpy", where)
+        exact = np.array([_exact_angle(each) for each in origin.attrib["rpy"].split()])
+        changed = float(np.abs(exact - angles).max())
+        origin.set("rpy", " ".join(map(repr, exact.tolist())))
+    return changed
+
+
+def _exact_angle(text: str) -> float:
+    """The quarter turn that a rounded figure stands for, or its value [rad]."""
+    value = float(text)
+    quarter = round(value / (math.pi / 2)) * (math.pi / 2)
+    exponent = Decimal(text).as_tuple().exponent
+    decimals = -exponent if isinstance(exponent, int) else 0
+    unit = 10.0**-decimals if decimals >= CHAIN.least_decimals else 0.0
+    return quarter if abs(quarter - value) < max(unit, CHAIN.rounded_angle) else value
 
 
 def joint_range(joint: Element) -> tuple[float, float, float, float]:

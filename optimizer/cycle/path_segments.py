@@ -13,7 +13,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
@@ -66,7 +66,7 @@ def path_segments(arm: Arm, course: ToolCourse, branch: BranchFilter | None) -> 
         (T,) = course.poses(np.array([seed]))
         try:
             solutions = kinematics.solve(T, arm.T_flange_tcp, limits, windings=False)
-        except (UnreachablePose, SingularPose):
+        except (UnreachablePose, NoConfigurationFound, SingularPose):
             continue
         allowed = [
             each.q

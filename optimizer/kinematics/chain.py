@@ -50,6 +50,18 @@ class Chain:
         """Number of joints."""
         return len(self.placements)
 
+    @cached_property
+    def length(self) -> float:
+        """Upper bound of the distance of the flange from the first joint's origin [m]."""
+        links = [*self.placements[1:], self.T_last_flange]
+        return float(sum(np.linalg.norm(link[:3, 3]) for link in links))
+
+    def beyond_length(self, T: Array) -> float:
+        """Distance [m] of the flange pose T (4, 4) beyond the stretched chain; a pose with a
+        positive distance is out of reach.
+        """
+        return float(np.linalg.norm(T[:3, 3] - self.placements[0, :3, 3])) - self.length
+
     def mirrored(self) -> Chain:
         """The same chain read from the flange to the base.
 

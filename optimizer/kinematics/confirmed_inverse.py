@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from joulepath.models.robot import Array, Limits, Robot
-from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
 from joulepath.optimizer.kinematics.ik_solutions import (
@@ -165,13 +165,15 @@ class ConfirmedInverseKinematics:
             distance = self._solver.distance_to_reach(_orthonormal(T))
             reached = self._reached_at_edge(T, members, limits, distance)
             if not len(reached.q):
-                raise out_of_reach(distance, target)
+                raise out_of_reach(self._chain, T, distance, target, self.complete)
         nearest, inside = nearest_turns(reached.q, limits)
         principal = reached.principal(self._solver, self._chain)
         owners = list(compress(principal, inside))
         q = nearest if len(owners) == len(nearest) else nearest[np.flatnonzero(inside)]
         if windings:
             q, owners = _with_full_turns(q, owners, limits)
+        if not owners and not self.complete:
+            raise NoConfigurationFound(target, within_limits=True)
         if not owners:
             raise UnreachablePose(
                 target,

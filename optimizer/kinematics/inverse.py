@@ -86,6 +86,7 @@ class InverseKinematics(Protocol):
 
         Raises:
             UnreachablePose: there is no solution.
+            NoConfigurationFound: a search that may miss configurations found none.
             SingularPose: the pose is reached only on a self-motion of unknown form.
         """
         ...

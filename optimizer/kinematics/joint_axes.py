@@ -30,6 +30,8 @@ class JointAxesSettings:
     """Distance of axes below which they count as meeting [m]; far above the shifts of a
     calibration.
     """
+    steep: float = 0.5
+    """Vertical component above which an axis is not nearly level."""
 
 
 AXES = JointAxesSettings()
@@ -67,6 +69,22 @@ class JointAxes:
         back = np.linalg.inv(frames)
         return Chain(np.concatenate([frames[:1], back[:-1] @ frames[1:]]), back[-1] @ self.T_zero)
 
+    def in_one_sense(self) -> tuple[JointAxes, Array]:
+        """The same axes, with neighbouring parallel axes in the same sense.
+
+        Returns:
+            The axes, and factors (nq,), 1 or -1, by which their joint positions are those of the
+            given axes.
+        """
+        directions, senses = self.directions.copy(), np.ones(len(self.directions))
+        for k in range(1, len(directions)):
+            if (
+                np.linalg.norm(np.cross(directions[k - 1], directions[k])) < AXES.parallel
+                and directions[k - 1] @ directions[k] < 0
+            ):
+                directions[k], senses[k] = -directions[k], -1.0
+        return JointAxes(directions, self.points, self.T_zero), senses
+
     def simplified(self) -> JointAxes:
         """Nearest arm with exactly parallel and meeting axes; equal to this one if no axes nearly
         are.
@@ -89,6 +107,15 @@ class JointAxes:
             for k in range(len(points) - 1, 0, -1):
                 _let_meet(directions, points, k, k - 1)
         return JointAxes(directions, points, self.T_zero)
+
+
+def upward(direction: Array) -> Array:
+    """The direction (3,) or its opposite: the one away from the ground, or for a nearly level axis
+    the one along the positive x or y axis.
+    """
+    steep = abs(direction[2]) > AXES.steep
+    k = 2 if steep else int(np.abs(direction[:2]).argmax())
+    return -direction if direction[k] < 0 else direction
 
 
 def meeting_point(directions: Array, points: Array) -> tuple[Array, float]:

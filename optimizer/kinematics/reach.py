@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.newton import solved
@@ -81,19 +81,34 @@ def at_the_edge(
     return q, residual
 
 
-def out_of_reach(distance: float | None, target: str) -> UnreachablePose | SingularPose:
-    """Error for a pose without a configuration.
+def out_of_reach(
+    chain: Chain, T: Array, distance: float | None, target: str, complete: bool
+) -> UnreachablePose | NoConfigurationFound | SingularPose:
+    """Error for a pose without a known configuration.
 
     Args:
+        chain: chain of the arm.
+        T: flange pose (4, 4).
         distance: distance out of reach [m]; None if unknown.
         target: name of the pose in the message.
+        complete: whether every configuration would have been found.
     """
+    if distance is None and (beyond := chain.beyond_length(T)) > 0:
+        hint = "give it in metres, not millimetres, or " if beyond > REACH.like_millimetres else ""
+        return UnreachablePose(
+            target,
+            None,
+            f"The {target} pose is {beyond:.4g} m beyond the stretched arm: {hint}move the "
+            "position closer to the robot.",
+        )
+    if distance is None and not complete:
+        return NoConfigurationFound(target, within_limits=False)
     if distance is None:
         return UnreachablePose(
             target,
             None,
-            f"No arm configuration was found for the {target} pose: move the position closer to "
-            "the robot's workspace, or change the orientation.",
+            f"The {target} pose is out of reach: move the position closer to the robot's "
+            "workspace, or change the orientation.",
         )
     if distance <= REACH.rounding:
         return SingularPose(target, 0.0)

@@ -11,7 +11,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.ruckig_motion import straight_spline, time_optimal_spline
@@ -149,7 +149,7 @@ def _goals(arm: Arm, known: Sequence[Array]) -> Iterator[Array]:
     if kinematics is not None:
         try:
             found = kinematics.solve(tcp_pose(arm, known[0]), arm.T_flange_tcp, arm.active_limits)
-        except (UnreachablePose, SingularPose):
+        except (UnreachablePose, NoConfigurationFound, SingularPose):
             return
         yield from (each.q for each in found)
 

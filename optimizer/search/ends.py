@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import (
+    NoConfigurationFound,
     OutsideLimits,
     SingularPose,
     UnreachablePose,
@@ -78,6 +79,7 @@ def ends_of(
     Raises:
         UnreachableTargets: none of several targets has a configuration.
         UnreachablePose: no configuration of the branches asked for reaches a single pose.
+        NoConfigurationFound: a search found no configuration of a single pose.
         SingularPose: a single pose is singular.
         InvalidProblem: a pose of an arm without inverse kinematics.
     """
@@ -96,7 +98,7 @@ def ends_of(
                 index,
                 max(samples // max(tolerance, 1), SAMPLING.least_orientations),
             )
-        except (UnreachablePose, SingularPose, OutsideLimits) as error:
+        except (UnreachablePose, NoConfigurationFound, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
     if not reached:
         raise UnreachableTargets(name, unreachable)
@@ -170,7 +172,7 @@ def _ends_of_samples(
     """The end configurations of orientations sampled evenly within the cones of pose and tool."""
     pose = within_cone(prepared.arm, pose, SAMPLING.cone_share)
     found: list[EndConfiguration] = []
-    errors: list[UnreachablePose | SingularPose] = []
+    errors: list[UnreachablePose | NoConfigurationFound | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, SAMPLING.least_orientations)
     for k, R in enumerate(sample_orientations(pose, tried)):
         if k % SAMPLING.orientations_per_check == SAMPLING.orientations_per_check - 1:
@@ -186,13 +188,13 @@ def _ends_of_samples(
                     on_curve=SAMPLING.members_per_orientation,
                 )
             ]
-        except (UnreachablePose, SingularPose) as error:
+        except (UnreachablePose, NoConfigurationFound, SingularPose) as error:
             errors.append(error)
     if found:
         return found
     unreachable = [error for error in errors if isinstance(error, UnreachablePose)]
     if len(unreachable) < tried:
-        raise next(error for error in errors if isinstance(error, SingularPose))
+        raise next(error for error in errors if not isinstance(error, UnreachablePose))
     distances = [error.distance for error in unreachable if error.distance is not None]
     raise UnreachablePose(
         name,

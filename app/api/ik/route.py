@@ -13,7 +13,7 @@ from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -22,7 +22,9 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/ik",
     summary="Every arm configuration that reaches a pose",
     response_model=model_of(IKAnswer),
-    responses=problem_responses(*WORKER_PROBLEMS, UnreachablePose, SingularPose),
+    responses=problem_responses(
+        *WORKER_PROBLEMS, UnreachablePose, NoConfigurationFound, SingularPose
+    ),
 )
 async def solve(
     request: Request, body: IKRequest, settings: ServiceSettings, engine: ServiceArmEngine

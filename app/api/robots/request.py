@@ -13,6 +13,9 @@ from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.models.own_arm.description import PLAUSIBLE
 from joulepath.models.shape_sizes import SIZES
 
+MOST_LOCKED = 100
+"""Most held joints of an arm."""
+
 Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
 NotNegative = Annotated[float, Field(ge=0, le=1e6)]
 PositivePerJoint = Positive | Annotated[list[Positive], Field(min_length=1, max_length=16)]
@@ -151,12 +154,18 @@ class OwnArm(Request):
         160.0,
         default=None,
     )
-    locked: dict[Named, Annotated[float, Field(ge=-100, le=100)]] | None = described(
-        "Positions of joints that are held: of fingers, or of joints of the arm.",
+    locked: (
+        Annotated[
+            dict[Named, Annotated[float, Field(ge=-100, le=100)]], Field(max_length=MOST_LOCKED)
+        ]
+        | Literal["others"]
+        | None
+    ) = described(
+        "Positions of joints that are held: of fingers, or of joints of the arm. `others`: all "
+        "joints that are not between base and tip, at zero or the limit nearest to it.",
         "rad or m",
         {"finger_joint": 0.02},
         default=None,
-        max_length=100,
     )
     drives: OwnDrives = described(
         "Motors and gears.", None, {"rotor_inertia": 0.4}, default=OwnDrives()

@@ -9,8 +9,11 @@ from typing import Any
 
 from joulepath.app.api.robots.request import OwnArm
 from joulepath.app.convert.base64_data import decoded
+from joulepath.app.convert.fields import location
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.base import FieldError, InvalidRequest
+from joulepath.app.http.problems import MOST_ERRORS
 from joulepath.models.own_arm.description import (
     Collision,
     Description,
@@ -36,16 +39,23 @@ class OwnRobotTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """`figures` and `warnings`, within about `deadline` seconds. Raises InvalidProblem or
+        """`figures` and `warnings`, within about `deadline` seconds. Raises InvalidRequest or
         DeadlineExceeded.
         """
         try:
             with until(Deadline.after(deadline)):
                 figures, warnings = own_figures(self.name, to_description(self.arm), checkpoint)
         except InvalidArm as error:
-            raise InvalidProblem(error.field, str(error)) from None
+            raise invalid_arm(error) from None
         own_robot(self.name, figures)
         return TaskResult.of_json({"figures": figures, "warnings": warnings})
+
+
+def invalid_arm(error: InvalidArm) -> InvalidRequest:
+    """The error of a request with the field and message of every problem."""
+    problems = [InvalidProblem(field, message) for field, message in error.problems[:MOST_ERRORS]]
+    errors = [FieldError(loc=location(each, "body"), msg=str(each)) for each in problems]
+    return InvalidRequest(errors, str(problems[0])) if len(errors) == 1 else InvalidRequest(errors)
 
 
 def to_description(arm: OwnArm) -> Description:

@@ -125,17 +125,25 @@ class TurnedPose:
         T[:, :3, :3] = self.R @ Rotation.from_rotvec(angle[:, None] * self.pose.axis).as_matrix()
         T[:, :3, 3] = self.pose.position
         signs = np.array(list(product((1.0, -1.0), repeat=3)))[branch]
-        flange = flange_pose(T, self.arm.T_flange_tcp)
-        return _Turned(self.form, flange, self.pose, h + ROUNDING).boxes(*signs.T)
+        drawing = self.form.drawing
+        flange = drawing.pose(flange_pose(T, self.arm.T_flange_tcp))
+        R, shift = drawing.T_form_base[:3, :3], drawing.T_form_base[:3, 3]
+        position, direction = R @ self.pose.position + shift, R @ self.pose.direction
+        turned = _Turned(self.form, flange, position, direction, h + ROUNDING)
+        centre, half, held = turned.boxes(*signs.T)
+        return drawing.file(centre), half, held
 
 
 @dataclass(frozen=True)
 class _Turned:
-    """Flange poses T (k, 4, 4) at the middles of cells with half widths `h` (k,) [rad]."""
+    """Flange poses T (k, 4, 4) of the table at the middles of cells with half widths `h` (k,)
+    [rad], turned about a `direction` (3,) through a `position` (3,) [m].
+    """
 
     form: URClosedForm
     T: Array
-    pose: ConeOrientedPose
+    position: Array
+    direction: Array
     h: Array
 
     def boxes(self, shoulder: Array, wrist: Array, elbow: Array) -> tuple[Array, Array, Mask]:
@@ -175,8 +183,8 @@ class _Turned:
         x_axis, y_axis, z_axis = (T[:, :3, k] for k in range(3))
         centre = T[:, :3, 3] - form.d6 * z_axis
         # The last axis' origin moves on a circle about the tool's axis.
-        beside = centre - self.pose.position
-        radius = np.linalg.norm(np.cross(beside, self.pose.direction), axis=1)
+        beside = centre - self.position
+        radius = np.linalg.norm(np.cross(beside, self.direction), axis=1)
         moved = 2 * np.sin(h / 2) * radius + ROUNDING
         rho = np.hypot(centre[:, 0], centre[:, 1])
         low, high = np.maximum(rho - moved, abs(form.d4)), rho + moved
@@ -202,11 +210,11 @@ class _Turned:
         seen = _seen_from_pole(off, angle)
         q6 = _Interval(np.arctan2(-wrist * v, wrist * u), seen)
         fifth = -(np.sin(q6.at)[:, None] * x_axis + np.cos(q6.at)[:, None] * y_axis)
-        along, above = (fifth * outward).sum(axis=1), fifth[:, 2]
+        along, above = form.tilted((fifth * outward).sum(axis=1), fifth[:, 2])
         heading = _Interval(np.arctan2(along, -above), seen)
         anywhere = seen >= np.pi
         arm = np.where(anywhere, 0.0, form.d5)[:, None]
-        level = np.stack([ahead.at, centre[:, 2] - form.d1], axis=1)
+        level = np.stack([ahead.at - form.a1, centre[:, 2] - form.d1], axis=1)
         place = level - arm * np.stack([np.sin(heading.at), -np.cos(heading.at)], axis=1)
         swung = np.where(anywhere, abs(form.d5), 2 * abs(form.d5) * np.sin(seen / 2))
         return _Wrist(held, q1, q5, q6, place, np.hypot(ahead.off, moved) + swung, heading)

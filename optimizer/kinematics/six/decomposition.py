@@ -8,7 +8,8 @@ Its solutions, including least-squares approximations near the pose, seed Newton
 exact arm.
 
 The seeds cover all branches except next to a singularity: EAIK loses rows there, and an arm with
-deviations has other branches than the simple one. More seeds are tried there. The solutions are
+deviations has other branches than the simple one. More seeds are tried there, and a search from
+many starts (`multi_start`) follows if no seed reaches the pose. The solutions are
 `complete` only for an arm with a spherical wrist on an ortho-parallel base, whose singularities are
 solved by formulas.
 """
@@ -18,7 +19,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import eaik.pybindings.EAIK as eaik
 import numpy as np
 import pinocchio as pin
 
@@ -33,8 +33,10 @@ from joulepath.optimizer.kinematics.joint_axes import JointAxes
 from joulepath.optimizer.kinematics.newton import NEWTON, solved
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.six.aligned_wrist import AlignedWrist
+from joulepath.optimizer.kinematics.six.multi_start import MultiStart
 from joulepath.optimizer.kinematics.six.named_branches import NamedBranches, in_order, numbered
 from joulepath.optimizer.kinematics.six.nearly_singular_seeds import SEEDS, seeds_around
+from joulepath.optimizer.kinematics.six.simple_arm import SimpleArm
 from joulepath.optimizer.kinematics.six.spherical_wrist import (
     LABELS,
     SPHERICAL_WRIST,
@@ -99,12 +101,12 @@ class DecomposedArm:
 
     confirmed = True
 
-    def __init__(
-        self, chain: Chain, axes: JointAxes, names: NamedBranches | None, decomposition: eaik.Robot
-    ) -> None:
-        self._chain, self._names, self._decomposition = chain, names, decomposition
-        self._R_zero = axes.T_zero[:3, :3]
-        self.complete = isinstance(names, SphericalWrist) and self._deviation() < SETTINGS.identical
+    def __init__(self, chain: Chain, names: NamedBranches | None, simple: SimpleArm) -> None:
+        self._chain, self._names, self._simple = chain, names, simple
+        self._search = MultiStart(chain)
+        self.complete = (
+            isinstance(names, SphericalWrist) and simple.deviation(chain) < SETTINGS.identical
+        )
         self._seed_error = SETTINGS.seed_error if self.complete else SETTINGS.deviating_seed_error
         self._wrist = (
             WristAngles(chain, names)
@@ -123,13 +125,11 @@ class DecomposedArm:
             return None
         chain = Chain.of(model)
         axes = JointAxes.of(chain).simplified()
-        steps = np.diff(axes.points, axis=0)
-        offsets = np.vstack([axes.points[:1], steps, axes.T_zero[:3, 3] - axes.points[-1]])
-        decomposition = eaik.Robot(axes.directions.T, offsets.T, np.eye(3), [], True)
-        if not decomposition.has_known_decomposition():
+        simple = SimpleArm.of(axes)
+        if simple is None:
             return None
         names = SphericalWrist.of(axes) or URGeometry.of(model, SETTINGS.ur_deviation)
-        return cls(chain, axes, names, decomposition)
+        return cls(chain, names, simple)
 
     def label(self, q: Array) -> BranchLabel:
         """Branch of a configuration (6,) [rad]: its name, or the number of the nearest solution, 1
@@ -172,7 +172,7 @@ class DecomposedArm:
 
     def _solve(self, matrix: bytes) -> _Found:
         T = np.frombuffer(matrix).reshape(4, 4)
-        rows = self._rows(T)
+        rows = self._simple.rows(T)
         if (found := self._regular(rows, T)) is not None:
             return found
         if self._wrist is not None and self._wrist.wrist.turns_freely(T):
@@ -189,6 +189,8 @@ class DecomposedArm:
             q = np.vstack([rows, *self._beside_folds(rows)])
             frames = link_frames(self._chain.placements, q)
         q, smallest = self._exact(q, frames, T)
+        if not len(q) and not motions and self.distance_to_reach(T) is None:
+            q, smallest = self._search.configurations(T), np.zeros(0)
         # The self-motions of a spherical wrist are known.
         for k in np.flatnonzero(smallest < ISOLATED.singular_value) if self._wrist is None else ():
             if lies_on_a_curve(self._chain, q[k], T):
@@ -236,19 +238,6 @@ class DecomposedArm:
         return bool(
             (np.column_stack([arms, sines]) < SETTINGS.twice_singular).sum(axis=1).max() > 1
         )
-
-    def _rows(self, T: Array) -> Array:
-        """Configurations (n, 6) [rad] of the simple arm, including least-squares approximations;
-        empty out of reach.
-        """
-        turned = np.array(T)
-        turned[:3, :3] = T[:3, :3] @ self._R_zero.T
-        try:
-            rows = np.array(self._decomposition.calculate_IK(turned).Q)
-        except RuntimeError:
-            return np.zeros((0, 6))
-        rows = rows.reshape(-1, 6)
-        return np.asarray(rows[np.isfinite(rows).all(axis=1)])
 
     def _aligned(self, rows: Array, T: Array) -> tuple[list[AlignedWrist], list[Array]]:
         """Self-motions and other configurations of rows (n, 6) with nearly aligned wrists."""
@@ -336,15 +325,4 @@ class DecomposedArm:
         if self._wrist is not None or not len(weak):
             return np.zeros((0, 6))
         on_curve = q[near & (smallest < SEEDS.curve_singular_value)]
-        return seeds_around(self._chain, self._rows, weak, on_curve, T)
-
-    def _deviation(self) -> float:
-        """Largest difference [m, rad] from the nearest simple arm, at sample configurations."""
-        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (32, 6))
-        T = self._chain.flange(q)
-        worst = 0.0
-        for each, T_exact in zip(q, T, strict=True):
-            simple = np.array(self._decomposition.fwdkin(each))
-            simple[:3, :3] = simple[:3, :3] @ self._R_zero
-            worst = max(worst, float(twist_size(pose_error(simple[None], T_exact))[0]))
-        return worst
+        return seeds_around(self._chain, self._simple.rows, weak, on_curve, T)

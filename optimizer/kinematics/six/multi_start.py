@@ -94,8 +94,12 @@ class MultiStart:
         Raises:
             SingularPose: a solution lies on a self-motion.
         """
-        q = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
+        q = self.configurations(T)
         return q, [numbered(each, q) for each in q]
+
+    def configurations(self, T: Array) -> Array:
+        """Configurations (n, 6) [rad] of the flange pose T (4, 4), as those of `solve`."""
+        return self._found(np.ascontiguousarray(T, dtype=float).tobytes())
 
     def self_motions(self, T: Array, limits: Limits | None = None) -> list[SelfMotion]:
         """Always empty: no self-motion is known."""
@@ -107,6 +111,8 @@ class MultiStart:
 
     def _solve(self, matrix: bytes) -> Array:
         T = np.frombuffer(matrix).reshape(4, 4)
+        if self._chain.beyond_length(T) > REACH.beyond:
+            return np.zeros((0, 6))
         rng, found, idle = np.random.default_rng(0), np.zeros((0, 6)), 0
         starts = rng.uniform(-np.pi, np.pi, (MULTI_START.round_size, 6))
         for _ in range(MULTI_START.rounds):

@@ -21,7 +21,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.joint_axes import AXES, JointAxes, meeting_point
+from joulepath.optimizer.kinematics.joint_axes import AXES, JointAxes, meeting_point, upward
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.problem.branches import Elbow, Label, Shoulder, Wrist
 
@@ -98,8 +98,7 @@ class SphericalWrist:
             or np.linalg.norm(np.cross(z[1], z[2])) > AXES.parallel
         ):
             return None
-        # The direction away from the ground if the first axis is upright.
-        up = z[0] * (-1.0 if z[0][2] < -0.5 else 1.0)
+        up = upward(z[0])
         forward = np.cross(z[1], up)
         reach = float((p[1] - p[0]) @ forward)
         if reach < 0 or (reach == 0 and (wrist - p[0]) @ forward < 0):

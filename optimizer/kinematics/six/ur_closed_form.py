@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.self_motion import is_point
+from joulepath.optimizer.kinematics.six.drawing import DrawnMotion
 from joulepath.optimizer.kinematics.six.stretched_wrist import StretchedWrist
 from joulepath.optimizer.kinematics.six.ur_geometry import UR, URGeometry, heading_uncertainty
 from joulepath.optimizer.problem.branches import Label
@@ -36,6 +37,7 @@ class URClosedForm(URGeometry):
             At most eight configurations (n, 6) [rad] in [-pi, pi], none if T is out of reach by
             more than `Reach` allows, and their n labels.
         """
+        T = self.drawing.pose(T)
         rows, labels = [], []
         for q1, ahead in self.shoulders(T):
             for q5, q6, sin_wrist, x, z, heading in self._wrists(T, q1, ahead):
@@ -44,9 +46,7 @@ class URClosedForm(URGeometry):
                     labels.append(self.label_of(ahead, sin_elbow, sin_wrist))
         if not rows:
             return np.zeros((0, 6)), []
-        q = np.array(rows)
-        # Clipping changes no more than the last digit.
-        return np.clip(q - tau * np.round(q / tau), -pi, pi), labels
+        return self.drawing.file_within_turn(np.array(rows)), labels
 
     def _wrists(
         self, T: Array, q1: float, ahead: float
@@ -71,9 +71,10 @@ class URClosedForm(URGeometry):
             c6, s6 = cos(q6), sin(q6)
             along = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             above = -(s6 * r31 + c6 * r32)
+            along, above = self.tilted(along, above)
             height = pz - self.d6 * r33 - self.d1
             turn, x, z = self._turned_into_reach(
-                ahead, height, along, above, heading_uncertainty(sine, abs(ahead))
+                ahead - self.a1, height, along, above, heading_uncertainty(sine, abs(ahead))
             )
             found.append(
                 (q5, q6 - turn if w > 0 else q6 + turn, sin_q5, x, z, atan2(along, -above) + turn)
@@ -83,10 +84,11 @@ class URClosedForm(URGeometry):
     def _turned_into_reach(
         self, ahead: float, height: float, along: float, above: float, slack: float
     ) -> tuple[float, float, float]:
-        """Turn of the fifth axis that brings the fourth axis into reach, within the uncertainty of
-        the pose.
+        """Turn of the wrist that brings the fourth axis into reach, within the uncertainty of the
+        pose.
 
-        Next to a stretched wrist, the rounding of the pose turns the fifth axis (along, above). At
+        Next to a stretched wrist, the rounding of the pose turns the direction (along, above) from
+        the fourth axis to the sixth, which is `ahead` of the second. At
         an edge of the elbow's reach, this may carry the fourth axis out of reach. Newton's method
         then turns it back, by no more than `slack` [rad].
 
@@ -96,7 +98,7 @@ class URClosedForm(URGeometry):
         least, most = self.reach
         turn, c, s = 0.0, 1.0, 0.0
         for _ in range(UR.newton_steps):
-            # The fifth axis is (sin, -cos) of an angle.
+            # The direction is (sin, -cos) of an angle.
             x = ahead - self.d5 * (c * along - s * above)
             z = height - self.d5 * (c * above + s * along)
             distance = hypot(x, z)
@@ -125,8 +127,6 @@ class URClosedForm(URGeometry):
         folded = (
             sqrt((distance - least) * (distance + least)) if distance - least > UR.edge else 0.0
         )
-        if self.a2 * self.a3 < 0:
-            stretched, folded = folded, stretched
         found = []
         for side in (stretched, -stretched) if stretched > 0 and folded > 0 else (stretched,):
             q3 = 2 * atan2(side, folded)
@@ -135,13 +135,13 @@ class URClosedForm(URGeometry):
             found.append((q2, q3, s3))
         return found
 
-    def self_motions(self, T: Array, limits: Limits | None = None) -> list[StretchedWrist]:
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[DrawnMotion]:
         """Self-motions of the flange pose T (4, 4), one for each shoulder with a stretched wrist,
         and elbow.
 
         Self-motions without a reachable member are left out; none is cut to the limits.
         """
-        found = []
+        T, found = self.drawing.pose(T), list[DrawnMotion]()
         R = T[:3, :3]
         for q1, ahead in self.shoulders(T):
             c1, s1 = cos(q1), sin(q1)
@@ -155,20 +155,20 @@ class URClosedForm(URGeometry):
             above = float(T[2, 3] - self.d6 * T[2, 2] - self.d1)
             for side in (1.0, -1.0):
                 motion = StretchedWrist(
-                    self.label_of(ahead, side * (1 if self.a2 * self.a3 > 0 else -1), 0.0),
+                    self.label_of(ahead, side, 0.0),
                     self.a2,
                     self.a3,
                     self.d5,
-                    ahead,
+                    ahead - self.a1,
                     above,
                     q1,
                     0.0 if w > 0 else pi,
-                    h0,
+                    h0 + self.tilt,
                     1.0 if sin(h1 - h0) > 0 else -1.0,
                     side,
                 )
                 if motion.arcs:
-                    found.append(motion)
+                    found.append(DrawnMotion(motion, self.drawing))
                     if is_point(motion):
                         break  # stretched or folded: the elbow has one side
         return found
@@ -181,6 +181,7 @@ class URClosedForm(URGeometry):
         over its reach within the plane are perpendicular. The distance is therefore a minimum over
         one angle.
         """
+        T = self.drawing.pose(T)
         least, most = self.reach
         axis = T[:3, 2]
         centre = T[:3, 3] - self.d6 * axis
@@ -190,12 +191,9 @@ class URClosedForm(URGeometry):
             side = c1 * centre[1] - s1 * centre[0] + self.d4
             fifth = np.cross(np.stack([s1, -c1, zero], axis=-1), axis)
             fifth *= flip / np.maximum(np.linalg.norm(fifth, axis=-1, keepdims=True), UR.rounding)
-            x = (
-                c1 * centre[0]
-                + s1 * centre[1]
-                - self.d5 * (c1 * fifth[..., 0] + s1 * fifth[..., 1])
-            )
-            z = centre[2] - self.d1 - self.d5 * fifth[..., 2]
+            along, above = self.tilted(c1 * fifth[..., 0] + s1 * fifth[..., 1], fifth[..., 2])
+            x = c1 * centre[0] + s1 * centre[1] - self.a1 - self.d5 * along
+            z = centre[2] - self.d1 - self.d5 * above
             radius = np.hypot(x, z)
             return np.asarray(
                 np.hypot(side, np.maximum(0, np.maximum(least - radius, radius - most)))
@@ -217,7 +215,8 @@ class URClosedForm(URGeometry):
         return best
 
     def _distance_with_stretched_wrist(self, T: Array) -> float:
-        """Distance to reach [m] with the wrist stretched; infinite if no first angle stretches it.
+        """Distance to reach [m] with the wrist stretched, of the table's flange pose T (4, 4);
+        infinite if no first angle stretches it.
 
         With the wrist stretched, the fourth axis may lie anywhere on a circle about the fifth
         joint.
@@ -227,7 +226,7 @@ class URClosedForm(URGeometry):
         for q1, ahead in self.shoulders(T):
             across = hypot(T[2, 2], cos(q1) * T[0, 2] + sin(q1) * T[1, 2])
             if across < UR.rounding:
-                radius = hypot(ahead, T[2, 3] - self.d6 * T[2, 2] - self.d1)
+                radius = hypot(ahead - self.a1, T[2, 3] - self.d6 * T[2, 2] - self.d1)
                 nearest, farthest = abs(radius - abs(self.d5)), radius + abs(self.d5)
                 best = min(best, max(0.0, least - farthest, nearest - most))
         return best

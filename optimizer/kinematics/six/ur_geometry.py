@@ -1,23 +1,30 @@
 """Geometry of arms of Universal Robots' form: parallel inner axes, offset wrist axes.
 
-The arm has the standard Denavit-Hartenberg table
+In some convention, the arm has the standard Denavit-Hartenberg table
 
-    a     = [0, a2, a3, 0, 0, 0]
+    a     = [a1, a2, a3, a4, 0, 0]
     d     = [d1, 0, 0, d4, d5, d6]
     alpha = [pi/2, 0, 0, pi/2, -pi/2, 0]
+
+The second, third and fourth axes are parallel, the others at right angles to the one before, and
+the fifth meets the sixth. `table_lengths` finds the lengths whatever convention the file uses.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, cos, hypot, pi, sin, sqrt
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.joint_axes import JointAxes
 from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.kinematics.six.drawing import Drawing, without_rounding
+from joulepath.optimizer.kinematics.six.table_lengths import drawn_lengths
 from joulepath.optimizer.problem.branches import Label
 
 
@@ -64,19 +71,28 @@ UR = URSettings()
 
 @dataclass(frozen=True)
 class URGeometry:
-    """Signed lengths [m] of the table above, and the names of the branches."""
+    """Signed lengths [m] of the table above, and the names of the branches.
+
+    `d5` is the distance of the sixth axis from the fourth in the arm's plane, `tilt` [rad] the
+    angle of this line from the fifth axis, and `drawing` the convention of the file. `a2` and `a3`
+    are negative, `d4`, `d5` and `d6` not: every drawing of an arm has the same lengths, and its
+    branches the same names.
+    """
 
     d1: float
+    a1: float
     a2: float
     a3: float
     d4: float
     d5: float
     d6: float
+    tilt: float
+    drawing: Drawing
 
     @classmethod
     def of(cls, model: pin.Model, tolerance: float = UR.table_tolerance) -> Self | None:
         """Geometry of a Pinocchio model with a frame `flange`; None if the table does not
-        describe the model.
+        describe the model in any convention.
 
         Args:
             model: Pinocchio model.
@@ -86,37 +102,36 @@ class URGeometry:
         """
         if model.nq != 6:
             return None
-        flange, data = model.getFrameId("flange"), model.createData()
-        pin.framesForwardKinematics(model, data, np.zeros(6))
-        elbow, wrist_1, wrist_2 = (data.oMi[j].translation for j in (3, 4, 5))
-        end = data.oMf[flange].translation
-        # At zero the arm lies along x, and the second axis along -y.
-        d1, d4 = float(elbow[2]), -float(wrist_2[1])
-        form = cls(
-            d1=d1,
-            a2=float(elbow[0]),
-            a3=float(wrist_1[0] - elbow[0]),
-            d4=d4,
-            d5=d1 - float(end[2]),
-            d6=-float(end[1]) - d4,
-        )
-        return form if form._describes(model, data, flange, tolerance) else None
+        chain = Chain.of(model)
+        lengths = drawn_lengths(JointAxes.of(chain))
+        if lengths is None:
+            return None
+        form = cls(**vars(lengths))
+        form = replace(form, drawing=form._with_flange(chain))
+        return form if form._describes(chain, tolerance) else None
 
-    def _describes(self, model: pin.Model, data: pin.Data, flange: int, tolerance: float) -> bool:
-        """Whether the table gives the forward kinematics of the model, at configurations in general
+    def _with_flange(self, chain: Chain) -> Drawing:
+        """The drawing with the flange frame of the table."""
+        drawing, q = self.drawing, np.zeros(6)
+        T = drawing.T_form_base @ chain.flange(q[None])[0]
+        T_flange_form = without_rounding(np.linalg.inv(T) @ self._forward(drawing.form(q)))
+        return replace(drawing, T_flange_form=T_flange_form)
+
+    def _describes(self, chain: Chain, tolerance: float) -> bool:
+        """Whether the table gives the forward kinematics of the chain, at configurations in general
         position.
         """
-        for q in np.random.default_rng(0).uniform(-pi, pi, (4, 6)):
-            pin.framesForwardKinematics(model, data, q)
-            if np.abs(data.oMf[flange].homogeneous - self._forward(q)).max() > tolerance:
-                return False
-        return True
+        q = np.random.default_rng(0).uniform(-pi, pi, (4, 6))
+        table = np.array([self._forward(each) for each in self.drawing.form(q)])
+        return bool(np.abs(self.drawing.pose(chain.flange(q)) - table).max() <= tolerance)
 
     def _forward(self, q: Array) -> Array:
-        a, d = (0, self.a2, self.a3, 0, 0, 0), (self.d1, 0, 0, self.d4, self.d5, self.d6)
+        a4, d5 = self.d5 * sin(self.tilt), self.d5 * cos(self.tilt)
+        a, d = (self.a1, self.a2, self.a3, a4, 0, 0), (self.d1, 0, 0, self.d4, d5, self.d6)
         T = np.eye(4)
         twists = (0, 1), (1, 0), (1, 0), (0, 1), (0, -1), (1, 0)  # cos and sin of alpha
-        for theta, length, offset, (ca, sa) in zip(q, a, d, twists, strict=True):
+        tilts = 0.0, 0.0, 0.0, self.tilt, 0.0, 0.0
+        for theta, length, offset, (ca, sa) in zip(q - tilts, a, d, twists, strict=True):
             c, s = cos(theta), sin(theta)
             T = T @ np.array(
                 [
@@ -128,6 +143,13 @@ class URGeometry:
             )
         return T
 
+    def tilted(self, along: Any, above: Any) -> tuple[Any, Any]:
+        """Direction in the arm's plane from the fourth axis to the sixth, for that of the fifth
+        axis.
+        """
+        c, s = cos(self.tilt), sin(self.tilt)
+        return c * along - s * above, c * above + s * along
+
     @property
     def reach(self) -> tuple[float, float]:
         """Smallest and largest distance [m] from the second axis to the fourth."""
@@ -135,7 +157,8 @@ class URGeometry:
 
     def label(self, q: Array) -> Label:
         """Branch of a configuration (6,) [rad]; at a singularity, one of the meeting branches."""
-        return self.label_of(self.ahead(q), sin(q[2]), sin(q[4]))
+        q = self.drawing.form(q)
+        return self.label_of(self._ahead(q), sin(q[2]), sin(q[4]))
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """Singular parts of the label at a configuration (6,) [rad].
@@ -145,7 +168,8 @@ class URGeometry:
         reach · reach / (a2 a3)). Next to a stretched wrist the excess grows, since the fourth axis
         moves with the uncertain heading.
         """
-        ahead, sin_elbow, sin_wrist = abs(self.ahead(q)), abs(sin(q[2])), abs(sin(q[4]))
+        q = self.drawing.form(q)
+        ahead, sin_elbow, sin_wrist = abs(self._ahead(q)), abs(sin(q[2])), abs(sin(q[4]))
         excess = abs(self.d5) * heading_uncertainty(max(sin_wrist, UR.stretched), ahead)
         elbow = sqrt(2 * excess * self.reach[1] / abs(self.a2 * self.a3))
         near = {
@@ -157,21 +181,25 @@ class URGeometry:
 
     def ahead(self, q: Array) -> float:
         """Distance [m] of the last axis' origin ahead of the first axis at a configuration (6,)."""
-        return self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2]) + self.d5 * sin(q[1] + q[2] + q[3])
+        return self._ahead(self.drawing.form(q))
+
+    def _ahead(self, q: Array) -> float:
+        links = self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2])
+        return self.a1 + links + self.d5 * sin(q[1] + q[2] + q[3])
 
     def label_of(self, ahead: float, sin_elbow: float, sin_wrist: float) -> Label:
         """Label from the distance [m] of the last axis' origin ahead of the first axis, and from
         the sines of the third and fifth angles.
         """
         return Label(
-            shoulder="left" if ahead * self.d4 < 0 else "right",
-            elbow="up" if ahead * self.a2 * self.a3 * sin_elbow < 0 else "down",
+            shoulder="left" if ahead < 0 else "right",
+            elbow="up" if ahead * sin_elbow < 0 else "down",
             wrist="no_flip" if sin_wrist < 0 else "flip",
         )
 
     def shoulders(self, T: Array) -> list[tuple[float, float]]:
-        """First angles [rad], each with the distance [m] of the last axis' origin ahead of the
-        first axis.
+        """First angles [rad] of the table's flange pose T (4, 4), each with the distance [m] of the
+        last axis' origin ahead of the first axis.
         """
         x, y = float(T[0, 3] - self.d6 * T[0, 2]), float(T[1, 3] - self.d6 * T[1, 2])
         distance = hypot(x, y)

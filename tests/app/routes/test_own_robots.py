@@ -232,3 +232,22 @@ def test_a_robot_of_seven_joints_keeps_its_shape(client: TestClient) -> None:
     }
     assert client.post("/optimize", json=move).json()["status"] == "optimal"
     client.delete("/robots/seven")
+
+
+def test_all_problems_of_a_urdf_are_in_one_answer(client: TestClient) -> None:
+    urdf = ARM["urdf"].replace('effort="60"', "").replace('<mass value="2"/>', '<mass value="0"/>')
+    answer = client.put("/robots/wrong", json={**ARM, "urdf": urdf})
+    errors = refused(answer, InvalidRequest)["errors"]
+    assert [each["loc"] for each in errors] == [["body", "urdf"], ["body", "torque"]]
+    assert "'forearm'" in errors[0]["msg"] and "'shoulder'" in errors[1]["msg"]
+
+
+def test_doubts_about_a_urdf_are_kept_with_the_robot(client: TestClient) -> None:
+    urdf = ARM["urdf"].replace('effort="40"', 'effort="1"').replace('"60"', '"2000"')
+    made = client.put("/robots/doubtful", json={**ARM, "urdf": urdf, "locked": "others"})
+    assert made.status_code == 201
+    kept = client.get("/robots/doubtful").json()["warnings"]
+    assert kept == made.json()["warnings"]
+    for words in ("'elbow' cannot hold", "'shoulder' has a torque limit of 2000"):
+        assert any(words in each for each in kept)
+    client.delete("/robots/doubtful")

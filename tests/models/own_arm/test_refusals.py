@@ -40,7 +40,7 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "is not XML", {"urdf": "<robot"}),
     ("urdf", "root element", {"urdf": "<sdf/>"}),
     ("urdf", "no <link>", {"urdf": "<robot/>"}),
-    ("urdf", "xacro", change("<link name=", "<xacro:macro/><link name=")),
+    ("urdf", "xacro", change("<link name=", "<xacro:insert_block/><link name=")),
     ("urdf", "xacro", change('"0.25 0 0"', '"${length} 0 0"')),
     ("urdf", "document type", {"urdf": '<!DOCTYPE r [<!ENTITY a "b">]>' + RICH}),
     ("tip", "no link 'nowhere'", {"tip": "nowhere"}),
@@ -100,7 +100,11 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("drives.viscous", "0, or from 1e-06", {"drives": Drives(viscous=-1.0)}),
     ("urdf", "are its units SI", change('<mass value="2.5"/>', '<mass value="2.5e300"/>')),
     ("urdf", "are its units SI", change('<origin xyz="0.25 0 0"/>', '<origin xyz="250 0 0"/>')),
-    ("urdf", "within 100 rad", change('lower="-2" upper="2.5"', 'lower="-180" upper="180"')),
+    (
+        "urdf",
+        "'elbow' has a position limit of 180 rad",
+        change('lower="-2" upper="2.5"', 'lower="-180" upper="180"'),
+    ),
     ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
     ("urdf", "`iyz` that is no finite number", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
     (

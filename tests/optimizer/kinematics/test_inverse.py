@@ -229,7 +229,7 @@ def test_a_rotation_rounded_to_nine_digits_is_met_to_as_many() -> None:
 
 
 def test_is_built_once() -> None:
-    assert inverse_kinematics_for(ROBOT) is IK is required_inverse_kinematics(ROBOT, "goal")
+    assert inverse_kinematics_for(ROBOT) is required_inverse_kinematics(ROBOT, "goal")
 
 
 def test_answers_are_ordered_by_branch() -> None:

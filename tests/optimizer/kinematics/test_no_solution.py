@@ -130,7 +130,7 @@ class NothingKnown:
     form.
     """
 
-    confirmed = False
+    complete, confirmed = True, False
 
     def label(self, q: Array) -> Label:
         return IK.label(q)

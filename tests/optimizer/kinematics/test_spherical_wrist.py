@@ -79,7 +79,7 @@ def test_regular_poses_have_the_same_solutions_by_the_general_method(
     poses = [flange(KUKA, q) for q in starts]
     form = DecomposedArm.of(KUKA.model) or pytest.fail("the arm has a decomposition")
     short = [form.solve(T) for T in poses]
-    assert [form._regular(form._rows(T), T) is not None for T in poses].count(True) >= (
+    assert [form._regular(form._simple.rows(T), T) is not None for T in poses].count(True) >= (
         15 if off > 1e-4 else 0
     )
     monkeypatch.setattr(DecomposedArm, "_regular", lambda *_: None)

@@ -1,0 +1,98 @@
+"""The same arm, drawn in other conventions or with rounded figures, has the same answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from joulepath import Arm, Pose, Problem, optimize
+from joulepath.models.own_arm.description import Description
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.robot import Robot
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from tests.models.own_arm.arms import AMPLE, robot
+from tests.models.own_arm.drawings import Convention, any_convention, drawn, right_angled
+from tests.optimizer.kinematics.six_joints import KUKA, UR5E, flange
+from tests.selection import long_but
+
+# relative, of energy and bound
+SAME = 1e-4
+START, MOVE = [0.2, -1.2, 1.0, 0.3, 0.9, 0.3], [0.9, 0.3, -0.4, 0.5, 0.4, 0.3]
+AS_GIVEN = Convention(np.ones(6), np.zeros(6), np.tile(np.eye(3), (7, 1, 1)))
+
+
+def described(urdf: str) -> Description:
+    return Description(urdf=urdf, tip="link_7", acceleration=8.0, payload=2.0)
+
+
+def answered(arm: Robot, convention: Convention) -> tuple[str, float, float]:
+    """Status, energy and bound [J] of a motion from joint positions to a pose."""
+    start = np.array(START)
+    made = robot(described(drawn(arm, convention)))
+    problem = Problem(
+        arm=Arm(robot=made),
+        start=convention.file(start),
+        goal=Pose(flange(arm, start + np.array(MOVE))),
+        deadline=AMPLE,
+    )
+    found = optimize(problem)
+    assert found.certificate.valid and found.complete
+    return found.status, found.energy.electrical.total, found.lower_bound
+
+
+@pytest.mark.parametrize("count", long_but((5,), (5, 50)))
+@pytest.mark.parametrize("arm", long_but([UR5E], [UR5E, KUKA]), ids=lambda each: each.name)
+def test_a_motion_costs_the_same_in_every_drawing(arm: Robot, count: int) -> None:
+    rng = np.random.default_rng(21)
+    status, energy, bound = answered(arm, AS_GIVEN)
+    assert status == "optimal"
+    for _ in range(count):
+        again = answered(arm, any_convention(6, rng))
+        assert again[0] == status
+        assert again[1:] == pytest.approx((energy, bound), rel=SAME)
+
+
+@pytest.mark.parametrize("arm", [UR5E, KUKA], ids=lambda each: each.name)
+@pytest.mark.parametrize("figure", [repr, "{:.9f}".format, "{:.4f}".format, "{:.3f}".format])
+def test_rounded_figures_are_the_arm_that_they_stand_for(
+    arm: Robot, figure: Callable[[float], str]
+) -> None:
+    rng = np.random.default_rng(22)
+    for _ in range(6):
+        convention = right_angled(6, rng)
+        made = robot(described(drawn(arm, convention, figure)))
+        assert required_inverse_kinematics(made, "goal").complete
+        q = rng.uniform(-2, 2, 6)
+        assert flange(made, convention.file(q)) == pytest.approx(flange(arm, q), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("written", "quarter"),
+    [("1.571", 1), ("-1.5707", -1), ("3.1416", 2), ("3.14159", 2), ("4.712", 3), ("1.5707963", 1)],
+)
+def test_a_quarter_turn_is_taken_as_meant(written: str, quarter: int) -> None:
+    exact = robot(described(_first_turned(repr(quarter * np.pi / 2))))
+    rounded = robot(described(_first_turned(written)))
+    q = np.linspace(-1, 1, 6)
+    assert flange(rounded, q) == pytest.approx(flange(exact, q), abs=1e-14)
+
+
+@pytest.mark.parametrize("written", ["1.5709", "1.57", "0.001", "1.5702", "3.14"])
+def test_another_angle_stays_as_it_is(written: str) -> None:
+    turned = robot(described(_first_turned(written)))
+    straight = robot(described(_first_turned("0")))
+    T = flange(turned, np.zeros(6)) @ np.linalg.inv(flange(straight, np.zeros(6)))
+    assert np.arctan2(T[1, 0], T[0, 0]) == pytest.approx(float(written), abs=1e-12)
+
+
+def test_the_description_says_which_angles_were_rounded() -> None:
+    for written, told in (("1.571", True), ("1.5707963", False), ("0.3", False)):
+        warnings = own_figures("mine", described(_first_turned(written)))[1]
+        assert any("written with few decimals" in each for each in warnings) == told
+
+
+def _first_turned(yaw: str) -> str:
+    """UR5e on a base turned about the vertical by a written angle."""
+    return drawn(UR5E, AS_GIVEN).replace('rpy="0.0 -0.0 0.0"', f'rpy="0 0 {yaw}"', 1)

@@ -1,0 +1,115 @@
+"""What a URDF may lack or have beside an arm, and all of its problems in one answer."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.models.own_arm.description import Description, InvalidArm
+from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.mesh_files import corners
+from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, robot
+from tests.optimizer.kinematics.six_joints import flange
+
+FINGERS = """
+  <joint name="finger" type="prismatic"><parent link="tool"/><child link="left"/><axis xyz="0 1 0"/>
+    <limit lower="0.01" upper="0.04" effort="20" velocity="0.1"/></joint>
+  <link name="left"><inertial><mass value="0.1"/>
+    <inertia ixx="1e-5" ixy="0" ixz="0" iyy="1e-5" iyz="0" izz="1e-5"/></inertial></link>
+  <joint name="opposite" type="prismatic"><parent link="tool"/><child link="right"/>
+    <axis xyz="0 -1 0"/><mimic joint="finger"/>
+    <limit lower="0" upper="0.04" effort="20" velocity="0.1"/></joint>
+  <link name="right"/>
+</robot>"""
+GRIPPING = replace(PLAIN, urdf=PLAIN.urdf.replace("</robot>", FINGERS))
+BROKEN = (
+    PLAIN.urdf.replace('lower="-2" upper="2"', 'lower="2" upper="2"')
+    .replace('lower="-2.5" ', "")
+    .replace('<mass value="2"/>', "")
+)
+
+
+@pytest.mark.parametrize(
+    "opening",
+    [
+        "<robot>",
+        '<robot name="">',
+        '<robot name="example" xmlns="http://www.ros.org">',
+        '<robot name="example" xmlns:xacro="http://ros.org/wiki/xacro">'
+        '<xacro:property name="length" value="0.4"/><xacro:arg name="side" default="left"/>',
+        '<robot name="example"><xacro:macro name="link"><link name="${name}"/></xacro:macro>',
+    ],
+)
+def test_the_arm_is_the_same_without_a_name_and_with_unused_xacro(opening: str) -> None:
+    given = replace(PLAIN, urdf=PLAIN.urdf.replace('<robot name="example">', opening))
+    assert given.urdf != PLAIN.urdf
+    q = np.array([0.3, -0.7])
+    assert (flange(robot(given), q) == flange(robot(PLAIN), q)).all()
+
+
+@pytest.mark.parametrize("used", ["${length}", "$(find arm)"])
+def test_xacro_in_use_is_refused(used: str) -> None:
+    urdf = PLAIN.urdf.replace('xyz="0 0 0.4"', f'xyz="0 0 {used}"')
+    with pytest.raises(InvalidArm, match="This is xacro"):
+        own_figures("mine", replace(PLAIN, urdf=urdf))
+
+
+def test_all_others_are_held_in_one_go() -> None:
+    """At zero, or at the limit nearest to it."""
+    by_name = replace(GRIPPING, locked={"finger": 0.01, "opposite": 0.0})
+    others = replace(GRIPPING, locked="others")
+    assert own_figures("mine", others) == own_figures("mine", by_name)
+    assert own_figures("mine", others)[0] != own_figures("mine", PLAIN)[0]
+
+
+def test_the_refusal_names_all_loose_joints_and_how_to_hold_them() -> None:
+    with pytest.raises(InvalidArm, match=r"finger, opposite\. Give.*\"others\"") as caught:
+        own_figures("mine", GRIPPING)
+    assert caught.value.field == "locked"
+
+
+def test_a_moving_joint_of_the_chain_is_no_other() -> None:
+    """A prismatic joint between base and tip is refused all the same."""
+    with pytest.raises(InvalidArm, match="'finger' is prismatic"):
+        own_figures("mine", replace(RICH_ARM, tip="finger", locked="others"))
+
+
+def test_all_problems_of_a_file_are_in_one_answer() -> None:
+    with pytest.raises(InvalidArm) as caught:
+        own_figures("mine", replace(PLAIN, urdf=BROKEN))
+    told = [message for _, message in caught.value.problems]
+    assert len(told) == 3
+    for message, words in zip(
+        told,
+        ("'shoulder' cannot move", "'elbow' has no <limit>", "'forearm' has a <mass>"),
+        strict=True,
+    ):
+        assert words in message and message in str(caught.value)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert again.problems == caught.value.problems and str(again) == str(caught.value)
+
+
+def test_all_problems_of_the_figures_are_in_one_answer() -> None:
+    urdf = PLAIN.urdf.replace('effort="60"', "").replace('velocity="3" effort="40"', "")
+    urdf = urdf.replace('<mass value="2"/>', '<mass value="0"/>')
+    with pytest.raises(InvalidArm) as caught:
+        own_figures("mine", replace(PLAIN, urdf=urdf, payload=-1.0, acceleration=-1.0))
+    fields = [field for field, _ in caught.value.problems]
+    assert fields == ["urdf", "acceleration", "velocity", "torque", "torque", "payload"]
+
+
+@pytest.mark.parametrize("description", [PLAIN, RICH_ARM, replace(GRIPPING, locked="others")])
+def test_a_plain_description_has_no_problem(description: Description) -> None:
+    assert own_figures("mine", description)[0]["kinematics"]
+
+
+def test_a_mesh_of_a_package_is_found_by_the_end_of_its_path() -> None:
+    square = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+    meshes = {"arm/meshes/link.obj": square, "arm/meshes/other.obj": square + b"\n"}
+    for reference in ("package://arm/meshes/link.obj", "file:///opt/ros/arm/meshes/link.obj"):
+        found = corners(meshes, reference)
+        assert found is not None and found.shape == (4, 3)
+    assert RICH.count("<mesh") == 1

@@ -1,0 +1,94 @@
+"""No pose made by forward kinematics is refused, whatever the axes of the arm and its drawing."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.inverse import (
+    inverse_kinematics_for,
+    required_inverse_kinematics,
+)
+from joulepath.optimizer.kinematics.six.simple_arm import SimpleArm
+from tests.optimizer.kinematics.axis_patterns import (
+    RELATIONS,
+    Relation,
+    is_degenerate,
+    random_axes,
+    redrawn,
+    robot_of,
+)
+from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, solved
+from tests.selection import long_but
+
+# a cache full of these arms would drop those of other tests
+uncached = inverse_kinematics_for.__wrapped__
+PATTERNS = list(product(RELATIONS, repeat=5))
+# arms whose configurations the closed form of three parallel or meeting axes finds
+TRIOS: list[tuple[Relation, ...]] = [
+    ("square", "opposed", "opposed", "square", "square"),
+    ("square meeting", "parallel", "opposed", "square meeting", "square meeting"),
+    ("opposed", "square", "parallel", "parallel", "square"),
+    ("oblique", "parallel", "opposed", "oblique", "opposed"),
+    ("square meeting", "opposed", "square", "square meeting", "same centre"),
+]
+
+
+@pytest.mark.parametrize("count", long_but((200,), (200, 10_000)))
+def test_no_pose_of_any_pattern_is_refused(count: int) -> None:
+    rng, refused = np.random.default_rng(51), []
+    tried = 0
+    while tried < count:
+        pattern = PATTERNS[rng.integers(len(PATTERNS))]
+        axes = redrawn(random_axes(pattern, rng), rng)[0]
+        if is_degenerate(axes, rng):
+            continue
+        tried += 1
+        robot = robot_of(axes)
+        T = flange(robot, rng.uniform(-np.pi, np.pi, 6))
+        try:
+            kinematics = uncached(robot)
+            assert kinematics is not None
+            found = kinematics.solve(T, windings=False)
+            assert max(np.abs(flange(robot, each.q) - T).max() for each in found) < ACCURACY
+        except (SingularPose, NoConfigurationFound) as error:
+            refused.append((pattern, str(error)))
+    assert not refused
+
+
+@pytest.mark.parametrize("pattern", TRIOS)
+def test_a_closed_form_finds_the_configuration_in_any_drawing(
+    pattern: tuple[Relation, ...],
+) -> None:
+    rng = np.random.default_rng(7)
+    axes = random_axes(pattern, rng)
+    for _ in range(6):
+        other = redrawn(axes, rng)[0]
+        assert SimpleArm.of(other.simplified()) is not None
+        found = solved(robot_of(other), rng.uniform(-np.pi, np.pi, 6))
+        assert found.away < FOUND and found.error < ACCURACY
+
+
+def test_a_redrawn_arm_moves_alike() -> None:
+    rng = np.random.default_rng(3)
+    axes = random_axes(TRIOS[0], rng)
+    other, senses, zeros = redrawn(axes, rng)
+    q = rng.uniform(-np.pi, np.pi, (8, 6))
+    assert np.abs(axes.chain().flange(q) - other.chain().flange(senses * q + zeros)).max() < 1e-12
+
+
+def test_nothing_found_does_not_claim_the_pose_out_of_reach() -> None:
+    """At nearly the length of all links together, without a proof that they do not reach so far."""
+    rng = np.random.default_rng(5)
+    robot = robot_of(random_axes(("square", "oblique", "square", "oblique", "square"), rng))
+    kinematics, chain = required_inverse_kinematics(robot, "goal"), Chain.of(robot.model)
+    T = np.eye(4)
+    T[:3, 3] = chain.placements[0, :3, 3] + np.array([0.0, 0.0, 0.99 * chain.length])
+    with pytest.raises(NoConfigurationFound, match="not prove the pose out of reach") as caught:
+        kinematics.solve(T, target="start")
+    assert caught.value.target == "start" and not caught.value.within_limits
+    assert not kinematics.complete
