@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 from joulepath.optimizer.dynamics.plant import has_corners
 from joulepath.optimizer.motion.seven_segment import shortest_duration
@@ -14,6 +15,8 @@ from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import DURATION_TOLERANCE, SearchState
 from joulepath.optimizer.search.switch_knots import follow_switches
 from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE
+from joulepath.optimizer.solve.methods.method import Method, above
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
 
@@ -30,6 +33,29 @@ class RefinementSettings:
 
 
 REFINEMENT = RefinementSettings()
+
+
+@dataclass(frozen=True)
+class FastestStartSettings:
+    """Settings of the solves from the time-optimal motion of a candidate.
+
+    They cost as much as the refinement. Of 100 random requests, the conditions choose the few in
+    which these solves saved 0.05 % or more.
+    """
+
+    held_back: float = 1.5
+    """Ratio of the duration to the shortest duration of the joints above which path constraints
+    that are active hold the motion back. Its jerk then switches elsewhere than in the first solve,
+    and the local optima differ by up to 0.5 %. Below, the solves gained nothing."""
+    active: float = 0.98
+    """Ratio of a path constraint to its limit above which the constraint is active."""
+    broken_promise: float = 1e-3
+    """Excess of the cost of a nearly fastest motion over its cost in the NLP, as a share, above
+    which the solve ended too early. The quadrature of the NLP is more accurate with knots at the
+    jumps of jerk, where those of the time-optimal motion are."""
+
+
+FASTEST_START = FastestStartSettings()
 
 
 def refine(state: SearchState, candidate: Candidate) -> None:
@@ -49,6 +75,7 @@ def refine(state: SearchState, candidate: Candidate) -> None:
             improve(state, candidate, lambda solver: solver.refined(coarse, fine=False))
     if method.may_grade(candidate.spline) and not deadline.passed:
         solve_from(state, candidate, sampled(candidate.spline), fine=True)
+    start_from_fastest(state, candidate)
     if not method.guess_baselines:
         return
     if state.uses_storage:
@@ -66,6 +93,58 @@ def refine(state: SearchState, candidate: Candidate) -> None:
         # `lasting` rounds otherwise, which leads the objective to other local optima
         slower = retimed(spline, longest / spline.duration)
         solve_from(state, candidate, sampled(slower), fine=False, duration=longest)
+
+
+def start_from_fastest(
+    state: SearchState, candidate: Candidate, settings: FastestStartSettings = FASTEST_START
+) -> None:
+    """Improve a candidate by solves from its time-optimal motion, where these may find less.
+
+    The first solve starts from a smoothed time-optimal motion on few control points, and the
+    refinement stays near the optimum that it leads to.
+
+    Args:
+        state: state of the search.
+        candidate: the solved candidate.
+        settings: settings of the choice.
+    """
+    problem = state.problem
+    if has_corners(problem.objective, problem.arm) or state.uses_storage:
+        return
+    durations: tuple[float, ...] = ()
+    if _is_held_back(state, candidate, settings):
+        durations = (0.0, candidate.spline.duration)
+    elif lasts_below(SPLINE_SPACES.tight, state, candidate) and _costs_more_than_promised(
+        state, candidate, settings
+    ):
+        durations = (0.0,)
+    for duration in durations:
+        if not state.deadline.passed:
+            improve(state, candidate, partial(_solve_from_fastest, duration))
+
+
+def _solve_from_fastest(duration: float, solver: Method) -> SolveResult:
+    return solver.solve_from_fastest(duration)
+
+
+def _is_held_back(state: SearchState, candidate: Candidate, settings: FastestStartSettings) -> bool:
+    """Whether path constraints make a motion much slower than the limits of its joints."""
+    path, spline = state.prepared.path, candidate.spline
+    if path is None or lasts_below(settings.held_back, state, candidate):
+        return False
+    q, t = sampled(spline)
+    return bool(path.ratios(q, spline.curve(t, 1)).max() > settings.active)
+
+
+def _costs_more_than_promised(
+    state: SearchState, candidate: Candidate, settings: FastestStartSettings
+) -> bool:
+    """Whether a motion costs more than in the NLP of its solve."""
+    promised = None if candidate.attempt is None else candidate.attempt.promised_cost
+    if promised is None:
+        return False
+    cost = state.prepared.cost_of(candidate.spline)
+    return cost > above(promised, 1 + settings.broken_promise)
 
 
 @dataclass(frozen=True)

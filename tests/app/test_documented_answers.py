@@ -33,7 +33,7 @@ SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
     ("docs/collisions.md", r"The motion needs ([\d.]+) J", "optimize/bin_to_shelf", {}, TOTAL),
     (
         "docs/collisions.md",
-        r"it\nneeds ([\d.]+) J",
+        r"it needs ([\d.]+) J",
         "optimize/bin_to_shelf",
         {"collisions": False},
         TOTAL,
@@ -73,7 +73,7 @@ SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
 ]
 SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
     ("docs/paths.md", r"a seam of 0.4 m needs ([\d.]+) J", "optimize/seam_any_turn", {}, TOTAL),
-    ("docs/cycles.md", r"along lines: the cycle needs\n([\d.]+) J", "cycle/round_parts", {}, TOTAL),
+    ("docs/cycles.md", r"along lines: the cycle needs ([\d.]+) J", "cycle/round_parts", {}, TOTAL),
     (
         "docs/cycles.md",
         r"a seam of 0.4 m: the cycle needs ([\d.]+) J",
@@ -97,8 +97,8 @@ def answer_to(server: Server, request: str, changes: dict[str, Any]) -> dict[str
 
 
 def stated(page: str, pattern: str) -> float:
-    """The only number on a page that a pattern finds."""
-    (number,) = re.findall(pattern, (ROOT / page).read_text())
+    """The only number on a page that a pattern finds, wherever its lines break."""
+    (number,) = re.findall(pattern.replace(" ", r"\s+"), (ROOT / page).read_text())
     return float(number)
 
 

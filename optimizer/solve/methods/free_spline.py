@@ -232,15 +232,29 @@ class FreeSpline(SplineMethod):
                 break
         return with_effort(tried[-1], tried)
 
-    def time_optimal_guess(self) -> Guess:
-        """The time-optimal motion under limits on rates, with knots at its jumps of jerk."""
-        line = self.coordinates
+    def solve_from_fastest(self, duration: float) -> SolveResult:
+        """Solve from the time-optimal motion, slowed down to a duration [s]; 0 for the motion
+        itself.
+
+        At the knots of a slowed motion the slope of jerk may jump, but not jerk itself: its jerk
+        need not switch there.
+        """
+        return self.improve(self.time_optimal_guess(duration))
+
+    def time_optimal_guess(self, duration: float = 0.0) -> Guess:
+        """The time-optimal motion under limits on rates, with knots at its jumps of jerk.
+
+        Args:
+            duration: duration to which the motion is slowed down [s].
+        """
+        line, settings = self.coordinates, SPLINE_SPACES
         fastest = time_optimal(line.limits, line.start, line.goal)
-        duration = max(fastest.duration, DURATIONS.least)
-        space = self.spaces.at_switches(duration, SPLINE_SPACES.exact_multiplicity)
-        return Guess(
-            space, space.fit(fastest.q, fastest.t / duration), duration, progress=self._progress
-        )
+        least = max(fastest.duration, DURATIONS.least)
+        is_slowed = duration > least
+        multiplicity = settings.refined_multiplicity if is_slowed else settings.exact_multiplicity
+        space = self.spaces.at_switches(max(duration, least), multiplicity)
+        points = space.fit(fastest.q, fastest.t / least)
+        return Guess(space, points, max(duration, least), progress=self._progress)
 
 
 def _is_lost(tried: list[SolveResult]) -> bool:

@@ -115,6 +115,14 @@ class Method(ABC):
         """
         return SolveResult(SolveStatus.FAILED, SolveReason.NO_INITIAL_GUESS)
 
+    def solve_from_fastest(self, duration: float) -> SolveResult:
+        """Solve from the time-optimal motion under limits on rates, slowed down to a duration [s].
+
+        Args:
+            duration: duration of the slowed motion [s]; 0 for the time-optimal motion itself.
+        """
+        return SolveResult(SolveStatus.FAILED, SolveReason.NO_INITIAL_GUESS)
+
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
         """Solve from samples of a motion, with control points evenly spaced in time.
 

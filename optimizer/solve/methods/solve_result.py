@@ -141,6 +141,9 @@ class SolveResult:
     stationarity: float | None = None
     """Stationarity of the NLP where its solver ended; None without an NLP."""
 
+    promised_cost: float | None = None
+    """Cost of the motion in the NLP where its solver ended [J]; None without an NLP."""
+
     collision: Clearance | None = None
     """The clearance that the best motion found violates; None if it violates none."""
 

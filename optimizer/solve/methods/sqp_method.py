@@ -114,6 +114,7 @@ class SqpMethod(StagedMethod):
                     solves,
                     check.spline,
                     result.stationarity,
+                    promised_cost=result.cost,
                     cut_short=late,
                     unobstructed_cost=unobstructed_cost,
                 )
