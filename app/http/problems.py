@@ -9,7 +9,7 @@ from typing import Any, Literal
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field, ValidationError, create_model
 
-from joulepath.app.answers.declared import model_of, shown_fields
+from joulepath.app.answers.declared import model_of
 from joulepath.app.convert.fields import location
 from joulepath.app.exceptions import access, base, queue, report, stored, transport
 from joulepath.app.exceptions.base import FieldError, InternalError, InvalidRequest
@@ -23,6 +23,7 @@ from joulepath.optimizer.excitation import errors as excitation
 from joulepath.optimizer.export import errors as exports
 from joulepath.optimizer.identify import errors as identification
 from joulepath.optimizer.identify.logs import log_errors as logs
+from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.search import errors as search
 
 PREFIX = "/problems/"

@@ -24,8 +24,9 @@ from joulepath.optimizer.dynamics.interval import Known, saving_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import is_given_order_allowed
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
-from joulepath.optimizer.result.solution import Baseline, Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import baselines, nearest, saving
 
 

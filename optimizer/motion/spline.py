@@ -14,6 +14,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Axes, Count, Unit
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.quadrature import quadrature
+from joulepath.optimizer.presentation.equality import Comparable
 
 # quadrature panels: their greatest length [s], and their least and greatest number unless knot
 # spans ask for more
@@ -24,8 +25,8 @@ RATE_POINTS = 33
 FIT_SAMPLES = 201
 
 
-@dataclass(frozen=True)
-class Spline:
+@dataclass(frozen=True, eq=False)
+class Spline(Comparable):
     """Clamped B-spline of the joint positions over time."""
 
     degree: Count
@@ -34,6 +35,13 @@ class Spline:
     """Knots."""
     control_points: Annotated[Array, Axes(("point", "joint")), Unit("rad")]
     """Control points, [point][joint]."""
+
+    def __repr__(self) -> str:
+        points, joints = self.control_points.shape
+        return (
+            f"Spline({joints} joints, {self.duration:.4g} s, degree {self.degree}, "
+            f"{points} control points)"
+        )
 
     @property
     def duration(self) -> float:
