@@ -1,5 +1,7 @@
 __version__: str
 
+from .app.client import Client, ServiceUnreachable
+from .app.exceptions.base import InvalidRequest, ServiceError
 from .models.own_arm.description import InvalidArm
 from .models.registry import load_robot, robot_names
 from .models.robot import Limits, Robot
@@ -154,6 +156,7 @@ __all__ = [
     "Capsule",
     "Certificate",
     "Clearance",
+    "Client",
     "ClosestPair",
     "Compared",
     "Comparison",
@@ -196,6 +199,7 @@ __all__ = [
     "InvalidArm",
     "InvalidFigures",
     "InvalidProblem",
+    "InvalidRequest",
     "InvalidTable",
     "Inverter",
     "JointEnergy",
@@ -253,6 +257,8 @@ __all__ = [
     "SavingInterval",
     "SavingRange",
     "Scene",
+    "ServiceError",
+    "ServiceUnreachable",
     "SimulatedSaving",
     "SingularPose",
     "Solution",

@@ -132,7 +132,7 @@ def _dataclass(hint: Any, data: dict[str, Any]) -> Any:
     return kind(**{field: read(hints[field], each) for field, each in data.items()})
 
 
-def _with_subclasses(kind: type) -> Iterator[type]:
+def _with_subclasses(kind: type[Any]) -> Iterator[type[Any]]:
     yield kind
     for each in kind.__subclasses__():
         yield from _with_subclasses(each)
