@@ -17,19 +17,21 @@ RUN python3 -m venv venv \
         -r /tmp/${LOCK} \
     && pip uninstall --yes --quiet pip setuptools \
     && python /tmp/slim.py venv
-# The libraries of the studio page, by an npm that stays in this step.
-COPY requirements-node.lock scripts/vendor_studio.py /tmp/studio/scripts/
-COPY app/static/studio/package.json app/static/studio/package-lock.json /tmp/studio/joulepath/app/static/studio/
+# The studio page, by a Node that stays in this step.
+COPY requirements-node.lock scripts/build_studio.py /tmp/studio/scripts/
+COPY app/studio /tmp/studio/joulepath/app/studio
 RUN mv /tmp/studio/scripts/requirements-node.lock /tmp/studio/ \
     && python3 -m venv /tmp/node && PATH=/tmp/node/bin:$PATH \
-    && python /tmp/studio/scripts/vendor_studio.py && rm -rf /tmp/node
+    && python /tmp/studio/scripts/build_studio.py \
+    && rm -rf /tmp/node /tmp/studio/joulepath/app/studio
 COPY LICENSE ./
 COPY joulepath joulepath
 COPY models models
 COPY optimizer optimizer
 COPY app app
+RUN rm -rf app/studio app/static/studio
 COPY examples app/static/examples
-RUN mv /tmp/studio/joulepath/app/static/studio/vendor app/static/studio/
+RUN mv /tmp/studio/joulepath/app/static/studio app/static/
 ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 # Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
 COPY scripts/import_all.py /tmp/

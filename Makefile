@@ -16,6 +16,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 INSTALL := $(PY) scripts/install.py
 STUDIO := app/static/studio
+STUDIO_SOURCES := $(shell find app/studio -type f -not -path '*/node_modules/*' -not -path '*/.node/*')
 NATIVE := optimizer/native/libjoulepath.so.1
 SOURCES := app optimizer models tests benchmarks examples scripts
 
@@ -29,7 +30,7 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-.PHONY: serve test test-long bench lock clean ready lint mypy style kernels pytest pytest-long
+.PHONY: serve test test-long bench lock clean ready lint mypy style types kernels pytest pytest-long vitest
 
 serve: $(VENV)/.runtime $(VENV)/.package kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
@@ -42,11 +43,11 @@ ready: $(VENV)/.runtime $(NATIVE)
 # The linters come first: they find in a minute what the tests find later.
 test: ready
 	@$(MAKE) --no-print-directory --jobs=2 lint
-	@$(MAKE) --no-print-directory pytest
+	@$(MAKE) --no-print-directory vitest pytest
 
 test-long: ready
 	@$(MAKE) --no-print-directory --jobs=2 lint
-	@$(MAKE) --no-print-directory pytest-long
+	@$(MAKE) --no-print-directory vitest pytest-long
 
 # `worksteal`: a process that has run its share of the tests takes some of another one's.
 pytest:
@@ -56,7 +57,7 @@ pytest:
 pytest-long:
 	$(PY) -m pytest -n auto --dist worksteal -m "" $(PYTEST_ARGS)
 
-lint: mypy style
+lint: mypy style types
 
 mypy: $(VENV)/.dev
 	$(PY) -m mypy
@@ -65,6 +66,13 @@ style: $(VENV)/.dev
 	$(PY) -m ruff check $(SOURCES)
 	$(PY) -m ruff format --check $(SOURCES)
 	$(VENV)/bin/lint-imports --no-logo
+
+# The types of the studio page, and the tests of its state.
+types: $(PY)
+	$(PY) scripts/build_studio.py check
+
+vitest: $(PY)
+	$(PY) scripts/build_studio.py test
 
 bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
@@ -80,7 +88,7 @@ $(VENV)/.runtime: requirements.lock $(PY)
 	@touch $@
 
 # The package itself: `joulepath` and `import joulepath` work from any folder, with the sources of this one.
-$(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/vendor $(NATIVE)
+$(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/index.html $(NATIVE)
 	@$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
@@ -89,10 +97,10 @@ $(NATIVE): $(wildcard optimizer/native/*.c) optimizer/native/build.py | $(PY) $(
 	@echo "Compiling $@ ..."
 	@$(PY) optimizer/native/build.py
 
-# The libraries of the studio page.
-$(STUDIO)/vendor: $(STUDIO)/package-lock.json scripts/vendor_studio.py $(PY)
-	@echo "Fetching the libraries of the studio page into $@ ..."
-	@$(PY) scripts/vendor_studio.py
+# The studio page. Node comes as a package where the machine has none.
+$(STUDIO)/index.html: $(STUDIO_SOURCES) scripts/build_studio.py $(PY)
+	@echo "Building the studio page into $(STUDIO) ..."
+	@$(PY) scripts/build_studio.py
 	@touch $@
 
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
@@ -128,5 +136,5 @@ lock: $(VENV)/.dev
 	$(LOCK) --group node --output-file requirements-node.lock
 
 clean:
-	rm -rf $(VENV) $(NATIVE) $(STUDIO)/vendor build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(NATIVE) $(STUDIO) app/studio/node_modules app/studio/.node build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.planner.path_planner import Effort, plan_paths
 from joulepath.optimizer.collision.planner.state_validity import ValidityCheckers
@@ -113,7 +113,7 @@ def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:
 
 
 def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
-    """Configurations (nq,) [rad] of a TCP pose that keep all margins, and RESERVE beyond them."""
+    """Configurations (nq,) [rad] of a TCP pose with all margins and the reserve beyond them."""
     kinematics = required_inverse_kinematics(arm.robot, "goal")
     try:
         found = kinematics.solve(
@@ -122,7 +122,12 @@ def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
     except (UnreachablePose, SingularPose):
         return []
     # what a request may start or end at
-    return [each.q for each in found if model.least_distance(each.q[None], RESERVE) >= RESERVE]
+    return [
+        each.q
+        for each in found
+        if model.least_distance(each.q[None], CLEARANCE_CONSTRAINT.reserve)
+        >= CLEARANCE_CONSTRAINT.reserve
+    ]
 
 
 # obstacles, and where the TCP may start and end (4, 4)

@@ -30,7 +30,7 @@ from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
@@ -100,7 +100,7 @@ def refused(problem: Problem) -> DurationTooShort | None:
         )
     )
     try:
-        optimize(replace(problem, duration_max=max(least / 10, LEAST_DURATION)))
+        optimize(replace(problem, duration_max=max(least / 10, DURATIONS.least)))
     except DurationTooShort as error:
         return error
     except JoulepathError:

@@ -18,7 +18,7 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
@@ -72,7 +72,12 @@ def with_self_collision(seed: int, count: int) -> dict[str, Any]:
     model = CollisionModel(Arm(robot=load_robot("ur5e")))
     ratios, walls = [], []
     for move in moves(seed, count):
-        if model.least_distance(np.stack([move.q_start, move.q_goal]), RESERVE) <= RESERVE:
+        if (
+            model.least_distance(
+                np.stack([move.q_start, move.q_goal]), CLEARANCE_CONSTRAINT.reserve
+            )
+            <= CLEARANCE_CONSTRAINT.reserve
+        ):
             continue
         without, with_links = (
             solve(move, "bspline", collisions)[0] for collisions in (False, True)

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import Arm
 
@@ -89,7 +89,10 @@ def collision_free(rng: np.random.Generator, robot: Robot) -> Array:
     model = CollisionModel(Arm(robot=robot))
     while True:
         q = rng.uniform(robot.limits.q_min, robot.limits.q_max)
-        if model.least_distance(q[None], RESERVE) > RESERVE:
+        if (
+            model.least_distance(q[None], CLEARANCE_CONSTRAINT.reserve)
+            > CLEARANCE_CONSTRAINT.reserve
+        ):
             return np.asarray(q)
 
 

@@ -26,6 +26,7 @@ from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import TOOL
+from joulepath.optimizer.problem.problem import Problem
 
 # Okabe and Ito's blue to orange, which colour-blind readers can tell apart
 OVER_TIME = LinearSegmentedColormap.from_list(
@@ -113,13 +114,11 @@ def shaded(polygons: list[Array], colour: str, alpha: float) -> list[tuple[float
     return colours
 
 
-def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float, float]) -> None:
-    """Solves the request and draws its motion into a file."""
-    problem = to_problem(request, request.deadline)
-    solution = optimize(problem)
-    spline = solution.trajectory.spline
-    model = CollisionModel(problem.arm)
-    frames = model.frames(spline.curve(np.linspace(0, spline.duration, instants)))
+def _surfaces(
+    problem: Problem, model: CollisionModel, frames: Array
+) -> tuple[list[Array], list[tuple[float, ...]]]:
+    """Polygons of the bodies at all instants, and their colours."""
+    instants = len(frames)
     polygons: list[Array] = []
     colours: list[tuple[float, ...]] = []
 
@@ -146,7 +145,17 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
                 "#333333" if body.name == TOOL and at_end else colour,
                 1 if at_end else 0.22,
             )
+    return polygons, colours
 
+
+def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float, float]) -> None:
+    """Solves the request and draws its motion into a file."""
+    problem = to_problem(request, request.deadline)
+    solution = optimize(problem)
+    spline = solution.trajectory.spline
+    model = CollisionModel(problem.arm)
+    frames = model.frames(spline.curve(np.linspace(0, spline.duration, instants)))
+    polygons, colours = _surfaces(problem, model, frames)
     figure = plt.figure(figsize=(9, 7.2))
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     for body in model.bodies:

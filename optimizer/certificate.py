@@ -35,7 +35,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Single, single
 from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
+from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
 from joulepath.optimizer.result.certificate import Certificate, EndError
 from joulepath.optimizer.result.energy import Energy
 
@@ -261,7 +261,7 @@ class _Replay:
         if path.fixed_speed is not None:
             off = speed - path.fixed_speed
             worst = float(np.where(beyond, np.abs(off), off).max()) + dip
-            return {"path_speed": worst / (SPEED_TOLERANCE * path.fixed_speed)}
+            return {"path_speed": worst / (TOOL_PATH.speed_tolerance * path.fixed_speed)}
         least = float(speed[beyond].min(initial=np.inf)) - dip
         return {"path_speed": path.least_speed / least if least > 0 else np.inf}
 

@@ -88,9 +88,8 @@ def pareto(
         JoulepathError: as `optimize`; InvalidProblem also for a fixed duration, or too many points.
     """
     if not PARETO.least_points <= points <= PARETO.most_points:
-        raise InvalidProblem(
-            "points", f"points must lie between {PARETO.least_points} and {PARETO.most_points}."
-        )
+        allowed = f"between {PARETO.least_points} and {PARETO.most_points}"
+        raise InvalidProblem("points", f"points must lie {allowed}.")
     if problem.duration_min is not None and problem.duration_min == problem.duration_max:
         raise InvalidProblem(
             "duration", "A front runs over durations: leave duration out or give a range."
@@ -296,10 +295,8 @@ class _Search:
         """Whether a node needs less energy than the answer of `optimize`, by more than the scatter
         of solves.
         """
-        return (
-            self.least.answer is None
-            or node.energy < self.least.energy - PARETO.same_energy * abs(self.least.energy)
-        )
+        scatter = PARETO.same_energy * abs(self.least.energy)
+        return self.least.answer is None or node.energy < self.least.energy - scatter
 
     def same_as_least(self, node: FrontNode) -> bool:
         """Whether a node needs less energy than the answer of `optimize`, within the scatter of

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import ClosestPair
-from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, waits
+from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, holding_times
 from joulepath.optimizer.dynamics.interval import arm_spread
 from joulepath.optimizer.dynamics.kernel import Kernel
 from joulepath.optimizer.dynamics.plant import Plant
@@ -22,7 +22,7 @@ from joulepath.optimizer.kinematics.tool_path.followed_paths import FollowedPath
 from joulepath.optimizer.kinematics.tool_path.least_speed import LeastSpeed
 from joulepath.optimizer.kinematics.tool_path.least_time import least_time
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.motion.limit_ratios import too_much
+from joulepath.optimizer.motion.limit_ratios import excess_text
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
@@ -176,7 +176,7 @@ class PreparedProblem(Plant):
                 sorted(zip(self.path.names, worst, strict=True), key=lambda each: each[1])
             )
             broken = [
-                too_much(name, ratio) for name, ratio in ratios.items() if ratio > 1 + rounding
+                excess_text(name, ratio) for name, ratio in ratios.items() if ratio > 1 + rounding
             ]
         slowest = np.inf if self.least_speed is None else self.least_speed.reached(q, v)
         if slowest < 1 - rounding:
@@ -212,7 +212,7 @@ class PreparedProblem(Plant):
         still = np.zeros((1, self.arm.robot.nq))
         q_end = spline.control_points[-1]
         held = self.torques(q_end[None], still, still)[0]
-        times = waits(dwell, spline.duration)
+        times = holding_times(dwell, spline.duration)
         return moving + waiting_sensitivity(
             self.arm, q_end, held, *times, dwell, arm_spread(self.arm)
         )

@@ -13,13 +13,9 @@ from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.clearance_constraint import ClearanceConstraint
 from joulepath.optimizer.collision.clearance_proof import is_proven_clear, proven_clearance
 from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
-from joulepath.optimizer.collision.planner.path_planner import (
-    USUAL,
-    Effort,
-    PlannedPaths,
-    plan_paths,
-)
+from joulepath.optimizer.collision.planner.path_planner import USUAL_EFFORT, Effort, plan_paths
 from joulepath.optimizer.collision.planner.planned_path_memo import PlannedPathMemo
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths
 from joulepath.optimizer.collision.planner.state_validity import ValidityCheckers
 from joulepath.optimizer.collision.stand_ins import StandIns
 from joulepath.optimizer.deadline import Deadline
@@ -83,7 +79,7 @@ class Surroundings:
             return None
         if is_proven_clear(self.model, spline):
             return None
-        distance = self.model.along(self._samples(spline), 0.0)
+        distance = self.model.distances_along(self._samples(spline), 0.0)
         least = float(distance.min(initial=np.inf))
         if least < 0:
             k, pair = np.unravel_index(int(distance.argmin()), distance.shape)
@@ -117,7 +113,7 @@ class Surroundings:
             return [None] * len(motions)
         keys = [q.tobytes() for q in motions]
         paths = {key: _thinned(q) for key, q in zip(keys, motions, strict=True)}
-        distance = self.model.along(np.concatenate(list(paths.values())), within=0.0)
+        distance = self.model.distances_along(np.concatenate(list(paths.values())), within=0.0)
         parts = np.split(distance, np.cumsum([len(q) for q in paths.values()])[:-1])
         found = {key: self._worst(part) for key, part in zip(paths, parts, strict=True)}
         return [found[key] for key in keys]
@@ -159,7 +155,7 @@ class Surroundings:
         q_goal: Array,
         deadline: Deadline,
         other_goals: Sequence[Array] = (),
-        effort: Effort = USUAL,
+        effort: Effort = USUAL_EFFORT,
     ) -> PlannedPaths:
         """Collision-free joint paths to a goal or to one of several others; see `plan_paths`.
 
@@ -179,7 +175,7 @@ class Surroundings:
         template = self._memo.template(q_start, q_goal)
         goals = np.vstack([q_goal, *other_goals]) if template is None else q_goal[None]
         planned = plan_paths(
-            self.arm, q_start, goals, deadline, effort, checkers=self._checkers, like=template
+            self.arm, q_start, goals, deadline, effort, checkers=self._checkers, template=template
         )
         self._memo.keep(q_start, goals, planned)
         return planned
@@ -205,7 +201,7 @@ class Surroundings:
 
         Above `within` [m], the value is a lower bound greater than `within`.
         """
-        return float(self.model.along(_thinned(q), within).min(initial=np.inf))
+        return float(self.model.distances_along(_thinned(q), within).min(initial=np.inf))
 
     def _samples(self, spline: Spline) -> Array:
         """Samples q (CONTACT.samples, nq) [rad] at equal time steps of a motion."""

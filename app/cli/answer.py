@@ -116,11 +116,11 @@ def compile_kernel_of(robot_name: str) -> None:
     from joulepath.app.exceptions.stored import StoreUnavailable
     from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
     from joulepath.optimizer.exceptions import UnknownRobot
-    from joulepath.optimizer.native.library_cache import PATIENCE, CompilerHangs
+    from joulepath.optimizer.native.library_cache import CACHE, CompilerHangs
 
     try:
         compile_kernel(
-            robot_named(robot_name), patience=replace(PATIENCE, compiler=PATIENCE.command)
+            robot_named(robot_name), settings=replace(CACHE, compiler_timeout=CACHE.command_timeout)
         )
     except (UnknownRobot, StoreUnavailable):
         return  # the answer says so

@@ -11,6 +11,7 @@ import orjson
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, write
+from joulepath.app.cli.table import table
 
 Kind = Literal["json", "csv"]
 
@@ -19,7 +20,9 @@ Kind = Literal["json", "csv"]
     epilog="""\b
 Examples:
   joulepath evaluate motion.json
-  joulepath evaluate log.csv --units deg --settings arm.json --format csv --output energies.csv"""
+  joulepath evaluate log.csv --units deg --settings arm.json --format csv --output energies.csv
+  joulepath evaluate log.csv --format moves
+  echo '{"log": "1f4e6a0b-52f7-4c9e-9a0c-6f1d2e3b4a59"}' | joulepath evaluate - --format moves"""
 )
 @FILE
 @OUTPUT
@@ -32,9 +35,9 @@ Examples:
 @click.option(
     "--format",
     "wanted",
-    type=click.Choice(["json", "csv"]),
+    type=click.Choice(["json", "csv", "moves"]),
     default="json",
-    help="Kind of the answer.",
+    help="Kind of the answer; `moves`: a table to read, measured against predicted.",
 )
 @click.option(
     "--settings",
@@ -69,7 +72,7 @@ def evaluate(
     file: str,
     output: Path | None,
     given: Kind | None,
-    wanted: Kind,
+    wanted: Literal["json", "csv", "moves"],
     settings: Path | None,
     deadline: float,
     **options: Any,
@@ -89,7 +92,11 @@ def evaluate(
     with tempfile.NamedTemporaryFile(prefix="joulepath-", suffix=f".{kind}") as copy:
         copy.write(content_of(file))
         copy.flush()
-        answer = _answer(copy.name, kind, fields, wanted, deadline)
+        form: Kind = "csv" if wanted == "csv" else "json"
+        answer = _answer(copy.name, kind, fields, form, deadline)
+    if wanted == "moves":
+        write(moves_of(parsed(answer)).encode(), output)
+        return
     write(answer, output)
     if wanted == "json":
         terminal.summary(lambda: summary_of(parsed(answer)))
@@ -116,6 +123,31 @@ def _settings_in(file: Path) -> dict[str, Any]:
     if not isinstance(fields, dict):
         raise click.UsageError("--settings must name a file that holds one JSON object.")
     return fields
+
+
+def moves_of(answer: dict[str, Any]) -> str:
+    """A line per move: predicted energy with its interval, measured energy, their difference."""
+    head = ("move", "start [s]", "time [s]", "predicted [J]", "likely [J]", "measured [J]", "by")
+    rows: list[tuple[str, ...]] = [(*head, "difference")]
+    parts = [(str(k), part) for k, part in enumerate(answer["segments"], 1)]
+    rows += [_row(name, part) for name, part in [*parts, ("total", answer["total"])]]
+    return table(rows)
+
+
+def _row(name: str, part: dict[str, Any]) -> tuple[str, ...]:
+    electrical, known = part["energy"]["electrical"], part["measured"] or {}
+    likely, difference = electrical.get("interval"), part["difference"]
+    by = next((key for key in ("electrical", "by_efforts") if known.get(key) is not None), None)
+    return (
+        name,
+        f"{part['start']:.2f}",
+        f"{part['end'] - part['start']:.2f}",
+        f"{electrical['total']:.1f}",
+        "" if likely is None else f"{likely['p5']:.1f} to {likely['p95']:.1f}",
+        "" if by is None else f"{known[by]:.1f}",
+        "" if by is None else {"electrical": "power", "by_efforts": "efforts"}[by],
+        "" if difference is None else f"{difference:+.1%}",
+    )
 
 
 def summary_of(answer: dict[str, Any]) -> dict[str, str]:

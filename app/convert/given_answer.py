@@ -20,13 +20,13 @@ from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import LONGEST_CYCLE, MOST_STOPS
+from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 
 MOST_KNOTS = 4096
 HIGHEST_DEGREE = 31
-LONGEST_REST = LONGEST_CYCLE
+LONGEST_REST = CYCLE_RANGES.longest
 # of a stop: a move, two lines, a path, a dwell and a wait
-MOST_LEGS = 6 * MOST_STOPS + 5
+MOST_LEGS = 6 * CYCLE_RANGES.max_stops + 5
 MOVING = ("move", "line", "path")
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Row = Annotated[list[Number], Field(min_length=1, max_length=16)]

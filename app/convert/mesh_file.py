@@ -20,11 +20,11 @@ from joulepath.models.uploads.mesh import read_mesh
 from joulepath.models.uploads.mesh_text import MeshSize
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.clouds import MOST_TRIANGLES, TriangleMesh
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES, TriangleMesh
 
 # triangles of cached meshes, 72 bytes each
 MOST_KEPT_TRIANGLES = 400_000
-_MOST = MeshSize(triangles=MOST_TRIANGLES)
+_MOST = MeshSize(triangles=CLOUD_RANGES.max_triangles)
 
 Format = Literal["stl", "obj", "glb"]
 

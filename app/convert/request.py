@@ -18,7 +18,7 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.problem.targets import AnyOf, Single, Target
 from joulepath.optimizer.problem.tool_path import ToolPath
 
@@ -116,5 +116,5 @@ def _duration_bounds(request: asked.MotionRequest) -> tuple[float | None, float 
         return request.duration, request.duration
     given = request.duration or asked.DurationRange()
     if given.max is None and request.objective == "electrical":
-        return given.min, min(LONGEST_DURATION, request.sample_period * MOTION_LIMITS.max_samples)
+        return given.min, min(DURATIONS.longest, request.sample_period * MOTION_LIMITS.max_samples)
     return given.min, given.max

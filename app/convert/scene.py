@@ -12,6 +12,7 @@ from joulepath.app.convert.mesh_file import mesh_from_file
 from joulepath.app.convert.pose import to_base, to_matrix
 from joulepath.app.convert.voxels import occupied_cells
 from joulepath.app.schemas import scene as asked
+from joulepath.app.schemas import shapes
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.clouds import Points, Voxels
@@ -62,21 +63,21 @@ def _to_obstacle(given: asked.Obstacle, T_base_frame: Array) -> Obstacle:
 
 
 def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:
-    if isinstance(given, asked.Box):
+    if isinstance(given, shapes.Box):
         return Box(np.array(given.size))
-    if isinstance(given, asked.Sphere):
+    if isinstance(given, shapes.Sphere):
         return Sphere(given.radius)
-    if isinstance(given, asked.Cylinder):
+    if isinstance(given, shapes.Cylinder):
         return Cylinder(given.radius, given.length)
-    if isinstance(given, asked.Capsule):
+    if isinstance(given, shapes.Capsule):
         return Capsule(given.radius, given.length)
-    if isinstance(given, asked.Mesh):
+    if isinstance(given, shapes.Mesh):
         return Mesh(np.array(given.vertices))
-    if isinstance(given, asked.Points):
+    if isinstance(given, shapes.Points):
         return Points(np.array(given.points), given.radius)
-    if isinstance(given, asked.Voxels):
+    if isinstance(given, shapes.Voxels):
         return Voxels(given.size, occupied_cells(given))
-    if isinstance(given, asked.MeshFile):
+    if isinstance(given, shapes.MeshFile):
         return mesh_from_file(given.format, given.data, given.scale)
     return HalfSpace()
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from joulepath.app.convert.base64_data import decoded
-from joulepath.app.schemas.scene import MOST_CELLS, VoxelBits, Voxels
+from joulepath.app.schemas.shapes import MOST_CELLS, VoxelBits, Voxels
 from joulepath.optimizer.exceptions import InvalidProblem
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from joulepath.optimizer.collision.close_pass import CLOSE
+from joulepath.optimizer.collision.close_pass import CLOSE_PASS
 from joulepath.optimizer.collision.stand_ins import StandInSettings
 from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.problem.arm import PAYLOAD, TOOL
@@ -95,11 +95,11 @@ def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> l
 
 def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> str:
     first, second = pair
-    # the proven distance may be below CLOSE, and the sampled one a little above it
+    # the proven distance may be below CLOSE_PASS.distance, and the sampled one a little above it
     how = f"{_mm(distance)} mm apart" if distance > 0 else f"overlapping by {_mm(-distance)} mm"
     return (
-        f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} s{proven}. "
-        f"{ADVICE}"
+        f"Closer than {CLOSE_PASS.distance * 1e3:g} mm: {first} and {second} are {how} "
+        f"at {time:.3f} s{proven}. {ADVICE}"
     )
 
 

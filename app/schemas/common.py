@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from difflib import get_close_matches
 from itertools import islice
 from typing import Annotated, Any, Literal
 
@@ -22,54 +19,15 @@ from pydantic_core import PydanticCustomError
 from joulepath.app.answers.declared import with_unit
 from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID
 from joulepath.app.schemas.lengths import LENGTHS
+from joulepath.app.schemas.names import TYPOS, nearest
 from joulepath.optimizer.problem.names import is_plain
 from joulepath.optimizer.problem.pose import QUATERNION_TOLERANCE
-
-
-@dataclass(frozen=True)
-class TypoSettings:
-    """Recognition of mistyped names."""
-
-    longest: int = 64
-    """Longest name compared with known names [characters]."""
-    shortest: int = 3
-    """Shortest name compared with known names [characters]."""
-    alike: float = 0.6
-    """Least share of common letters of a suggestion, see difflib."""
-    nearly_same: float = 0.8
-    """Least share of common letters of a name taken for another one."""
-    compared: int = 4
-    """Most names of an object compared with the expected names."""
-
-
-TYPOS = TypoSettings()
 
 KEY_HEADER = "Idempotency-Key"
 UNKNOWN_FIELD = "unknown_field"
 """Type of the error about fields that a model does not have; its context has the names of those
 that it has, `known`, and the first that it has not, `unknown`."""
 MOST_UNKNOWN = 20
-
-
-def nearest(name: str, known: Iterable[str], alike: float = TYPOS.alike) -> str | None:
-    """The one of the known names that `name` was meant to be; None if none is like it.
-
-    `alike` is the least share of letters in common, see difflib.
-    """
-    by_form = {_form(each): each for each in known}
-    begun = [
-        each
-        for form, each in by_form.items()
-        if len(name) >= TYPOS.shortest and form.startswith(_form(name))
-    ]
-    if len(begun) == 1:
-        return begun[0]
-    found = get_close_matches(_form(name[: TYPOS.longest]), by_form, n=1, cutoff=alike)
-    return by_form[found[0]] if found else None
-
-
-def _form(name: str) -> str:
-    return name.lower().replace("-", "_")
 
 
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:

@@ -16,7 +16,7 @@ from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.log_file import LogFile
 from joulepath.app.schemas.request import Seconds
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""
@@ -120,7 +120,7 @@ class EvaluateSettings(ArmRequest):
         10.0,
         default=None,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
 
 

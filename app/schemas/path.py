@@ -10,13 +10,8 @@ from pydantic_core import PydanticCustomError
 from joulepath.app.schemas.arm import Speed
 from joulepath.app.schemas.common import BasePose, Request, described, number_or_object
 from joulepath.app.schemas.orientation import Axis, ConeOrientedPose, TargetPose
-from joulepath.optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
-from joulepath.optimizer.problem.tool_path import (
-    MOST_POINTS,
-    SPEED_TOLERANCE,
-    TOOL_PATH,
-    PathShape,
-)
+from joulepath.optimizer.problem.line import LINE_RANGES
+from joulepath.optimizer.problem.tool_path import MOST_POINTS, TOOL_PATH, PathShape
 
 SPEED = "Largest speed of the TCP on the way. Null: as fast as the limits allow."
 
@@ -33,7 +28,8 @@ class SpeedRange(Request):
     )
     max: Speed | None = described(
         "Largest speed, at least 1.05 times `min`; or equal to it: the speed is fixed then, and "
-        f"held within {SPEED_TOLERANCE:.1%} between the ramps. Null: as fast as the limits allow.",
+        f"held within {TOOL_PATH.speed_tolerance:.1%} between the ramps. Null: as fast as the "
+        "limits allow.",
         "m/s",
         0.2,
         default=None,
@@ -221,6 +217,10 @@ class Line(Request):
         default="tcp",
     )
     distance: float = described(
-        "Length of the line.", "m", 0.08, ge=LEAST_DISTANCE, le=MOST_DISTANCE
+        "Length of the line.",
+        "m",
+        0.08,
+        ge=LINE_RANGES.least_distance,
+        le=LINE_RANGES.greatest_distance,
     )
     speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)

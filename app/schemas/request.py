@@ -20,10 +20,10 @@ from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
-from joulepath.optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
+from joulepath.optimizer.problem.problem import DURATIONS, BoundEffort, MethodName
 from joulepath.optimizer.result.energy import Objective
 
-Seconds = Annotated[float, Field(ge=1e-3, le=LONGEST_DURATION)]
+Seconds = Annotated[float, Field(ge=1e-3, le=DURATIONS.longest)]
 
 
 WhichCandidates = Literal["all", "computed", "none"]
@@ -152,7 +152,7 @@ class Holding(Request):
         0.5,
         default=0.0,
         ge=0,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
     brake_power: Annotated[float, Field(ge=0, le=1e4)] | None = described(
         "Power drawn while the brakes hold, electronics included. Null: the power of the "
@@ -197,7 +197,7 @@ class MotionRequest(ArmRequest):
     duration: Duration | None = described(
         "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective "
         "`mechanical` needs a number, a `max` or a `dwell`, because a slower motion needs less "
-        f"work. The duration is at most {LONGEST_DURATION:g} s and at most "
+        f"work. The duration is at most {DURATIONS.longest:g} s and at most "
         f"{MOTION_LIMITS.max_samples} times `sample_period`.",
         "s",
         {"max": 3.0},

@@ -19,7 +19,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 Step = Literal["method", "branch", "orientation", "duration", "payload"]
 Fields = dict[str, Any]
@@ -116,7 +116,7 @@ def _duration(base: Base) -> Iterator[Proposal]:
     if base.request.get("duration") is not None and base.request["objective"] == "electrical":
         yield Proposal("duration", "Let the optimiser choose the duration.", _timed(base, None))
     for factor, word in ((SUGGESTIONS.longer, "longer"), (1 / SUGGESTIONS.longer, "shorter")):
-        duration = min(base.duration * factor, LONGEST_DURATION)
+        duration = min(base.duration * factor, DURATIONS.longest)
         yield Proposal(
             "duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration)
         )

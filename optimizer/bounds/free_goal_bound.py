@@ -46,7 +46,7 @@ from joulepath.optimizer.problem.targets import AnyOf
 
 
 @dataclass(frozen=True)
-class FamilySettings:
+class PoseFamilySettings:
     """Settings of the subdivision of a pose's configurations."""
 
     boxes_per_joint: tuple[int, ...] = (4, 2, 1)
@@ -63,7 +63,7 @@ class FamilySettings:
     """Sum of half sides [rad] below which it pays to narrow a box in all joints."""
 
 
-FAMILY = FamilySettings()
+POSE_FAMILY = PoseFamilySettings()
 
 
 def bound_of_free_goals(
@@ -168,10 +168,10 @@ class _GoalBoxes(BoxSubdivision[_StartBoxes]):
     def first(self) -> _StartBoxes:
         """Boxes over one turn of every joint, for every start."""
         nq, count = self.starts.shape[1], len(self.starts)
-        inner, most = max(nq - WRIST_JOINTS, 0), FAMILY.most_first_boxes
+        inner, most = max(nq - WRIST_JOINTS, 0), POSE_FAMILY.most_first_boxes
         fineness = next(
-            (n for n in FAMILY.boxes_per_joint if 2 * n**inner * count <= most),
-            FAMILY.boxes_per_joint[-1],
+            (n for n in POSE_FAMILY.boxes_per_joint if 2 * n**inner * count <= most),
+            POSE_FAMILY.boxes_per_joint[-1],
         )
         centre, half = one_turn_boxes(nq, fineness)
         start = np.repeat(np.arange(count), len(centre))
@@ -238,7 +238,7 @@ class PoseFamily:
     @cached_property
     def weights(self) -> Array:
         """Approximate path of the TCP per joint, shape (nq,) [m/rad]; 0 for a free joint."""
-        path = self._boxes.levers + FAMILY.length_per_radian
+        path = self._boxes.levers + POSE_FAMILY.length_per_radian
         return np.where(self._boxes.free, 0.0, path)
 
     def sizes(self, half: Array) -> Array:
@@ -247,11 +247,11 @@ class PoseFamily:
         Args:
             half: half sides, shape (b, nq) [rad].
         """
-        return np.minimum(half, FAMILY.wide_side) * self.weights
+        return np.minimum(half, POSE_FAMILY.wide_side) * self.weights
 
     def is_settled(self, half: Array) -> bool:
         """Whether a box with half sides (nq,) [rad] is too small to split."""
-        return bool(half[~self._boxes.free].max(initial=0.0) < FAMILY.smallest_side)
+        return bool(half[~self._boxes.free].max(initial=0.0) < POSE_FAMILY.smallest_side)
 
     def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Mask]:
         """Smaller boxes with all configurations of the pose in given boxes (b, nq) [rad].
@@ -273,7 +273,7 @@ class PoseFamily:
                 centre[reached], half[reached]
             )
         size = half.sum(axis=1) - self._boxes.free[-1] * half[:, -1]
-        small = np.flatnonzero(reached & (size < FAMILY.narrowing_size))
+        small = np.flatnonzero(reached & (size < POSE_FAMILY.narrowing_size))
         if len(small):
             centre[small], half[small], reached[small] = self._boxes.narrowed(
                 centre[small], half[small]

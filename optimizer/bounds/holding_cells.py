@@ -25,7 +25,7 @@ from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
@@ -113,9 +113,11 @@ class HoldingCells:
             (n,).
         """
         problem, rows, n = self.prepared.problem, np.arange(len(away)), HOLDING_CELLS.probes
-        first = np.maximum(shortest_duration(away, self.prepared.arm.active_limits), LEAST_DURATION)
+        first = np.maximum(
+            shortest_duration(away, self.prepared.arm.active_limits), DURATIONS.least
+        )
         first = np.maximum(first, problem.duration_min or 0.0)
-        longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+        longest = DURATIONS.longest if problem.duration_max is None else problem.duration_max
         # the plain bound is at least the work plus the power drawn at all times
         drawn = net.power - net.deficit
         last = np.where(drawn > 0, (cap - net.work) / np.maximum(drawn, TINY), np.inf)

@@ -22,7 +22,7 @@ from scipy.fft import fftn
 
 from joulepath.models.robot import Array
 
-SAMPLES = 5
+SAMPLES_PER_JOINT = 5
 """Samples of each joint: 2 · 2 + 1 for a polynomial of degree 2."""
 
 
@@ -58,10 +58,12 @@ class InertiaSpectrum:
         """
         if joints > SPECTRUM.most_joints:
             return None
-        angles, turning = 2 * np.pi * np.arange(SAMPLES) / SAMPLES, joints - 1
-        q = np.concatenate([np.zeros((SAMPLES**turning, 1)), _grid(angles, turning)], axis=1)
+        angles, turning = 2 * np.pi * np.arange(SAMPLES_PER_JOINT) / SAMPLES_PER_JOINT, joints - 1
+        q = np.concatenate(
+            [np.zeros((SAMPLES_PER_JOINT**turning, 1)), _grid(angles, turning)], axis=1
+        )
         upper = np.triu_indices(joints)
-        samples = inertia(q)[:, *upper].reshape(*(SAMPLES for _ in range(turning)), -1)
+        samples = inertia(q)[:, *upper].reshape(*(SAMPLES_PER_JOINT for _ in range(turning)), -1)
         size = np.abs(fftn(samples, axes=range(turning))) / len(q)
         size += SPECTRUM.rounding / len(q) * np.abs(samples).max()
         # bounds need only |n| and |c_n|: terms of n and -n are merged

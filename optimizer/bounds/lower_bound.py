@@ -17,7 +17,7 @@ from joulepath.optimizer.bounds.net_energy import NetEnergy, electrical
 from joulepath.optimizer.dynamics.dwell import holding_power, linear_dwells
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 LEAST_PART_DURATION = 1e-12
 """Least duration of a part of a motion [s], which avoids a division by zero."""
@@ -45,9 +45,9 @@ def lower_bounds(
     """
     problem = prepared.problem
     shortest = np.maximum(
-        shortest_duration(displacement, problem.arm.active_limits), LEAST_DURATION
+        shortest_duration(displacement, problem.arm.active_limits), DURATIONS.least
     )
-    longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    longest = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     least = max(problem.duration_min or 0.0, min(prepared.least_time, longest))
     t_min = np.maximum(shortest, least)
     t_max = np.full_like(t_min, longest)
@@ -88,7 +88,7 @@ def priced_bounds(
         Bounds, shape (P,) [J]; inf for a motion that always takes longer.
     """
     shortest = np.maximum(
-        shortest_duration(displacement, prepared.arm.active_limits), LEAST_DURATION
+        shortest_duration(displacement, prepared.arm.active_limits), DURATIONS.least
     )
     t_max, waiting = np.full_like(shortest, longest), np.full_like(shortest, -price)
     t_min = np.maximum(shortest, min(prepared.least_time, longest))
@@ -101,7 +101,7 @@ def travel_bounds(
     displacement: Array,
     potential_gain: Array,
     price: float = 0.0,
-    longest: float = LONGEST_DURATION,
+    longest: float = DURATIONS.longest,
 ) -> Array:
     """Lower bounds on energy + price · duration of parts of a motion, whose sum bounds the motion.
 
@@ -151,7 +151,7 @@ def bound_through_passes(prepared: PreparedProblem, q_start: Array, q_goal: Arra
         return -np.inf
     q = np.array([q_start, *problem.passes, q_goal])
     gains = np.diff([prepared.potential(each) for each in q])
-    longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    longest = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     return float(travel_bounds(prepared, np.diff(q, axis=0), gains, longest=longest).sum())
 
 

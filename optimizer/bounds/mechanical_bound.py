@@ -57,7 +57,7 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ def mechanical_bounds(
     """
     arm, problem = EnergyRange(prepared), prepared.problem
     longest = np.full(
-        len(q_start), LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+        len(q_start), DURATIONS.longest if problem.duration_max is None else problem.duration_max
     )
     swing = Swing.of(arm, q_start, q_goal, potentials)
     travelled = 2 * _least_energy(

@@ -21,7 +21,7 @@ from joulepath.optimizer.bounds.mechanical_bound import EnergyRange, Swing, most
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def priced_work_bounds(
     """
     arm, displacement = EnergyRange(prepared), q_goal - q_start
     limits, rotors = prepared.arm.active_limits, prepared.arm.drives.rotor_inertia
-    shortest = np.maximum(shortest_duration(displacement, limits), LEAST_DURATION)
+    shortest = np.maximum(shortest_duration(displacement, limits), DURATIONS.least)
     travel = np.sqrt(displacement**2 @ rotors)
     swing = Swing.of(arm, q_start, q_goal, potentials)
     ends, which = np.unique(np.column_stack([potentials, swing.least]), axis=0, return_inverse=True)

@@ -25,7 +25,7 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.dwell import LinearDwell, linear_dwells
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
@@ -181,8 +181,8 @@ class _RaisedPair:
         dwells = [LinearDwell.none()]
         if dwell is not None:
             dwells = linear_dwells(dwell, prepared.arm, prepared.holding_power(pair.q_goal[None]))
-        shortest = max(pair.shortest, LEAST_DURATION, problem.duration_min or 0.0)
-        longest = problem.duration_max or LONGEST_DURATION
+        shortest = max(pair.shortest, DURATIONS.least, problem.duration_min or 0.0)
+        longest = problem.duration_max or DURATIONS.longest
         return [
             DurationCells(self.shared, pair, pair.motion, dwell, (low, high), self.target)
             for dwell in dwells

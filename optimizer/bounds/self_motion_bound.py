@@ -60,7 +60,7 @@ class CellSettings:
 
 
 @dataclass(frozen=True)
-class HoldingSettings:
+class HoldingStageSettings:
     """Settings of the stage that adds the copper loss of holding to bounds of pairs of cells."""
 
     rounds: int = 8
@@ -78,7 +78,7 @@ class HoldingSettings:
 
 
 CELLS = CellSettings()
-HOLDING = HoldingSettings()
+HOLDING_STAGE = HoldingStageSettings()
 
 
 def self_motion_bound(
@@ -129,8 +129,9 @@ def bound_between_curves(
     pairs = search.run(SearchLimits(CELLS.rounds, deadline))
     if not len(pairs.value):
         return np.inf
-    tolerance = 0.0 if prepared.problem.bound == "tight" else SUBDIVISION.tolerance
-    return _with_holding(search, pairs, deadline, enough - tolerance * abs(enough))
+    if np.isfinite(enough) and prepared.problem.bound != "tight":
+        enough -= SUBDIVISION.tolerance * abs(enough)
+    return _with_holding(search, pairs, deadline, enough)
 
 
 @dataclass(frozen=True)
@@ -223,19 +224,19 @@ def _with_holding(search: _CellPairs, pairs: _Pairs, deadline: Deadline, enough:
     if cells is None:
         return float(pairs.value.min())
     raised_before = np.zeros(len(pairs.value), dtype=bool)
-    for _ in range(HOLDING.rounds):
-        order = np.argsort(pairs.value, kind="stable")[: HOLDING.pairs_per_round]
+    for _ in range(HOLDING_STAGE.rounds):
+        order = np.argsort(pairs.value, kind="stable")[: HOLDING_STAGE.pairs_per_round]
         least = float(pairs.value[order[0]])
         if deadline.passed or not np.isfinite(least) or least >= enough:
             break
-        order = order[pairs.value[order] <= least + HOLDING.bound_range * abs(least)]
+        order = order[pairs.value[order] <= least + HOLDING_STAGE.bound_range * abs(least)]
         done = raised_before[order]
         wide = pairs.goal.half[order] >= CELLS.smallest_half_width
         new, split = order[~done], order[done & wide][: CELLS.pairs_per_round]
         if done[0] and order[0] not in split:
-            lowest = order[: HOLDING.repeated_pairs]
+            lowest = order[: HOLDING_STAGE.repeated_pairs]
             raised = _raised(search, cells, pairs[lowest])
-            if raised.value[0] <= least + HOLDING.least_rise * abs(least):
+            if raised.value[0] <= least + HOLDING_STAGE.least_rise * abs(least):
                 break
             value = pairs.value.copy()
             value[lowest] = raised.value
@@ -261,14 +262,14 @@ def _raised(search: _CellPairs, cells: HoldingCells, pairs: _Pairs) -> _Pairs:
     possible = np.flatnonzero(
         np.isfinite(pairs.value)
         & (pairs.start.half == 0)
-        & (pairs.goal.half <= HOLDING.group_half_width)
+        & (pairs.goal.half <= HOLDING_STAGE.group_half_width)
     )
     if not len(possible):
         return pairs
     starts, goals = pairs.start[possible], pairs.goal[possible]
     (q_start, _), (q_goal, half) = search.start.boxes(starts), search.goal.boxes(goals)
     gain = search.gains(starts, q_start, goals, q_goal) - half @ search.rates
-    interval = np.floor(goals.parameter / (2 * HOLDING.group_half_width))
+    interval = np.floor(goals.parameter / (2 * HOLDING_STAGE.group_half_width))
     groups = np.stack([starts.curve, goals.curve, interval], axis=1)
     first, row = np.unique(groups, axis=0, return_index=True, return_inverse=True)[1:]
     row = row.ravel()

@@ -21,11 +21,11 @@ from joulepath.optimizer.problem.scene import Attachment, Obstacle
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
+    """Core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
 
-    Other bodies must stay at least `margin` [m] away from it. `touches` are the links that it
-    touches by design. A body with a `cloud` is its `patch`: then the core is only a box around it,
-    with the radius of its parts.
+    Other bodies must keep a distance of at least `margin` [m]. `touches` are the links that the
+    body touches by design. A body with a `cloud` is its patch `patch`; the core is then only a box
+    around it, with the radius of its parts.
     """
 
     name: str
@@ -39,17 +39,17 @@ class Body:
 
     @cached_property
     def points(self) -> Array:
-        """The core's points (m, 3) [m] in the link frame."""
+        """Points (m, 3) [m] of the core in the link frame."""
         return self.core.points @ self.T_link_core[:3, :3].T + self.T_link_core[:3, 3]
 
     @cached_property
     def ball_centre(self) -> Array:
-        """Centre (3,) [m] of a ball that encloses the core, in the link frame."""
+        """Centre (3,) [m] of a ball around the core, in the link frame."""
         return np.asarray((self.points.min(axis=0) + self.points.max(axis=0)) / 2)
 
     @cached_property
     def ball_radius(self) -> float:
-        """Radius [m] of that ball; the core's own radius is not included."""
+        """Radius [m] of the ball around the core; the radius of the core is not included."""
         return (
             float(np.linalg.norm(self.points - self.ball_centre, axis=1).max())
             + self.core.disc_radius
@@ -115,7 +115,7 @@ def _bodies_of_obstacle(obstacle: Obstacle) -> list[Body]:
 
 
 def _touched(part: Attachment, robot: Robot) -> frozenset[int]:
-    """The links that a tool or payload touches by design: those declared, else the one that carries
+    """Links that a tool or payload touches by design: the declared links, by default the link with
     the flange.
     """
     names = robot.link_names

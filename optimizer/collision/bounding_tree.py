@@ -1,12 +1,13 @@
-"""A tree of bounding balls over many small parts: which of them are near a segment, for many
-segments at once.
+"""Tree of bounding balls over many small parts, searched for the parts near segments.
 
-The parts are halved three times per level, at the median along the longest extent of their centres.
-The search goes down the tree level by level, for all queries together. Its effort per query grows
-with the logarithm of the number of parts, unless many parts are equally near.
+The parts of a node are halved several times per level, at the median along the longest extent of
+their centres. The search goes down the tree level by level, for all queries together. Its effort
+per query grows with the logarithm of the number of parts, unless many parts are equally near.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,23 +15,33 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.cores import Indices
 from joulepath.optimizer.deadline import checkpoint
 
-# parts of a leaf at most, and queries that are searched at once: they bound the memory
-LEAF, AT_ONCE = 16, 1024
-# halvings per level
-HALVINGS = 3
-# bounds of distances are loosened by this [m], far above their rounding
-ROUNDING = 1e-9
+
+@dataclass(frozen=True)
+class TreeSettings:
+    """Form of the tree, and blocks of its searches."""
+
+    leaf_parts: int = 16
+    """Largest number of parts of a leaf."""
+    queries_per_block: int = 1024
+    """Queries that are searched at once; they bound the memory."""
+    halvings_per_level: int = 3
+    """Halvings of the parts of a node per level of the tree."""
+    rounding: float = 1e-9
+    """Loosening of distance bounds [m], far above their rounding errors."""
+
+
+TREE = TreeSettings()
 
 
 class BoundingTree:
-    """The tree over parts that balls with centres (n, 3) and radii (n,) [m] enclose."""
+    """Tree over parts enclosed by balls with centres (n, 3) and radii (n,) [m]."""
 
     def __init__(self, centres: Array, radii: Array) -> None:
         self.centres, self.radii = centres, radii
         self.order = np.arange(len(centres))
         spans, children = [(0, len(centres))], [(0, 0)]
-        for node, (begin, end) in enumerate(spans):  # grows while it is walked through
-            if end - begin > LEAF:
+        for node, (begin, end) in enumerate(spans):  # The list grows during the loop.
+            if end - begin > TREE.leaf_parts:
                 parts = self._split(begin, end)
                 children[node] = len(spans), len(spans) + len(parts)
                 spans += parts
@@ -40,8 +51,8 @@ class BoundingTree:
         self._node_centres, self._node_radii = self._balls()
 
     def patches(self, most: int) -> list[int]:
-        """At most `most` nodes that together hold every part, each once: the root, or nodes of one
-        depth and leaves.
+        """At most `most` nodes that together contain every part exactly once: the root, or nodes of
+        one depth and leaves.
         """
         nodes = [0]
         while True:
@@ -51,29 +62,37 @@ class BoundingTree:
             nodes = finer
 
     def parts(self, node: int) -> Indices:
-        """The parts (k,) below a node."""
+        """Parts (k,) below a node."""
         begin, end = self._spans[node]
         return self.order[begin:end]
 
     def near(
         self, segments: Array, reach: Array, within: Array, root: Indices, nearest: bool = False
     ) -> tuple[Indices, Indices]:
-        """All (query, part) (m,) whose distance may be at most `within` (k,) [m].
+        """All (query, part) (m,) with a distance that may be at most `within`.
 
-        A query is a body inside the capsule around `segments` (k, 2, 3) with radius `reach` (k,)
-        [m]; it asks for parts below the node `root` (k,). `nearest`: parts that cannot be the
-        nearest one of the query are left out, too.
+        A query is a body inside the capsule around a segment.
+
+        Args:
+            segments: segments of the queries (k, 2, 3) [m].
+            reach: radii of the capsules (k,) [m].
+            within: limits of the distances (k,) [m].
+            root: nodes (k,) below which parts are searched.
+            nearest: whether parts that cannot be the nearest part of their query are left out, too.
         """
-        found = [
+        blocks = [
             self._near(
                 segments[block], reach[block], within[block], root[block], nearest, block.start
             )
-            for block in (slice(low, low + AT_ONCE) for low in range(0, len(segments), AT_ONCE))
+            for block in (
+                slice(low, low + TREE.queries_per_block)
+                for low in range(0, len(segments), TREE.queries_per_block)
+            )
         ]
-        none = np.zeros(0, dtype=np.intp)
+        empty = np.zeros(0, dtype=np.intp)
         return (
-            np.concatenate([none, *(query for query, _ in found)]),
-            np.concatenate([none, *(part for _, part in found)]),
+            np.concatenate([empty, *(query for query, _ in blocks)]),
+            np.concatenate([empty, *(part for _, part in blocks)]),
         )
 
     def _near(
@@ -86,7 +105,7 @@ class BoundingTree:
         offset: int,
     ) -> tuple[Indices, Indices]:
         checkpoint()
-        within = within + ROUNDING
+        within = within + TREE.rounding
         query: Indices = np.arange(len(segments))
         node = root
         leaves: list[tuple[Indices, Indices]] = []
@@ -111,7 +130,7 @@ class BoundingTree:
             segments, reach, within, query, self.centres[part], self.radii[part], nearest
         )
         if nearest:
-            # once more: the limits have shrunk over all parts of a query
+            # Once more, since the limits have shrunk over all parts of a query.
             query, part = query[keep], part[keep]
             keep = self._kept(
                 segments, reach, within, query, self.centres[part], self.radii[part], nearest
@@ -128,23 +147,24 @@ class BoundingTree:
         radii: Array,
         nearest: bool,
     ) -> Indices:
-        """Indices of the balls that may hold a part in question.
+        """Indices of the balls that may contain a part within the limit.
 
-        `nearest` lowers `within` to the distance that some part of a ball has for sure.
+        With `nearest`, `within` is lowered in place to a distance that some part of a ball has for
+        certain.
         """
         distance, blur = point_segment(centres, segments[query]), radii + reach[query]
         if nearest:
-            np.minimum.at(within, query, distance + blur + ROUNDING)
+            np.minimum.at(within, query, distance + blur + TREE.rounding)
         return np.flatnonzero(distance - blur <= within[query])
 
     def _split(self, begin: int, end: int) -> list[tuple[int, int]]:
         spans = [(begin, end)]
-        for _ in range(HALVINGS):
+        for _ in range(TREE.halvings_per_level):
             spans = [half for low, high in spans for half in self._halved(low, high)]
         return spans
 
     def _halved(self, begin: int, end: int) -> list[tuple[int, int]]:
-        if end - begin <= LEAF:
+        if end - begin <= TREE.leaf_parts:
             return [(begin, end)]
         order = self.order[begin:end]
         centres = self.centres[order]

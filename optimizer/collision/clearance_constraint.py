@@ -1,5 +1,5 @@
-"""Clearance as a path constraint: every constrained pair of bodies keeps its margin, and RESERVE
-beyond it.
+"""Clearance as a path constraint: every constrained pair of bodies keeps its margin and a
+reserve.
 """
 
 from __future__ import annotations
@@ -15,32 +15,56 @@ from joulepath.optimizer.collision.model import CollisionModel, PairDistances
 from joulepath.optimizer.kinematics.path_constraints import ConstraintRatios
 
 CLEARANCE = "clearance"
-# distance kept beyond the margins [m]: twice the difference that the proof allows between proven
-# and sampled clearance
-RESERVE = 2e-4
-# distance [m] over which a ratio falls from 1 to 0, and the distance above which only a bound of it
-# is computed: the QP leaves out ratios below a half
-SCALE, COUNTED = 0.1, 0.06
-# the ratio above which that of a motion that is checked is exact
-CHECKED = 0.98
+
+
+@dataclass(frozen=True)
+class ClearanceSettings:
+    """Clearance as a ratio of a path constraint."""
+
+    reserve: float = 2e-4
+    """Distance kept beyond the margins [m]: twice the difference between proven and sampled
+    clearance that the proof allows.
+    """
+    ratio_range: float = 0.1
+    """Distance [m] over which the ratio decreases from 1 to 0."""
+    gradient_distance: float = 0.06
+    """Distance [m] above which only a bound is computed, without a gradient: the QP leaves out
+    ratios below a half.
+    """
+    exact_ratio: float = 0.98
+    """Ratio above which the ratios of a checked motion are exact [1]."""
+
+
+CLEARANCE_CONSTRAINT = ClearanceSettings()
 
 
 @dataclass
-class _Known:
-    """Lower bounds on distances (n, p) [m] at configurations q (n, nq) [rad], from which those
-    nearby are bounded.
+class _LastDistances:
+    """Lower bounds on distances (n, p) [m] at the configurations q (n, nq) [rad] of the last call.
+
+    They bound the distances at nearby configurations.
     """
 
     q: Array
     distance: Array
+
+    def bounds(self, model: CollisionModel, q: Array, pairs: Indices) -> Array | None:
+        """Lower bounds (n, p) [m] at q (n, nq) [rad]; None for another number of configurations."""
+        if self.q.shape != q.shape:
+            return None
+        return self.distance - model.greatest_changes(q - self.q, pairs)
+
+    def store(self, q: Array, distance: Array) -> None:
+        """Replaces the distances of the last call."""
+        self.q, self.distance = q, distance
 
 
 @dataclass(frozen=True)
 class ClearanceConstraint:
     """Clearance of the pairs (k,) of a collision model.
 
-    The ratio is linear in the signed distance: 1 at RESERVE beyond the margin, 0 at SCALE beyond
-    that.
+    The ratio is linear in the signed distance: 1 at `reserve` beyond the margin, 0 at `ratio_range`
+    beyond that distance.
     """
 
     model: CollisionModel
@@ -48,49 +72,54 @@ class ClearanceConstraint:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The same name for every pair."""
+        """The name of the constraint, once per pair."""
         return (CLEARANCE,) * len(self.pairs)
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """Ratios (n, k) at consecutive samples of a motion, exact above CHECKED; the others are
-        below it.
+        """Ratios (n, k) at consecutive samples of a motion, exact above `exact_ratio`; all others
+        are bounded by it.
         """
-        return _ratio(self.model.along(q, RESERVE + (1 - CHECKED) * SCALE, self.pairs))
+        settings = CLEARANCE_CONSTRAINT
+        within = settings.reserve + (1 - settings.exact_ratio) * settings.ratio_range
+        return _ratio(self.model.distances_along(q, within, self.pairs))
 
     def linearised(
         self, frames: Array, q: Array, v: Array, wanted: Mask | None = None
     ) -> ConstraintRatios:
-        """Ratios with gradients, which are zero for pairs above the distance COUNTED, and for those
-        not `wanted`.
+        """Ratios with gradients; the gradient is zero for pairs beyond `gradient_distance`, and for
+        pairs that are not `wanted`.
         """
-        found = (
+        distances = (
             self._pair_distances(frames, q)
             if wanted is None
             else self.model.chosen_distances(frames, self.pairs, wanted)
         )
-        by_q = np.zeros((*found.distance.shape, q.shape[1]))
+        by_q = np.zeros((*distances.distance.shape, q.shape[1]))
         gradients = self.model.gradients(
-            frames, found.configuration, self.pairs[found.column], found.nearest
+            frames, distances.configuration, self.pairs[distances.column], distances.nearest
         )
-        by_q[found.configuration, found.column] = gradients / -SCALE
-        return ConstraintRatios(_ratio(found.distance), by_q, np.broadcast_to(0.0, by_q.shape))
+        exact = distances.configuration, distances.column
+        by_q[exact] = gradients / -CLEARANCE_CONSTRAINT.ratio_range
+        return ConstraintRatios(_ratio(distances.distance), by_q, np.broadcast_to(0.0, by_q.shape))
 
     def _pair_distances(self, frames: Array, q: Array) -> PairDistances:
-        """Distances at q (n, nq), of which those bounded away from COUNTED by earlier ones are not
-        computed.
+        """Distances at q (n, nq), with bounds instead for pairs bounded away from
+        `gradient_distance` by the distances of the last call.
         """
-        last, known = self._last, None
-        if last.q.shape == q.shape:
-            known = last.distance - self.model.changes(q - last.q, self.pairs)
-        found = self.model.pair_distances(frames, self.pairs, COUNTED, known)
-        last.q, last.distance = q, found.distance
-        return found
+        bounds = self._last.bounds(self.model, q, self.pairs)
+        distances = self.model.pair_distances(
+            frames, self.pairs, CLEARANCE_CONSTRAINT.gradient_distance, bounds
+        )
+        self._last.store(q, distances.distance)
+        return distances
 
     @cached_property
-    def _last(self) -> _Known:
-        """What was computed last: nothing at first."""
-        return _Known(np.zeros((0, self.model.nq)), np.zeros((0, len(self.pairs))))
+    def _last(self) -> _LastDistances:
+        """Distances of the last call; empty at first."""
+        return _LastDistances(np.zeros((0, self.model.nq)), np.zeros((0, len(self.pairs))))
 
 
 def _ratio(distance: Array) -> Array:
-    return np.asarray(1 - (distance - RESERVE) / SCALE)
+    return np.asarray(
+        1 - (distance - CLEARANCE_CONSTRAINT.reserve) / CLEARANCE_CONSTRAINT.ratio_range
+    )

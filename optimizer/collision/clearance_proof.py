@@ -1,34 +1,33 @@
 """Lower bound on the clearance of a motion, proven over continuous time.
 
-For a unit vector n fixed in the frame of a pair's first body, sep_n(t) = min n·x over the second
-body - max n·x over the first never exceeds the signed distance. Relative to the first body, the
-acceleration of a point of the second body is at most
+**Convex bodies.** For a unit vector n fixed in the frame of the first body of a pair,
+sep_n(t) = min n·x over the second body - max n·x over the first never exceeds the signed distance.
+Relative to the first body, the acceleration of a point of the second body is at most
 
     A = Σ_k lever_k (|a_k| + v_k² + 2 |v_k| Σ_{j<k} |v_j|)        over the joints between the two,
 
-where lever_k [m] bounds its distance from the axis of joint k. Over an interval of length h [s],
-n·x(t) is therefore at least its chord less A h² / 8, and
+with a bound lever_k [m] on its distance from the axis of joint k. Over an interval of length h [s],
+n·x(t) is therefore at least its chord minus A h² / 8, and
 
     distance(t) ≥ min(sep_n(begin), sep_n(end)) - A h² / 8.
 
 The Bernstein coefficients of the spline's polynomial in a knot span bound |v_k| and |a_k|. n is the
-normal at one of the two ends of the interval, whichever gives the higher bound. The bound holds for
-every n: a poor normal makes it weaker, not wrong. An interval whose bound is too far below the
-least sampled distance is halved.
+normal at one of the two ends of the interval, chosen for the higher bound. The bound holds for
+every n: a poor normal only makes it weaker. An interval is halved if its bound is too far below the
+least sampled distance.
 
-An obstacle of many parts has no such normal as a whole. Its distance changes no faster than L
-(below), so that
+**Obstacles of many parts.** Such an obstacle has no normal as a whole. The relative speed of a
+point of the second body is at most L = Σ_k lever_k |v_k|, and its distance changes no faster, so
 
     distance(t) ≥ (distance(begin) + distance(end) - L h) / 2.
 
-Once an interval is so short that L h ≤ EXPANDED, the parts that can come within the least sampled
-distance there take the place of the obstacle: each is convex. The distance of all others stays
-above the least sampled one.
+Once an interval is short enough for L h ≤ `part_travel`, the obstacle is replaced by its parts that
+may come within the least sampled distance there; every part is convex. The distances of all other
+parts stay above the least sampled distance.
 
-Pairs that are far apart are removed first: the relative speed of a point of the second body is at
-most L = Σ_k lever_k |v_k|. If ball(t) bounds the distance from below by that of the bodies'
-enclosing balls, the distance is at least (ball(begin) + ball(end) - L h) / 2 throughout the
-interval.
+**Distant pairs.** They are removed first. With the distance ball(t) of the enclosing balls of both
+bodies, a lower bound on their distance, the distance is at least
+(ball(begin) + ball(end) - L h) / 2 throughout the interval.
 """
 
 from __future__ import annotations
@@ -41,230 +40,203 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.collision.bodies import Indices
+from joulepath.optimizer.collision.interval_checks import Instants, IntervalChecks
+from joulepath.optimizer.collision.interval_motion import IntervalMotion
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.pair_distance import WitnessPoints
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.result.certificate import Clearance
 
-# an interval is done if its bound is this near to the least sampled distance: absolutely [m], or
-# relative to it
-GAP, RELATIVE_GAP = 1e-4, 0.01
-LEAST_INTERVALS = 32
-# the proof ends with the bound reached so far after this many halvings, or checks of a pair over an
-# interval
-MOST_LEVELS, MOST_CHECKS = 20, 400_000
-# distances of whole clouds are not computed if they are greater than the least sampled one by this
-# [m]
-BEYOND = 0.1
-# travel [m] of a body over an interval below which the parts of a cloud are checked one by one
-EXPANDED = 0.02
-
 
 @dataclass(frozen=True)
-class _Instants:
-    """Times t (k,) [s] and the link frames there (k, nq + 1, 4, 4)."""
+class ClearanceProofSettings:
+    """Accuracy and effort of clearance proofs."""
 
-    t: Array
-    frames: Array
-
-    def with_more(self, more: _Instants) -> _Instants:
-        return _Instants(
-            np.concatenate([self.t, more.t]), np.concatenate([self.frames, more.frames])
-        )
-
-
-@dataclass(frozen=True)
-class _Checks:
-    """Pairs over intervals (k,): indices of the pair and of the instants at both ends, and the
-    distances there.
-
-    `part` (k,) is the part of the first body if that is a patch of a cloud, -1 for all of its
-    parts.
+    gap: float = 1e-4
+    """Difference [m] between least sampled distance and bound up to which an interval is done."""
+    relative_gap: float = 0.01
+    """The same difference relative to the least sampled distance [1]; the larger one counts."""
+    least_intervals: int = 32
+    """Least number of initial intervals."""
+    max_halvings: int = 20
+    """Halvings after which the proof ends with the bound reached so far."""
+    max_checks: int = 400_000
+    """Checks of a pair over an interval after which the proof ends with the bound reached so
+    far.
+    """
+    cloud_distance_margin: float = 0.1
+    """Excess [m] over the least sampled distance above which the distance of a whole cloud is not
+    computed.
+    """
+    part_travel: float = 0.02
+    """Travel [m] of a body over an interval up to which the parts of a cloud are checked one by
+    one.
     """
 
-    pair: Indices
-    part: Indices
-    begin: Indices
-    end: Indices
-    at_begin: WitnessPoints
-    at_end: WitnessPoints
 
-    def __getitem__(self, chosen: Indices) -> _Checks:
-        return _Checks(
-            self.pair[chosen],
-            self.part[chosen],
-            self.begin[chosen],
-            self.end[chosen],
-            self.at_begin[chosen],
-            self.at_end[chosen],
-        )
-
-    def with_more(self, more: _Checks) -> _Checks:
-        return _Checks(
-            np.concatenate([self.pair, more.pair]),
-            np.concatenate([self.part, more.part]),
-            np.concatenate([self.begin, more.begin]),
-            np.concatenate([self.end, more.end]),
-            self.at_begin.with_more(more.at_begin),
-            self.at_end.with_more(more.at_end),
-        )
-
-    def distinct_intervals(self) -> tuple[Indices, Indices]:
-        """The different intervals (m, 2), as indices of instants, and which of them each check (k,)
-        is about.
-        """
-        # as one number each: rows of two are sorted much more slowly
-        base = int(self.end.max(initial=0)) + 1
-        codes, which = np.unique(self.begin * base + self.end, return_inverse=True)
-        return np.column_stack(np.divmod(codes, base)), which
+CLEARANCE_PROOF = ClearanceProofSettings()
 
 
 def proven_clearance(model: CollisionModel, spline: Spline) -> Clearance | None:
-    """Proven and sampled clearance of a motion, margins subtracted; None if the model checks no
-    pair.
+    """Proven and sampled clearance of a motion, with margins subtracted; None if the model checks
+    no pair.
     """
     if not len(model.pairs):
         return None
-    found = _Proof(model, spline).run()
-    if found.min_clearance < 0 and found.sampled >= GAP:
-        # the limits on the effort ended it: less effort shows that the margins hold
-        found = replace(
-            found, min_clearance=max(found.min_clearance, _Proof(model, spline, wanted=GAP).bound())
-        )
-    return found
+    clearance = _Proof(model, spline).run()
+    if clearance.min_clearance < 0 and clearance.sampled >= CLEARANCE_PROOF.gap:
+        # The limits on the effort ended the proof, but less effort may show that the margins hold.
+        bound = _Proof(model, spline, CLEARANCE_PROOF.gap).bound()
+        clearance = replace(clearance, min_clearance=max(clearance.min_clearance, bound))
+    return clearance
 
 
 def is_proven_clear(model: CollisionModel, spline: Spline) -> bool:
-    """Whether the clearance is proven to be GAP or more: `proven_clearance` is then not negative.
+    """Whether the clearance is proven to be at least `gap`, so that `proven_clearance` is not
+    negative.
 
-    It takes far fewer intervals than to know how great the clearance is. False may also mean that
-    more are needed.
+    This takes far fewer intervals than a sharp bound on the clearance. The result is also False if
+    the proof would need more than the allowed checks.
     """
-    return not len(model.pairs) or _Proof(model, spline, wanted=GAP).bound() >= GAP
+    gap = CLEARANCE_PROOF.gap
+    return not len(model.pairs) or _Proof(model, spline, gap).bound() >= gap
 
 
 class _Proof:
-    """The proof for one motion. `least` [m] is the least distance sampled so far, of `closest`:
-    pair and time [s].
+    """Proof for one motion.
 
-    Without `wanted` [m] the bound comes near to the least distance; else the proof ends once the
-    bound is as high, or a sample is lower.
+    `least` [m] is the least distance sampled so far, and `closest` its pair and time [s]. Without
+    `required` [m] the proof ends with a bound close to the least distance; otherwise it ends once
+    the bound reaches `required`, or a sample is lower.
     """
 
-    def __init__(self, model: CollisionModel, spline: Spline, wanted: float | None = None) -> None:
-        self.model, self.geometry, self.spline, self.wanted = model, model.geometry, spline, wanted
-        self.curve = spline.curve
-        self.levers = model.levers_between
+    def __init__(
+        self, model: CollisionModel, spline: Spline, required: float | None = None
+    ) -> None:
+        self.model, self.geometry, self.spline, self.required = (
+            model,
+            model.geometry,
+            spline,
+            required,
+        )
+        self.motion = IntervalMotion(model, spline)
+        self.settings = CLEARANCE_PROOF
         self.least = np.inf
         self.closest = (0, 0.0)
 
     def run(self) -> Clearance:
-        """The proven clearance, with what is closest."""
+        """Proven clearance, with the closest pair."""
         proven = self.bound()
         pair, t = self.closest
-        points = self.model.nearest_points(self.instants(np.array([t])).frames, pair)
+        points = self.model.nearest_points(self.motion.instants(np.array([t])).frames, pair)
         return Clearance(proven, self.least, self.model.names(pair), t, points)
 
     def bound(self) -> float:
-        """Lower bound [m]: halves intervals until all are proven, or the limits on the effort are
-        reached.
+        """Lower bound [m]: intervals are halved until all are proven, or the limits on the effort
+        are reached.
 
-        -inf if a sample is lower than what is `wanted`.
+        The bound is -inf if a sample is lower than `required`.
         """
         instants, distances = self.sampled()
-        if self.wanted is not None and self.least < self.wanted:
+        if self.required is not None and self.least < self.required:
             return -np.inf
         checks = self.initial_checks(instants, distances)
         proven, checked = np.inf, 0
-        for level in range(MOST_LEVELS):
+        for level in range(self.settings.max_halvings):
             checked += len(checks.pair)
             bound = self.bounds(instants, checks)
-            enough = (
-                self.least - max(GAP, RELATIVE_GAP * abs(self.least))
-                if self.wanted is None
-                else self.wanted
+            enough = self.sufficient_bound()
+            is_last = (
+                level == self.settings.max_halvings - 1
+                or checked > self.settings.max_checks
+                or self.least < enough
             )
-            is_last = level == MOST_LEVELS - 1 or checked > MOST_CHECKS or self.least < enough
             is_open = np.zeros(len(bound), dtype=bool) if is_last else bound < enough
             proven = min(proven, float(bound[~is_open].min(initial=np.inf)))
             if not is_open.any():
                 break
             instants, checks = self.halved(
-                instants, self.expanded(instants, checks[np.flatnonzero(is_open)])
+                instants, self.with_parts(instants, checks[np.flatnonzero(is_open)])
             )
-        # rounding may put a bound that is exact above the sample
+        # Rounding may put an exact bound above the sample.
         return min(proven, self.least)
 
-    def sampled(self) -> tuple[_Instants, Array]:
+    def sufficient_bound(self) -> float:
+        """Bound [m] at which an interval is done."""
+        if self.required is not None:
+            return self.required
+        settings = self.settings
+        return self.least - max(settings.gap, settings.relative_gap * abs(self.least))
+
+    def sampled(self) -> tuple[Instants, Array]:
         """Instants (n,) with all knots, and lower bounds (n, p) [m] on the distances of all pairs
         there.
 
-        The pair of the least bound is sampled at each of them.
+        The pair with the least bound is sampled at every instant.
         """
         spans = np.unique(self.spline.knots)
-        longest = self.spline.duration / LEAST_INTERVALS
+        longest = self.spline.duration / self.settings.least_intervals
         parts = [
             np.linspace(a, b, math.ceil((b - a) / longest), endpoint=False)
             for a, b in pairwise(spans)
         ]
         t = np.concatenate([*parts, spans[-1:]])
-        instants = self.instants(t)
-        # those of half-spaces, which no ball encloses, are exact
+        instants = self.motion.instants(t)
+        # Distances of half-spaces are exact, since no ball encloses a half-space.
         distances = self.model.pair_distances(instants.frames, within=-np.inf).distance
         self.sample_normals(
             instants, np.arange(len(t)), distances.argmin(axis=1), np.full(len(t), -1)
         )
         return instants, distances
 
-    def initial_checks(self, instants: _Instants, distances: Array) -> _Checks:
-        """The pairs that may be the closest between two instants, of all intervals; with lower
-        bounds `distances`.
+    def initial_checks(self, instants: Instants, distances: Array) -> IntervalChecks:
+        """Checks of the pairs that may be the closest, over all intervals between n instants.
+
+        `distances` (n, p) [m] are lower bounds at the instants; they are improved in place.
         """
         n, p = distances.shape
-        v, _, h = self.rate_bounds(instants.t[:-1], instants.t[1:])
-        travel = (v * h[:, None]) @ self.levers.T
+        travel = self.motion.travels_between(instants.t)
         is_open = self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))
-        beads = self.geometry.bead_bounds(instants.frames, instant, pair)
-        distances[instant, pair] = np.maximum(distances[instant, pair], beads)
+        bounds = self.geometry.cover_bounds(instants.frames, instant, pair)
+        distances[instant, pair] = np.maximum(distances[instant, pair], bounds)
         is_open &= self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))
-        found = self.sample_normals(instants, instant, pair, np.full(len(pair), -1))
+        witness = self.sample_normals(instants, instant, pair, np.full(len(pair), -1))
         row = np.zeros((n, p), dtype=np.intp)
         row[instant, pair] = np.arange(len(pair))
         begin, pair = np.nonzero(is_open)
         part = np.full(len(pair), -1)
-        return _Checks(
-            pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]]
+        return IntervalChecks(
+            pair, part, begin, begin + 1, witness[row[begin, pair]], witness[row[begin + 1, pair]]
         )
 
     def may_be_closest(self, bounds: Array, travel: Array) -> Mask:
-        """Which pairs (n - 1, p) may be nearer than what is known or wanted over the intervals
-        between n instants.
+        """Pairs (n - 1, p) that may be nearer than the known or required distance, over the
+        intervals between n instants.
 
-        `bounds` (n, p) [m] are lower bounds on their distances at the instants, which change over
-        an interval by no more than the `travel` (n - 1, p) [m].
+        `bounds` (n, p) [m] are lower bounds on their distances at the instants. Over an interval a
+        distance changes at most by `travel` (n - 1, p) [m].
         """
-        limit = self.least if self.wanted is None else min(self.least, self.wanted)
+        limit = self.least if self.required is None else min(self.least, self.required)
         return np.asarray((bounds[:-1] + bounds[1:] - travel) / 2 < limit)
 
-    def expanded(self, instants: _Instants, checks: _Checks) -> _Checks:
-        """The checks, with those of clouds over short intervals replaced by checks of the parts
+    def with_parts(self, instants: Instants, checks: IntervalChecks) -> IntervalChecks:
+        """The checks, with checks of clouds over short intervals replaced by checks of the parts
         that may be nearest.
         """
         of_cloud = self.model.geometry.is_cloud[checks.pair] & (checks.part < 0)
         if not of_cloud.any():
             return checks
-        travel = self.travels(instants, checks)
-        chosen = np.flatnonzero(of_cloud & (travel <= EXPANDED))
+        travel = self.motion.travels(instants, checks)
+        chosen = np.flatnonzero(of_cloud & (travel <= self.settings.part_travel))
         whole = checks[chosen]
-        # a part that is farther away at the begin stays farther away than the least sampled
-        # distance
+        # A part beyond this distance at the beginning stays beyond the least sampled distance.
         case, part = self.geometry.near_parts(
             instants.frames, whole.begin, whole.pair, np.maximum(self.least, 0.0) + travel[chosen]
         )
         pair, begin, end = whole.pair[case], whole.begin[case], whole.end[case]
-        parts = _Checks(
+        parts = IntervalChecks(
             pair,
             part,
             begin,
@@ -272,122 +244,57 @@ class _Proof:
             self.sample_normals(instants, begin, pair, part),
             self.sample_normals(instants, end, pair, part),
         )
-        return checks[np.flatnonzero(~of_cloud | (travel > EXPANDED))].with_more(parts)
+        others = np.flatnonzero(~of_cloud | (travel > self.settings.part_travel))
+        return checks[others].with_more(parts)
 
-    def halved(self, instants: _Instants, checks: _Checks) -> tuple[_Instants, _Checks]:
+    def halved(self, instants: Instants, checks: IntervalChecks) -> tuple[Instants, IntervalChecks]:
         """Both halves of every interval, with the normals at the middle."""
-        intervals, which = checks.distinct_intervals()
-        middle = which + len(instants.t)
-        instants = instants.with_more(self.instants(instants.t[intervals].mean(axis=1)))
-        found = self.sample_normals(instants, middle, checks.pair, checks.part)
-        first = replace(checks, end=middle, at_end=found)
-        return instants, first.with_more(replace(checks, begin=middle, at_begin=found))
+        intervals, interval = checks.distinct_intervals()
+        middle = interval + len(instants.t)
+        instants = instants.with_more(self.motion.instants(instants.t[intervals].mean(axis=1)))
+        witness = self.sample_normals(instants, middle, checks.pair, checks.part)
+        first = replace(checks, end=middle, at_end=witness)
+        return instants, first.with_more(replace(checks, begin=middle, at_begin=witness))
 
     def sample_normals(
-        self, instants: _Instants, instant: Indices, pair: Indices, part: Indices
+        self, instants: Instants, instant: Indices, pair: Indices, part: Indices
     ) -> WitnessPoints:
-        """Distances and normals of pairs (k,) at instants (k,). They update the least sampled
+        """Distances and normals of pairs (k,) at instants (k,); they update the least sampled
         distance.
         """
-        within = max(self.least, 0.0) + BEYOND
-        found = self.geometry.witness_points(instants.frames, instant, pair, within, part)
-        # patches of a cloud that are farther away: a lower bound is enough
-        found.distance[np.isinf(found.distance)] = within
+        within = max(self.least, 0.0) + self.settings.cloud_distance_margin
+        witness = self.geometry.witness_points(instants.frames, instant, pair, within, part)
+        # For patches of a cloud that are farther away, a lower bound is enough.
+        witness.distance[np.isinf(witness.distance)] = within
         if len(pair):
-            k = int(found.distance.argmin())
-            if found.distance[k] < self.least:
-                self.least, self.closest = (
-                    float(found.distance[k]),
-                    (int(pair[k]), float(instants.t[instant[k]])),
-                )
-        return found
+            k = int(witness.distance.argmin())
+            if witness.distance[k] < self.least:
+                self.least = float(witness.distance[k])
+                self.closest = int(pair[k]), float(instants.t[instant[k]])
+        return witness
 
-    def bounds(self, instants: _Instants, checks: _Checks) -> Array:
+    def bounds(self, instants: Instants, checks: IntervalChecks) -> Array:
         """Lower bounds (k,) [m] on the distances over the intervals."""
         of_cloud = self.model.geometry.is_cloud[checks.pair] & (checks.part < 0)
         if of_cloud.any():
-            whole, convex = checks[np.flatnonzero(of_cloud)], checks[np.flatnonzero(~of_cloud)]
+            clouds, convex = checks[np.flatnonzero(of_cloud)], checks[np.flatnonzero(~of_cloud)]
             result = np.empty(len(of_cloud))
             result[~of_cloud] = self.convex_bounds(instants, convex)
-            result[of_cloud] = (
-                whole.at_begin.distance + whole.at_end.distance - self.travels(instants, whole)
-            ) / 2
+            travels = self.motion.travels(instants, clouds)
+            result[of_cloud] = (clouds.at_begin.distance + clouds.at_end.distance - travels) / 2
             return result
         return self.convex_bounds(instants, checks)
 
-    def convex_bounds(self, instants: _Instants, checks: _Checks) -> Array:
-        """The same for convex bodies and parts."""
+    def convex_bounds(self, instants: Instants, checks: IntervalChecks) -> Array:
+        """Lower bounds (k,) [m] on the distances of convex bodies and parts over the intervals."""
         normals = checks.at_begin.normal, checks.at_end.normal
         best = self.geometry.separations(
             instants.frames, checks.begin, checks.end, checks.pair, normals, checks.part
         )
-        return best - self.chord_errors(instants, checks)
-
-    def travels(self, instants: _Instants, checks: _Checks) -> Array:
-        """L h (k,) [m]: how far a point of the second body moves at most, relative to the first."""
-        intervals, which = checks.distinct_intervals()
-        v, _, h = self.rate_bounds(*instants.t[intervals].T)
-        return np.asarray((self.levers[checks.pair] * v[which]).sum(axis=1) * h[which])
-
-    def chord_errors(self, instants: _Instants, checks: _Checks) -> Array:
-        """A h² / 8 (k,) [m]."""
-        intervals, which = checks.distinct_intervals()
-        v, a, h = self.rate_bounds(*instants.t[intervals].T)
-        before = np.cumsum(v, axis=1) - v
-        between = self.model.joints_between[checks.pair]
-        # joints below the first body move both bodies alike: their speeds are taken out of the
-        # running sum
-        below = np.where(between, 0.0, v[which]).cumsum(axis=1)
-        lower = before[which] - np.where(between, below, 0.0)
-        v, a = v[which], a[which]
-        acceleration = (self.levers[checks.pair] * (a + v**2 + 2 * v * np.maximum(lower, 0.0))).sum(
-            axis=1
-        )
-        return np.asarray(acceleration * h[which] ** 2 / 8)
-
-    def rate_bounds(self, begin: Array, end: Array) -> tuple[Array, Array, Array]:
-        """Bounds on |v| [rad/s] and |a| [rad/s²] (k, nq) over intervals (k,) [s], and the
-        intervals' lengths (k,) [s].
-
-        Each interval must lie within a knot span.
-        """
-        h, degree = end - begin, self.spline.degree
-        # the polynomial of each interval in powers of the elapsed fraction of it
-        powers = np.stack(
-            [
-                self.curve(begin, d) * (h**d / math.factorial(d))[:, None]
-                for d in range(1, degree + 1)
-            ]
-        )
-        orders = np.arange(1, degree + 1)[:, None, None]
-        v = np.abs(_bernstein(powers * orders)).max(axis=0) / h[:, None]
-        a = np.abs(_bernstein((powers * orders * (orders - 1))[1:])).max(axis=0) / h[:, None] ** 2
-        return v, a, h
-
-    def instants(self, t: Array) -> _Instants:
-        """Link frames at times (k,) [s]."""
-        return _Instants(t, self.model.frames(self.curve(t)))
+        return best - self.motion.chord_errors(instants, checks)
 
 
 def _at_ends(intervals: Mask) -> Mask:
-    """Which pairs (n, p) are needed at n instants for those of the intervals (n - 1, p) between
-    them.
-    """
+    """Pairs (n, p) needed at n instants for pairs of the intervals (n - 1, p) between them."""
     none = np.zeros_like(intervals[:1])
     return np.asarray(np.concatenate([intervals, none]) | np.concatenate([none, intervals]))
-
-
-def _bernstein(powers: Array) -> Array:
-    """Bernstein coefficients (d + 1, …) on [0, 1] of polynomials with coefficients (d + 1, …),
-    lowest power first.
-
-    The values of a polynomial lie within the convex hull of its Bernstein coefficients.
-    """
-    degree = len(powers) - 1
-    matrix = np.array(
-        [
-            [math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)]
-            for i in range(degree + 1)
-        ]
-    )
-    return np.tensordot(matrix, powers, axes=1)

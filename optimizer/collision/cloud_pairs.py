@@ -19,10 +19,10 @@ from joulepath.optimizer.collision.clouds import Cloud, ConvexAgainstCloud, Witn
 
 @dataclass(frozen=True)
 class _Batch:
-    """Cases (m,) of one obstacle and, unless they are all segments, of one moving body.
+    """Cases (m,) of one obstacle, and of one moving body or of all segments.
 
-    `chosen` (m,) indexes the cases, `root` (m,) are their patches. Either `segments` (m, 2, 3) or
-    the poses T (m, 4, 4) of the core, in the frame of the cloud, are given.
+    `chosen` (m,) are indices of the cases, `root` (m,) their patches. Either `segments` (m, 2, 3)
+    or the poses T (m, 4, 4) of the core are given, in the frame of the cloud.
     """
 
     chosen: Indices
@@ -35,13 +35,13 @@ class _Batch:
 
 
 class CloudPairs:
-    """The patches and moving bodies of a collision model."""
+    """Patches and moving bodies of a collision model."""
 
     def __init__(self, bodies: Sequence[Body]) -> None:
         self._bodies = bodies
-        # obstacles of one content share a cloud, but each has a pose
+        # Obstacles of equal shape share a cloud, but every obstacle has its own pose.
         keys = [
-            None if body.cloud is None else (id(body.cloud), body.T_link_core.tobytes())
+            None if body.cloud is None else (body.cloud, body.T_link_core.tobytes())
             for body in bodies
         ]
         known = list(dict.fromkeys(key for key in keys if key is not None))
@@ -63,38 +63,39 @@ class CloudPairs:
         within: Array,
         part: Indices,
     ) -> Witness:
-        """Distance (k,), normal (k, 3) and point (k, 3) of the nearest part, or of `part` (k,)
-        where not negative.
+        """Distance (k,), normal (k, 3) and point (k, 3) of the nearest part, or of `part` (k,) if
+        it is not negative.
 
-        The distance of a nearest part above `within` (k,) [m] is infinite.
+        The distance of a nearest part is infinite if it exceeds `within` (k,) [m].
         """
         count = len(first)
         distance, normal, point = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
-        for named in (True, False):
-            cases = np.flatnonzero((part >= 0) == named)
+        for has_part in (True, False):
+            cases = np.flatnonzero((part >= 0) == has_part)
             for batch in self._batches(frames, configuration, first, second, cases):
                 k = batch.chosen
                 if batch.segments is not None:
-                    found = (
+                    witness = (
                         batch.cloud.to_segments(part[k], batch.segments)
-                        if named
+                        if has_part
                         else batch.cloud.nearest(batch.segments, batch.root, within[k])
                     )
                 else:
                     assert batch.convex is not None and batch.T is not None
-                    found = (
+                    witness = (
                         batch.convex.to_cores(part[k], batch.T)
-                        if named
+                        if has_part
                         else batch.convex.nearest(batch.T, batch.root, within[k])
                     )
                 R, origin = batch.T_base_cloud[:3, :3], batch.T_base_cloud[:3, 3]
-                distance[k], normal[k], point[k] = found[0], found[1] @ R.T, found[2] @ R.T + origin
+                distance[k], normal[k] = witness[0], witness[1] @ R.T
+                point[k] = witness[2] @ R.T + origin
         return distance, normal, point
 
     def near(
         self, frames: Array, configuration: Indices, first: Indices, second: Indices, within: Array
     ) -> tuple[Indices, Indices]:
-        """All (case, part) (m,) whose distance may be at most `within` (k,) [m]."""
+        """All (case, part) (m,) with a distance that may be at most `within` (k,) [m]."""
         none: Indices = np.zeros(0, dtype=np.intp)
         cases, parts = [none], [none]
         for batch in self._batches(frames, configuration, first, second, np.arange(len(first))):
@@ -109,7 +110,7 @@ class CloudPairs:
         return np.concatenate(cases), np.concatenate(parts)
 
     def highest(self, first: Indices, part: Indices, direction: Array) -> Array:
-        """max n·x (k,) [m] over parts (k,) for n (k, 3) in the base frame."""
+        """Greatest n·x (k,) [m] over parts (k,) for n (k, 3) in the base frame."""
         result = np.empty(len(first))
         for group in np.unique(self._group[first]).tolist():
             k = np.flatnonzero(self._group[first] == group)
@@ -121,7 +122,7 @@ class CloudPairs:
         self, frames: Array, configuration: Indices, first: Indices, second: Indices, cases: Indices
     ) -> Iterator[_Batch]:
         group, is_segment = self._group[first[cases]], self._is_segment[second[cases]]
-        # all segments of an obstacle are one batch, of other bodies each is one
+        # One batch per obstacle for all segments, and one per obstacle and body for other bodies.
         body = np.where(is_segment, -1, second[cases])
         for number, moving in dict.fromkeys(zip(group.tolist(), body.tolist(), strict=True)):
             k = cases[(group == number) & (body == moving)]
@@ -142,7 +143,7 @@ class CloudPairs:
                 yield replace(batch, convex=self._against(number, moving, cloud), T=T)
 
     def _obstacle(self, body: int) -> tuple[Cloud, Array]:
-        """The cloud of a patch and its pose (4, 4) in the base frame."""
+        """Cloud of a patch, and its pose (4, 4) in the base frame."""
         cloud = self._bodies[body].cloud
         assert cloud is not None
         return cloud, self._bodies[body].T_link_core

@@ -1,8 +1,8 @@
-"""Signed distances of obstacles of many parts: balls, voxels and triangles, each part exact, found
-by a bounding tree.
+"""Signed distances of obstacles of many parts: balls, voxels and triangles, each exact, found by a
+bounding tree.
 
-Everything is in the frame of the obstacle's shape. A closed mesh is solid: a body within it has a
-negative distance.
+Everything is in the frame of the obstacle's shape. A closed mesh is solid: the distance of a body
+inside it is negative.
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
 from cachetools import LRUCache, cached
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.bounding_tree import ROUNDING, BoundingTree, point_segment
+from joulepath.optimizer.collision.bounding_tree import TREE, BoundingTree, point_segment
 from joulepath.optimizer.collision.closed_form_distance import (
     box_segment,
     segment_segment,
@@ -27,24 +28,38 @@ from joulepath.optimizer.collision.cores import Core, Indices, box_corners, leas
 from joulepath.optimizer.problem.clouds import Cloud as Shape
 from joulepath.optimizer.problem.clouds import Points, TriangleMesh, Voxels, parts_of
 
-# trees that are kept for the next request with the same obstacle: of so many parts in all [1]. A
-# part takes up to 200 bytes
-MOST_KEPT_PARTS = 400_000
-# patches of an obstacle at most. Each is a body of its own: the optimiser bounds the distance of
-# each
-MOST_PATCHES = 8
-# longest edge [m] of the triangles that a tree holds, and the number of them at which the division
-# ends
-LONGEST_EDGE, MOST_DIVIDED = 0.05, 200_000
-# direction of the rays that tell the inside of a closed mesh: along no edge or face that a design
-# would have
-RAY = np.array([0.5657, 0.6213, 0.5422])
+
+@dataclass(frozen=True)
+class CloudSettings:
+    """Division of obstacles into parts, and memory for them."""
+
+    max_kept_parts: int = 400_000
+    """Largest total number of parts of the trees kept for later requests with the same obstacles. A
+    part takes up to 200 bytes.
+    """
+    max_patches: int = 8
+    """Largest number of patches of an obstacle. Every patch is a body with its own distance in the
+    optimiser.
+    """
+    longest_edge: float = 0.05
+    """Longest edge [m] of the triangles of a tree."""
+    max_triangles: int = 200_000
+    """Number of triangles at which their division ends."""
+
+
+CLOUDS = CloudSettings()
+
+
+RAY_DIRECTION = np.array([0.5657, 0.6213, 0.5422])
+"""Direction of the rays for the inside test of closed meshes, parallel to no edge or face of usual
+designs.
+"""
 
 Witness = tuple[Array, Array, Array]
 
 
 class Cloud:
-    """The parts of an obstacle, without the radius of its points, and the tree over them."""
+    """Parts of an obstacle, without the radius of its points, and their tree."""
 
     def __init__(self, shape: Shape) -> None:
         self.count = parts_of(shape)
@@ -64,20 +79,20 @@ class Cloud:
                 centres = (self.corners.min(axis=1) + self.corners.max(axis=1)) / 2
                 radii = np.linalg.norm(self.corners - centres[:, None], axis=2).max(axis=1)
         self.tree = BoundingTree(centres, radii)
-        # the inside of a solid has no parts: only its root knows of it
-        self.patches = [0] if self.is_solid else self.tree.patches(MOST_PATCHES)
+        # The inside of a solid has no parts, so only the root accounts for it.
+        self.patches = [0] if self.is_solid else self.tree.patches(CLOUDS.max_patches)
         self._low, self._high = self._box(self.tree.parts(0))
 
     def box(self, patch: int) -> Array:
-        """The corners (8, 3) [m] of the box around a patch."""
+        """Corners (8, 3) [m] of the box around a patch."""
         return box_corners(*self._box(self.tree.parts(patch)))
 
     def nearest(self, segments: Array, root: Indices, within: Array) -> Witness:
-        """Distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3), from the part
-        nearest to each.
+        """Distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3) from their nearest
+        parts.
 
-        The normal leads to the segment, on which the point is. `root` (k,) are patches. A distance
-        above `within` (k,) [m] is infinite, except within a solid.
+        The normal points to the segment, and the point lies on it. `root` (k,) are patches. A
+        distance above `within` (k,) [m] is infinite, except inside a solid.
         """
         may_be_inside = ((segments[:, 0] >= self._low) & (segments[:, 0] <= self._high)).all(
             axis=1
@@ -85,26 +100,29 @@ class Cloud:
         within = np.where(may_be_inside, np.inf, within)
         query, part = self.tree.near(segments, np.zeros(len(segments)), within, root, nearest=True)
         query, part = self._promising(segments, query, part)
-        found = _least(self.to_segments(part, segments[query]), query, len(segments), within)
+        witness = _least(self.to_segments(part, segments[query]), query, len(segments), within)
         if self.is_solid:
-            apart = np.flatnonzero(may_be_inside & (found[0] > 0))
-            inside = apart[self.inside(segments[apart, 0])]
-            found[0][inside] *= -1
-            found[1][inside] *= -1
-        return found
+            outside = np.flatnonzero(may_be_inside & (witness[0] > 0))
+            inside = outside[self.inside(segments[outside, 0])]
+            witness[0][inside] *= -1
+            witness[1][inside] *= -1
+        return witness
 
     def _promising(self, segments: Array, query: Indices, part: Indices) -> tuple[Indices, Indices]:
-        """Those (query, part) that may be nearer than the part of each query whose ball is
-        nearest."""
+        """The (query, part) that may be nearer than the part with the nearest ball of the same
+        query.
+        """
         if not self.tree.radii.any():
             return query, part
         least = point_segment(self.tree.centres[part], segments[query]) - self.tree.radii[part]
         order = np.lexsort((least, query))
         first = order[np.unique(query[order], return_index=True)[1]]
         reached = np.full(len(segments), np.inf)
-        reached[query[first]] = self.to_segments(part[first], segments[query[first]])[0] + ROUNDING
-        kept = least <= np.maximum(reached[query], 0.0)
-        return query[kept], part[kept]
+        reached[query[first]] = (
+            self.to_segments(part[first], segments[query[first]])[0] + TREE.rounding
+        )
+        is_candidate = least <= np.maximum(reached[query], 0.0)
+        return query[is_candidate], part[is_candidate]
 
     def to_segments(self, part: Indices, segments: Array) -> Witness:
         """Signed distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3) from parts
@@ -120,7 +138,7 @@ class Cloud:
         return distance, normal, point + centres
 
     def highest(self, part: Indices, direction: Array) -> Array:
-        """max n·x (k,) [m] over parts (k,) for n (k, 3)."""
+        """Greatest n·x (k,) [m] over parts (k,) for n (k, 3)."""
         if self.corners is not None:
             return np.asarray(np.einsum("kci,ki->kc", self.corners[part], direction).max(axis=1))
         height = np.einsum("ki,ki->k", self.tree.centres[part], direction)
@@ -129,11 +147,13 @@ class Cloud:
         )
 
     def inside(self, points: Array) -> Indices:
-        """Indices of the points (k, 3) that a closed mesh encloses: the crossings of a ray do not
+        """Indices of the points (k, 3) inside a closed mesh: the signed crossings of a ray do not
         cancel out.
         """
         assert self.corners is not None
-        rays = np.stack([points, points + RAY * 2 * np.linalg.norm(self._high - self._low)], axis=1)
+        rays = np.stack(
+            [points, points + RAY_DIRECTION * 2 * np.linalg.norm(self._high - self._low)], axis=1
+        )
         none = np.zeros(len(points))
         query, part = self.tree.near(rays, none, none, np.zeros(len(points), dtype=np.intp))
         triangles, ray = self.corners[part], rays[query]
@@ -161,11 +181,11 @@ class Cloud:
 
 
 class ConvexAgainstCloud:
-    """Distances of one convex core that is no segment, part by part, by Coal."""
+    """Distances of one convex core other than a segment, part by part, by Coal."""
 
     def __init__(self, cloud: Cloud, core: Core) -> None:
         self._cloud, self._core = cloud, core
-        # a ball around the core, whose centre is in it
+        # A ball around the core, with its centre inside the core.
         self._centre = core.points.mean(axis=0)
         self._radius = (
             float(np.linalg.norm(core.points - self._centre, axis=1).max()) + core.disc_radius
@@ -173,7 +193,9 @@ class ConvexAgainstCloud:
         self._pairs = ConvexPairs(_Cores(cloud, core))
 
     def nearest(self, T: Array, root: Indices, within: Array) -> Witness:
-        """As `Cloud.nearest`, for the core at T (k, 4, 4) in the frame of the cloud."""
+        """Distances as of `Cloud.nearest`, for the core at T (k, 4, 4) in the frame of the
+        cloud.
+        """
         cloud = self._cloud
         balls, reach = self.balls(T)
         if cloud.is_solid:
@@ -190,26 +212,27 @@ class ConvexAgainstCloud:
         )
         for k in order.tolist():
             q = int(query[k])
-            # the parts of a query come in the order of their lower bounds
+            # The parts of a query are ordered by their lower bounds.
             if least[k] < min(distance[q], within[q]):
                 d, n, p = self.to_cores(part[k : k + 1], T[q : q + 1])
                 if d[0] < distance[q] and d[0] <= within[q]:
                     distance[q], normal[q], point[q] = d[0], n[0], p[0]
         if cloud.is_solid:
-            apart = np.flatnonzero(distance > 0)
-            inside = apart[cloud.inside(balls[apart, 0])]
+            outside = np.flatnonzero(distance > 0)
+            inside = outside[cloud.inside(balls[outside, 0])]
             distance[inside] *= -1
             normal[inside] *= -1
         return distance, normal, point
 
     def balls(self, T: Array) -> tuple[Array, Array]:
-        """Segments (k, 2, 3) of no length and radii (k,) [m]: balls around the core at T (k, 4,
-        4)."""
+        """Balls around the core at T (k, 4, 4), as segments (k, 2, 3) of zero length and radii (k,)
+        [m].
+        """
         centres = T[:, :3, :3] @ self._centre + T[:, :3, 3]
         return np.repeat(centres[:, None], 2, axis=1), np.full(len(T), self._radius)
 
     def to_cores(self, part: Indices, T: Array) -> Witness:
-        """As `Cloud.to_segments`, for the core at T (k, 4, 4)."""
+        """Distances as of `Cloud.to_segments`, for the core at T (k, 4, 4)."""
         T_part = np.tile(np.eye(4), (len(part), 1, 1))
         if self._cloud.corners is None:
             T_part[:, :3, 3] = self._cloud.tree.centres[part]
@@ -217,9 +240,7 @@ class ConvexAgainstCloud:
 
 
 class _Cores(Sequence[Core]):
-    """The moving core, then the cores of the parts, each in its own frame: only those in use are
-    made.
-    """
+    """The moving core, then the cores of the parts, each in its own frame and built on demand."""
 
     def __init__(self, cloud: Cloud, core: Core) -> None:
         self._cloud, self._core = cloud, core
@@ -245,18 +266,18 @@ class _Cores(Sequence[Core]):
 
 
 def divided(triangles: Array) -> Array:
-    """Triangles (m, 3, 3) [m] whose union is that of triangles (k, 3, 3), without edges longer than
-    LONGEST_EDGE.
+    """Triangles (m, 3, 3) [m] with the same union as triangles (k, 3, 3), without edges longer than
+    `longest_edge`.
 
-    Balls around long triangles would be mostly empty. The longest edges are halved; at MOST_DIVIDED
-    triangles it ends.
+    Balls around long triangles would be mostly empty. The longest edges are halved until
+    `max_triangles` triangles are reached.
     """
     while True:
         edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-        long = edges.max(axis=1) > LONGEST_EDGE
-        if not long.any() or len(triangles) + long.sum() > MOST_DIVIDED:
+        long = edges.max(axis=1) > CLOUDS.longest_edge
+        if not long.any() or len(triangles) + long.sum() > CLOUDS.max_triangles:
             return triangles
-        # the longest edge is turned to the front: from corner 0 to corner 1
+        # The corners are rotated so that the longest edge is from corner 0 to corner 1.
         turn = (edges[long].argmax(axis=1)[:, None] + np.arange(3)) % 3
         a, b, c = (triangles[long][np.arange(len(turn)), turn[:, i]] for i in range(3))
         middle = (a + b) / 2
@@ -265,7 +286,7 @@ def divided(triangles: Array) -> Array:
 
 
 def _digest(shape: Shape) -> bytes:
-    """A digest of the parts; the radius of points is none of them."""
+    """Digest of the parts; the radius of points is not included."""
     match shape:
         case Points():
             content = [b"points", shape.points.tobytes()]
@@ -277,27 +298,27 @@ def _digest(shape: Shape) -> bytes:
 
 
 @cached(
-    LRUCache(MOST_KEPT_PARTS, getsizeof=lambda cloud: cloud.count),
+    LRUCache(CLOUDS.max_kept_parts, getsizeof=lambda cloud: cloud.count),
     key=_digest,
     lock=threading.Lock(),
 )
 def cloud_of(shape: Shape) -> Cloud:
-    """The parts of an obstacle and their tree. Those of the last requests are kept, by content."""
+    """Parts of an obstacle and their tree. Those of recent requests are kept, by content."""
     return Cloud(shape)
 
 
-def _least(found: Witness, query: Indices, count: int, within: Array) -> Witness:
-    """The nearest of the parts of every query; infinitely far if there is none within its limit."""
+def _least(witness: Witness, query: Indices, count: int, within: Array) -> Witness:
+    """Nearest part of every query; infinitely far if no part is within its limit."""
     distance, normal, point = (
         np.full(count, np.inf),
         np.tile([0.0, 0.0, 1.0], (count, 1)),
         np.zeros((count, 3)),
     )
-    order = np.lexsort((found[0], query))
+    order = np.lexsort((witness[0], query))
     first = order[np.unique(query[order], return_index=True)[1]]
-    first = first[found[0][first] <= within[query[first]]]
+    first = first[witness[0][first] <= within[query[first]]]
     distance[query[first]], normal[query[first]], point[query[first]] = (
-        each[first] for each in found
+        each[first] for each in witness
     )
     return distance, normal, point
 

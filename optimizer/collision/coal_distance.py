@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import coal
 import numpy as np
@@ -13,53 +14,68 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.deadline import checkpoint
 
-# tolerances of the distance [m], tried in turn. Coal's default of 1e-6 is too coarse for the line
-# search of the optimiser; deep inside a round body, EPA may not converge to the finest, and the
-# next is tried
-TOLERANCES = (1e-10, 1e-6, 1e-4)
-MOST_ITERATIONS = 500
-# Coal needs bodies with a volume: a point or a segment is grown by this radius [m], which is added
-# to the distance
-SKIN = 1e-2
-# Coal reports a failure by a distance beyond this [m]
-MOST_DISTANCE = 1e6
-# pairs between two looks at the deadline: some ten milliseconds
-PER_CHECK = 2048
+
+@dataclass(frozen=True)
+class CoalSettings:
+    """Settings of Coal's distances."""
+
+    tolerances: tuple[float, ...] = (1e-10, 1e-6, 1e-4)
+    """Tolerances of the distance [m] in successive attempts. Coal's default of 1e-6 is too coarse
+    for the line search of the optimiser; deep inside a round body, EPA may not converge to the
+    finest one.
+    """
+    max_iterations: int = 500
+    """Largest number of iterations of GJK and of EPA."""
+    skin: float = 1e-2
+    """Radius [m] by which a point or a segment is grown, since Coal needs bodies with a volume; it
+    is added to the distance.
+    """
+    largest_distance: float = 1e6
+    """Distance [m] beyond which a result of Coal signals a failure."""
+    pairs_per_check: int = 2048
+    """Pairs between two checks of the deadline, about ten milliseconds."""
+
+
+COAL = CoalSettings()
 
 
 class ConvexPairs:
-    """Distances between cores; the shapes that Coal needs are built once per core."""
+    """Distances between cores; Coal's shapes are built once per core."""
 
     def __init__(self, cores: Sequence[Core]) -> None:
         self._cores = cores
         self._shapes: dict[int, tuple[coal.CollisionGeometry, float, coal.Transform3s]] = {}
-        self._requests = [_request(tolerance) for tolerance in TOLERANCES]
+        self._requests = [_request(tolerance) for tolerance in COAL.tolerances]
 
     def witness_points(
         self, first: Iterable[int], second: Iterable[int], T_first: Array, T_second: Array
     ) -> tuple[Array, Array, Array]:
-        """Signed distance (k,) [m], normal (k, 3) from first to second, and a point (k, 3) [m] of
-        the second core.
+        """Signed distance (k,) [m], normal (k, 3) from first to second, and witness point (k, 3)
+        [m] of the second core.
 
-        `first`, `second` (k,) are indices of cores, whose poses in the base frame are T_first,
-        T_second (k, 4, 4). The point is the witness point. If Coal does not converge, the distance
-        is a lower bound.
+        If Coal does not converge, the distance is a lower bound.
+
+        Args:
+            first: indices (k,) of the first cores.
+            second: indices (k,) of the second cores.
+            T_first: poses (k, 4, 4) of the first cores in the base frame.
+            T_second: poses (k, 4, 4) of the second cores in the base frame.
         """
         count = len(T_first)
         distance, normal, point = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
         for k, (i, j) in enumerate(zip(first, second, strict=True)):
-            if k % PER_CHECK == PER_CHECK - 1:
+            if k % COAL.pairs_per_check == COAL.pairs_per_check - 1:
                 checkpoint()
             (a, skin_a, local_a), (b, skin_b, local_b) = self._shape(int(i)), self._shape(int(j))
             pose_a, pose_b = _transform(T_first[k]) * local_a, _transform(T_second[k]) * local_b
             for request in self._requests:
                 result = coal.DistanceResult()
-                found = coal.distance(a, pose_a, b, pose_b, request, result)
+                value = coal.distance(a, pose_a, b, pose_b, request, result)
                 if (
-                    abs(found) < MOST_DISTANCE
+                    abs(value) < COAL.largest_distance
                     and abs(float(result.normal @ result.normal) - 1) < 1e-6
                 ):
-                    distance[k], normal[k] = found + skin_a + skin_b, result.normal
+                    distance[k], normal[k] = value + skin_a + skin_b, result.normal
                     point[k] = result.getNearestPoint2() + skin_b * result.normal
                     break
             else:
@@ -70,7 +86,7 @@ class ConvexPairs:
 
     def _shape(self, number: int) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
         shape = self._shapes.get(number)
-        # two threads may both make it; all of them go on with the first
+        # Two threads may both build it; all threads use the first one.
         return (
             self._shapes.setdefault(number, coal_shape(self._cores[number]))
             if shape is None
@@ -101,8 +117,8 @@ def _lower_bound(
 
 
 def _support(core: Core, T: Array, directions: Array) -> tuple[Array, npt.NDArray[np.intp]]:
-    """min n·x (k,) [m] over a core at T (4, 4) for directions n (k, 3), and the index (k,) of its
-    point there.
+    """Least n·x (k,) [m] over a core at T (4, 4) for directions n (k, 3), and the index (k,) of the
+    attaining point.
     """
     in_core = directions @ T[:3, :3]
     heights = in_core @ core.points.T
@@ -113,12 +129,12 @@ def _support(core: Core, T: Array, directions: Array) -> tuple[Array, npt.NDArra
 def _request(tolerance: float) -> coal.DistanceRequest:
     request = coal.DistanceRequest(True, True)
     request.gjk_tolerance = request.epa_tolerance = tolerance
-    request.gjk_max_iterations = request.epa_max_iterations = MOST_ITERATIONS
+    request.gjk_max_iterations = request.epa_max_iterations = COAL.max_iterations
     return request
 
 
 def coal_shape(core: Core) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
-    """Coal's shape of a core, the radius [m] by which it is grown, and its pose in the frame of the
+    """Coal's shape of a core, its growth [m] beyond the core, and its pose in the frame of the
     core.
 
     A half-space has no such shape.
@@ -133,16 +149,16 @@ def coal_shape(core: Core) -> tuple[coal.CollisionGeometry, float, coal.Transfor
         length = float(np.linalg.norm(along))
         local[:3, 3] = points.mean(axis=0)
         if length == 0:
-            return coal.Sphere(SKIN), SKIN, _transform(local)
+            return coal.Sphere(COAL.skin), COAL.skin, _transform(local)
         z = along / length
         x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
         x /= np.linalg.norm(x)
         local[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-        return coal.Capsule(SKIN, length), SKIN, _transform(local)
+        return coal.Capsule(COAL.skin, length), COAL.skin, _transform(local)
     vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for vertex in points:
         vertices.append(vertex)
-    # a triangle is a body with two faces and no volume
+    # A triangle is a body with two faces and no volume.
     for triangle in [[0, 1, 2], [0, 2, 1]] if len(points) == 3 else _outward(points):
         triangles.append(coal.Triangle(*triangle))
     return coal.Convex(vertices, triangles), 0.0, _transform(local)

@@ -1,7 +1,7 @@
 """Geometry of shapes for distances: every shape is a convex core grown by a radius.
 
 The core is a point or segment, a box, the two discs of a cylinder, or the hull of a mesh; the
-half-space is a case of its own. Signed distances are computed between cores, and the radii are
+half-space is a separate case. Signed distances are computed between cores, and the radii are
 subtracted at the end.
 """
 
@@ -23,12 +23,12 @@ Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 @dataclass(frozen=True)
 class Core:
-    """The convex hull of `points` (m, 3) [m] in the frame of the shape, each point widened to a
+    """Convex hull of `points` (m, 3) [m] in the frame of the shape, with every point widened to a
     disc about z.
 
-    `radius` [m] grows the hull, `disc_radius` [m] is that of the discs (0: points). `half_size`
-    (3,) [m] is set for a box: half of its edges. If `is_half_space`, the core is instead all that
-    lies below its one point, z up.
+    `radius` [m] grows the hull, `disc_radius` [m] is the radius of the discs (0 for points).
+    `half_size` (3,) [m], half of the edges, is set for a box. If `is_half_space`, the core is
+    instead the half-space below its single point, with z up.
     """
 
     points: Array
@@ -39,15 +39,16 @@ class Core:
 
     @cached_property
     def planes(self) -> Array:
-        """Of a hull of points: its faces (f, 4), outward normals and offsets [m], `n · x + d <= 0`
+        """Faces (f, 4) of a hull of points: outward normals and offsets [m], with `n · x + d <= 0`
         inside.
         """
         return np.asarray(ConvexHull(self.points).equations)
 
 
 def core_of(shape: Shape) -> Core:
-    """Core of a shape, in the frame of the shape. Obstacles of many parts have none: see
-    `clouds`."""
+    """Core of a shape, in the frame of the shape. Obstacles of many parts have no core, see
+    `clouds`.
+    """
     match shape:
         case Sphere():
             return Core(np.zeros((1, 3)), shape.radius)
@@ -69,15 +70,15 @@ def core_of(shape: Shape) -> Core:
 
 
 def box_corners(low: Array, high: Array) -> Array:
-    """The corners (8, 3) [m] of the box between two of them."""
+    """Corners (8, 3) [m] of the box between its least and greatest corner."""
     return np.array(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij")).reshape(3, 8).T
 
 
 def least_height(core: Core, points: Array) -> Array:
-    """Lower bounds (k,) [m] on the distances of points (k, 3) [m], in the frame of the core, from
-    it.
+    """Lower bounds (k,) [m] on the distances of points (k, 3) [m] from a core, in the frame of the
+    core.
 
-    The core is a box, a cylinder's discs or a hull with a volume: no half-space, point or segment.
+    The core is a box, a cylinder or a hull with a volume, and no half-space, point or segment.
     """
     if core.half_size is not None:
         return np.asarray(np.linalg.norm(np.maximum(np.abs(points) - core.half_size, 0.0), axis=1))
@@ -93,5 +94,5 @@ def least_height(core: Core, points: Array) -> Array:
 
 
 def _on_z_axis(length: float) -> Array:
-    """Ends (2, 3) of a segment along z whose middle is the origin."""
+    """Ends (2, 3) of a segment along z about the origin."""
     return np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]])

@@ -1,8 +1,7 @@
-"""Collision model of an arm: bodies, the pairs that are checked, and their signed distances with
-gradients.
+"""Collision model of an arm: bodies, checked pairs, and signed distances with gradients.
 
 Everything is computed for many configurations at once. Configurations are q (n, nq) [rad] or the
-link frames there, `frames` (n, nq + 1, 4, 4) as `CollisionModel.frames` returns them.
+link frames there, `frames` (n, nq + 1, 4, 4) as returned by `CollisionModel.frames`.
 """
 
 from __future__ import annotations
@@ -20,9 +19,6 @@ from joulepath.optimizer.declared import Metres
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.problem.arm import Arm
 
-# along a motion, the distances at every so many samples are computed first
-STRIDE = 6
-
 
 @dataclass(frozen=True)
 class ClosestPair:
@@ -32,15 +28,17 @@ class ClosestPair:
     """Names of the two bodies: links, `tool`, `payload` or obstacles."""
     distance: Metres
     """Distance between the two bodies minus the obstacle's `margin`; if negative, the two bodies
-    are too close or overlap."""
+    are too close or overlap.
+    """
 
 
 @dataclass(frozen=True)
 class PairDistances:
-    """Signed distances (n, p) [m] of p pairs at n configurations; k of them are exact.
+    """Signed distances (n, p) [m] of p pairs at n configurations; k of them are exact, the others
+    are lower bounds.
 
-    `configuration`, `column` (k,) index the exact ones, `nearest` holds their witness points. The
-    others are lower bounds.
+    `configuration` and `column` (k,) index the exact distances, and `nearest` holds their witness
+    points.
     """
 
     distance: Array
@@ -50,12 +48,11 @@ class PairDistances:
 
 
 class CollisionModel:
-    """The bodies of an arm, and the `pairs` (p, 2) of them that are checked, the body nearer to the
-    base first.
+    """Bodies of an arm, and the checked `pairs` (p, 2) of bodies, in order from the base.
 
     Two links are checked unless they are adjacent or can never be in collision. Tool and payload
-    are checked against all links but those that they touch by design. The scene is checked against
-    every moving body. All distances have the margin of the obstacle subtracted.
+    are checked against all links except the links that they touch by design. The scene is checked
+    against every moving body. All distances have the margin of the obstacle subtracted.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -66,7 +63,7 @@ class CollisionModel:
         self._placements = joint_placements(arm.robot.model)
         joints = np.arange(1, self.nq + 1)
         first, second = self.geometry.links[self.pairs].T
-        # the joints (p, nq) that move the second body relative to the first
+        # Joints (p, nq) that move the second body relative to the first.
         self.joints_between = (joints > first[:, None]) & (joints <= second[:, None])
 
     def names(self, pair: int) -> tuple[str, str]:
@@ -86,11 +83,11 @@ class CollisionModel:
         balls, a lower bound, and the gradient zero.
         """
         frames = self.frames(q)
-        found = self.pair_distances(frames, within=within)
-        gradient = np.zeros((*found.distance.shape, self.nq))
-        exact = found.configuration, found.column
-        gradient[exact] = self.gradients(frames, *exact, found.nearest)
-        return found.distance, gradient
+        distances = self.pair_distances(frames, within=within)
+        gradient = np.zeros((*distances.distance.shape, self.nq))
+        exact = distances.configuration, distances.column
+        gradient[exact] = self.gradients(frames, *exact, distances.nearest)
+        return distances.distance, gradient
 
     def pair_distances(
         self,
@@ -99,17 +96,22 @@ class CollisionModel:
         within: float = np.inf,
         known: Array | None = None,
     ) -> PairDistances:
-        """Signed distances of `pairs` (p,), by default of every pair, at n configurations.
+        """Signed distances of pairs at n configurations.
 
-        They are exact for half-spaces, and for pairs whose lower bounds are at most `within` [m],
-        of patches of a cloud only those that are at most `within` apart themselves. `known` (n, p)
-        are lower bounds: balls bound only what they leave open.
+        Exact are the distances of half-spaces, and of pairs with lower bounds of at most `within`;
+        patches of a cloud are exact only if their distance is at most `within`.
+
+        Args:
+            frames: link frames.
+            pairs: pairs (p,), by default every pair.
+            within: limit of exact distances [m].
+            known: lower bounds (n, p) [m]; balls are used only if these do not exceed `within`.
         """
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
         distance, configuration, column = self.geometry.bounds(frames, pairs, within, known)
         nearest = self.geometry.witness_points(frames, configuration, pairs[column], within)
         if self.geometry.is_cloud.any() and np.isfinite(within):
-            # no part of these patches is within the limit, which is then the better lower bound
+            # No part of these patches is within the limit, so the limit is the better lower bound.
             beyond = np.isinf(nearest.distance)
             far = configuration[beyond], column[beyond]
             distance[far] = np.maximum(distance[far], within)
@@ -121,60 +123,64 @@ class CollisionModel:
         distance[configuration, column] = nearest.distance
         return PairDistances(distance, configuration, column, nearest)
 
-    def along(self, q: Array, within: float, pairs: Indices | None = None) -> Array:
+    def distances_along(
+        self, q: Array, within: float, pairs: Indices | None = None, stride: int = 6
+    ) -> Array:
         """Signed distances (n, p) [m] at consecutive samples q (n, nq) [rad] of a motion, exact up
         to `within` [m].
 
-        Those of every STRIDE-th sample bound the others from below, since a distance changes no
-        faster than the levers allow. Most of the others need not be computed. Several motions may
-        follow one another.
+        The distances at every `stride`-th sample bound the others from below, since a distance
+        changes no faster than the levers allow. Most of the others need not be computed. The
+        samples may be those of several consecutive motions.
         """
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
         frames, rows, count = self.frames(q), np.arange(len(q)), len(q)
-        if count <= 2 * STRIDE or not len(pairs):
+        if count <= 2 * stride or not len(pairs):
             return self.pair_distances(frames, pairs, within).distance
-        chosen = np.append(rows[:-1:STRIDE], count - 1)
-        # half of the way between two of them: the median, since the leap from one motion to the
-        # next says nothing
-        reach = float(np.median(self.changes(np.diff(q[chosen], axis=0), pairs).max(axis=1))) / 2
+        chosen = np.append(rows[:-1:stride], count - 1)
+        # Half of the change between two chosen samples: the median, which ignores the jump from one
+        # motion to the next.
+        changes = self.greatest_changes(np.diff(q[chosen], axis=0), pairs).max(axis=1)
+        reach = float(np.median(changes)) / 2
         result = np.empty((count, len(pairs)))
         result[chosen] = self.pair_distances(frames[chosen], pairs, within + reach).distance
         rest = np.delete(rows, chosen)
-        before = chosen[rest // STRIDE]
-        after = np.minimum(before + STRIDE, count - 1)
+        before = chosen[rest // stride]
+        after = np.minimum(before + stride, count - 1)
         known = np.maximum(
-            *(result[at] - self.changes(q[rest] - q[at], pairs) for at in (before, after))
+            *(result[at] - self.greatest_changes(q[rest] - q[at], pairs) for at in (before, after))
         )
         result[rest] = self.pair_distances(frames[rest], pairs, within, known).distance
         return result
 
-    def changes(self, move: Array, pairs: Indices) -> Array:
-        """Greatest changes (n, p) [m] of the distances of `pairs` (p,) when the joints move by
+    def greatest_changes(self, move: Array, pairs: Indices) -> Array:
+        """Greatest changes (n, p) [m] of the distances of `pairs` (p,) under joint displacements
         `move` (n, nq) [rad].
         """
         return np.asarray(np.abs(move) @ self.levers_between[pairs].T)
 
     def pairs_within(self, frames: Array, within: float) -> Mask:
-        """Which pairs (p,) are less than `within` [m] apart at any of n configurations.
+        """Mask (p,) of pairs less than `within` [m] apart at any of n configurations.
 
-        Most are so where their lower bounds are least: few distances are needed.
+        Most of these pairs are that near at the configuration with their least lower bound, so few
+        distances are needed.
         """
         every = np.arange(len(self.pairs))
         bound = self.geometry.bounds(frames, every, within)[0]
-        least = bound.argmin(axis=0)
-        found = np.zeros(len(every), dtype=bool)
-        (near,) = np.nonzero((bound[least, every] < within) & ~self.geometry.is_cloud)
-        found[near] = self.geometry.witness_points(frames, least[near], near).distance < within
-        (rest,) = np.nonzero((bound[least, every] < within) & ~found)
-        found[rest] = (
-            self.pair_distances(frames, rest, within, bound[:, rest]).distance < within
+        closest = bound.argmin(axis=0)
+        is_within = np.zeros(len(every), dtype=bool)
+        (near,) = np.nonzero((bound[closest, every] < within) & ~self.geometry.is_cloud)
+        is_within[near] = (
+            self.geometry.witness_points(frames, closest[near], near).distance < within
+        )
+        (undecided,) = np.nonzero((bound[closest, every] < within) & ~is_within)
+        is_within[undecided] = (
+            self.pair_distances(frames, undecided, within, bound[:, undecided]).distance < within
         ).any(axis=0)
-        return found
+        return is_within
 
     def chosen_distances(self, frames: Array, pairs: Indices, wanted: Mask) -> PairDistances:
-        """Exact signed distances of those of `pairs` (p,) that are `wanted` (n, p); the others are
-        zero.
-        """
+        """Exact signed distances of the `wanted` (n, p) among `pairs` (p,); the others are zero."""
         configuration, column = np.nonzero(wanted)
         nearest = self.geometry.witness_points(frames, configuration, pairs[column])
         distance = np.zeros(wanted.shape)
@@ -182,10 +188,10 @@ class CollisionModel:
         return PairDistances(distance, configuration, column, nearest)
 
     def least_distance(self, q: Array, within: float) -> float:
-        """The least signed distance [m] over all pairs and q (n, nq) [rad]; if above `within`, a
-        lower bound above it.
+        """Least signed distance [m] over all pairs and q (n, nq) [rad], or a lower bound above
+        `within`.
 
-        Infinite if no pair is checked.
+        It is infinite if no pair is checked.
         """
         return float(
             self.pair_distances(self.frames(q), within=within).distance.min(initial=np.inf)
@@ -194,56 +200,57 @@ class CollisionModel:
     def closest_pairs(
         self, q: Sequence[Array] | Array, within: float = np.inf
     ) -> list[ClosestPair]:
-        """The closest pair at each of q (n, nq) [rad]; an empty list if no pair is checked.
+        """Closest pair at every q (n, nq) [rad]; an empty list if no pair is checked.
 
-        If no distance is below `within` [m], `distance` is only a lower bound, and the pair may be
-        another one.
+        If no distance is below `within` [m], `distance` is only a lower bound, and another pair may
+        be closer.
         """
         if not (len(self.pairs) and len(q)):
             return []
         frames = self.frames(np.asarray(q))
-        # configurations that differ by full turns have the same frames: each set of frames is
-        # computed once
+        # Configurations that differ by full turns have the same frames, and these are computed
+        # once.
         rounded = np.round(frames[:, 1:, :3], 9) + 0.0
         rows: dict[bytes, int] = {}
-        which = [rows.setdefault(each.tobytes(), len(rows)) for each in rounded]
-        distinct = np.unique(which, return_index=True)[1]
+        row_of = [rows.setdefault(frame.tobytes(), len(rows)) for frame in rounded]
+        distinct = np.unique(row_of, return_index=True)[1]
         distance = self.pair_distances(frames[distinct], within=within).distance
         closest = distance.argmin(axis=1)
-        found = [
+        pairs = [
             ClosestPair(self.names(int(k)), float(d[k]))
             for k, d in zip(closest, distance, strict=True)
         ]
-        return [found[k] for k in which]
+        return [pairs[k] for k in row_of]
 
     def nearest_points(self, frames: Array, pair: int) -> tuple[list[float], list[float]]:
-        """The nearest points [m] of a pair on the surfaces of its first and second body, without
-        margins, at the frames (1, nq + 1, 4, 4)."""
-        found = self.geometry.witness_points(frames, np.array([0]), np.array([pair]))
-        first, second = self.geometry.surface_points(np.array([pair]), found)[0].tolist()
+        """Nearest points [m] of a pair on the surfaces of its first and second body, without
+        margins, at the frames (1, nq + 1, 4, 4).
+        """
+        witness = self.geometry.witness_points(frames, np.array([0]), np.array([pair]))
+        first, second = self.geometry.surface_points(np.array([pair]), witness)[0].tolist()
         return first, second
 
     def gradients(
-        self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints
+        self, frames: Array, configuration: Indices, pair: Indices, witness: WitnessPoints
     ) -> Array:
-        """Gradients (k, nq) [m/rad] of signed distances: n · (axis × (point - origin)) of every
-        joint in between.
+        """Gradients (k, nq) [m/rad] of signed distances: n · (axis × (point - origin)) for every
+        joint between the two bodies.
 
         By the envelope theorem, the motion of the witness points over the bodies does not
         contribute.
         """
-        return self.geometry.gradients(frames, configuration, pair, found)
+        return self.geometry.gradients(frames, configuration, pair, witness)
 
     @cached_property
     def levers_between(self) -> Array:
-        """Levers (p, nq) [m] of the joints between, else 0: a pair's distance changes by no more
-        per radian.
+        """Levers (p, nq) [m] of the joints between the bodies of a pair, zero for other joints:
+        greatest changes of the pair's distance per radian.
         """
         return np.asarray(self.levers() * self.joints_between)
 
     def levers(self) -> Array:
         """Upper bounds (p, nq) [m], over all configurations, on the distance of a pair's second
-        core from each axis.
+        core from every joint axis.
         """
         offsets = self._placements[:, :3, 3]
         across = np.hypot(offsets[:, 0], offsets[:, 1])
@@ -258,8 +265,8 @@ class CollisionModel:
                 float(np.hypot(body.points[:, 0], body.points[:, 1]).max()) + radius
             )
             for joint in range(body.link - 2, -1, -1):
-                # the offset of the next joint, in the frame of this one: its part along this axis
-                # is no lever
+                # Offset of the next joint in the frame of this joint; its part along the axis is no
+                # lever.
                 result[k, joint] = across[joint + 1] + reach
                 reach += lengths[joint + 1]
         return np.asarray(result[self.pairs[:, 1]])
@@ -273,16 +280,16 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
     for k in moving:
         link = bodies[k].link
         if k in links:
-            apart = [
+            others = [
                 i
                 for i in links
                 if link - bodies[i].link > 1
                 and (bodies[i].link, link) not in arm.robot.never_in_collision
             ]
         else:
-            apart = [i for i in links if bodies[i].link not in bodies[k].touches]
+            others = [i for i in links if bodies[i].link not in bodies[k].touches]
         obstacles = range(len(moving), len(bodies)) if link > 0 else ()
-        pairs += [(i, k) for i in (*apart, *obstacles)]
+        pairs += [(i, k) for i in (*others, *obstacles)]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 

@@ -1,4 +1,4 @@
-"""Bodies and the pairs of them that are checked, as arrays: what distances are computed from."""
+"""Bodies and their checked pairs as arrays, the input of distance computations."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.collision.bodies import Body, Indices
 
-# beads that cover a body
-BEADS = 4
+COVER_SPHERES = 4
+"""Number of spheres that cover a body."""
 
 
 class PairKind(IntEnum):
-    """What computes the distance of a pair, by the cores of its first and second body."""
+    """Method that computes the distance of a pair, by the cores of its first and second body."""
 
     SEGMENT_SEGMENT = 0
     BOX_SEGMENT = 1
@@ -30,16 +30,17 @@ class PairKind(IntEnum):
 class PairArrays:
     """Arrays of b bodies, in the frames of their links, and of p pairs.
 
-    `points` (b, m, 3) [m] are those of the cores, of which the first `counts` (b,) are their own.
-    `axes` (b, 3) and `disc_radii` (b,) [m] are those of cylinders, and `half_sizes` (b, 3) [m]
-    those of boxes about `T_link_core` (b, 4, 4); else zero. Balls about `ball_centres` (b, 3) [m],
-    and beads about `bead_centres` (b, BEADS, 3) [m], cover the cores without their `radii` (b,)
-    [m].
+    `points` (b, m, 3) [m] are the points of the cores; the first `counts` (b,) of them are
+    distinct. `axes` (b, 3) and `disc_radii` (b,) [m] describe cylinders, and `half_sizes` (b, 3)
+    [m] boxes about `T_link_core` (b, 4, 4); they are zero for other cores. Balls about
+    `ball_centres` (b, 3) [m], and spheres about `cover_centres` (b, COVER_SPHERES, 3) [m], cover
+    the cores without their `radii` (b,) [m].
 
-    `pairs` (p, 2) are indices of bodies, and `growth` (p,) [m] what radii and margins take from
-    their distance. `formed` (p,) is the body of a pair whose form, of half size `form_sizes` (b, 3)
-    [m] about z, is `is_cycle` (b,) or a box; `beaded` (p,) is the other one. `formed` is negative
-    where beads say nothing.
+    `pairs` (p, 2) are indices of bodies, and `growth` (p,) [m] is the sum of radii and margins to
+    subtract from their distance. `primitive` (p,) is the body of a pair that is a cylinder
+    (`is_cylinder` (b,)) or a box, of half size `primitive_half_sizes` (b, 3) [m] about z; `covered`
+    (p,) is the other body. `primitive` is negative for pairs without a useful bound by covering
+    spheres.
     """
 
     links: Indices
@@ -52,35 +53,37 @@ class PairArrays:
     radii: Array
     ball_centres: Array
     ball_radii: Array
-    bead_centres: Array
-    bead_radii: Array
-    form_sizes: Array
-    is_cycle: Mask
+    cover_centres: Array
+    cover_radii: Array
+    primitive_half_sizes: Array
+    is_cylinder: Mask
     pairs: Indices
     kinds: Indices
     growth: Array
-    formed: Indices
-    beaded: Indices
+    primitive: Indices
+    covered: Indices
 
     @staticmethod
     def of(bodies: Sequence[Body], pairs: Indices) -> PairArrays:
-        """The arrays of bodies and of pairs (p, 2) of them."""
+        """Arrays of bodies, and of pairs (p, 2) of them."""
         cores = [body.core for body in bodies]
-        most = max((len(body.points) for body in bodies), default=1)
+        max_points = max((len(body.points) for body in bodies), default=1)
         radii = np.array([core.radius for core in cores])
         growth = radii + np.array([body.margin for body in bodies])
-        form_sizes = np.array([_form_size(body) for body in bodies]).reshape(-1, 3)
-        has_form, (first, second) = form_sizes[:, 2] >= 0, pairs.T
-        # no beads cover a half-space
+        primitive_half_sizes = np.array([_primitive_half_size(body) for body in bodies]).reshape(
+            -1, 3
+        )
+        is_primitive, (first, second) = primitive_half_sizes[:, 2] >= 0, pairs.T
+        # No spheres cover a half-space.
         unbounded = np.array([core.is_half_space for core in cores], dtype=bool)
-        has_bound = (has_form[first] | has_form[second]) & ~unbounded[first]
+        has_bound = (is_primitive[first] | is_primitive[second]) & ~unbounded[first]
         return PairArrays(
             links=np.array([body.link for body in bodies], dtype=np.intp),
-            # cores with fewer points repeat their last point. The box around a patch of a cloud
-            # stands for the patch: its separations are lower bounds
+            # Cores with fewer points repeat their last point. A patch of a cloud is represented by
+            # the box around it, whose separations are lower bounds.
             points=np.array(
-                [b.points[np.minimum(np.arange(most), len(b.points) - 1)] for b in bodies]
-            ).reshape(-1, most, 3),
+                [b.points[np.minimum(np.arange(max_points), len(b.points) - 1)] for b in bodies]
+            ).reshape(-1, max_points, 3),
             counts=np.array([len(body.points) for body in bodies], dtype=np.intp),
             axes=np.array([body.T_link_core[:3, 2] for body in bodies]),
             disc_radii=np.array([core.disc_radius for core in cores]),
@@ -91,22 +94,24 @@ class PairArrays:
             radii=radii,
             ball_centres=np.array([body.ball_centre for body in bodies]).reshape(-1, 3),
             ball_radii=np.array([body.ball_radius for body in bodies]),
-            bead_centres=np.array([_bead_centres(body) for body in bodies]).reshape(-1, BEADS, 3),
-            bead_radii=np.array(
-                [body.ball_radius / (BEADS if body.is_segment else 1) for body in bodies]
+            cover_centres=np.array([_cover_centres(body) for body in bodies]).reshape(
+                -1, COVER_SPHERES, 3
             ),
-            form_sizes=form_sizes,
-            is_cycle=np.array([core.disc_radius > 0 for core in cores], dtype=bool),
+            cover_radii=np.array(
+                [body.ball_radius / (COVER_SPHERES if body.is_segment else 1) for body in bodies]
+            ),
+            primitive_half_sizes=primitive_half_sizes,
+            is_cylinder=np.array([core.disc_radius > 0 for core in cores], dtype=bool),
             pairs=pairs,
             kinds=_kinds(bodies, pairs),
             growth=growth[pairs].sum(axis=1),
-            formed=np.where(has_bound, np.where(has_form[first], first, second), -1),
-            beaded=np.where(has_form[first], second, first),
+            primitive=np.where(has_bound, np.where(is_primitive[first], first, second), -1),
+            covered=np.where(is_primitive[first], second, first),
         )
 
 
 def _kinds(bodies: Sequence[Body], pairs: Indices) -> Indices:
-    """The PairKind of every pair."""
+    """PairKind of every pair."""
     half_space = np.array([body.core.is_half_space for body in bodies], dtype=bool)[pairs]
     segment = np.array([body.is_segment for body in bodies], dtype=bool)[pairs]
     box = np.array([body.core.half_size is not None for body in bodies], dtype=bool)[pairs]
@@ -123,18 +128,18 @@ def _kinds(bodies: Sequence[Body], pairs: Indices) -> Indices:
     ).astype(np.intp)
 
 
-def _bead_centres(body: Body) -> Array:
-    """Centres (BEADS, 3) [m] of the beads in the link frame; the beads of a body that is no segment
-    coincide.
+def _cover_centres(body: Body) -> Array:
+    """Centres (COVER_SPHERES, 3) [m] of the covering spheres in the link frame; they coincide
+    unless the body is a segment.
     """
     if not body.is_segment:
-        return np.tile(body.ball_centre, (BEADS, 1))
-    fractions = (np.arange(BEADS) + 0.5) / BEADS
+        return np.tile(body.ball_centre, (COVER_SPHERES, 1))
+    fractions = (np.arange(COVER_SPHERES) + 0.5) / COVER_SPHERES
     return np.asarray(body.points[0] + fractions[:, None] * (body.points[-1] - body.points[0]))
 
 
-def _form_size(body: Body) -> Array:
-    """Half of the size (3,) [m] of a box or a cylinder about z; negative for any other core."""
+def _primitive_half_size(body: Body) -> Array:
+    """Half of the size (3,) [m] of a box or of a cylinder about z; negative for any other core."""
     core = body.core
     if core.half_size is not None:
         return core.half_size

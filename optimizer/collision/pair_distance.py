@@ -1,5 +1,4 @@
-"""Signed distances and witness points of pairs of bodies: closed forms where they exist, Coal for
-the other pairs.
+"""Signed distances and witness points of pairs of bodies, in closed form or by Coal.
 
 One call computes many pairs at many configurations. Index arrays (k,) select the computed cases:
 `configuration` is a row of `frames` (n, nq + 1, 4, 4), the T_base_link [m] of every link, and
@@ -39,7 +38,7 @@ class WitnessPoints:
         return WitnessPoints(self.distance[chosen], self.normal[chosen], self.point[chosen])
 
     def with_more(self, more: WitnessPoints) -> WitnessPoints:
-        """These and others."""
+        """These witness points, then others."""
         return WitnessPoints(
             *(
                 np.concatenate([getattr(self, name), getattr(more, name)])
@@ -70,12 +69,12 @@ class PairGeometry:
     def bounds(
         self, frames: Array, pairs: Indices, within: float, known: Array | None = None
     ) -> tuple[Array, Indices, Indices]:
-        """See `CompiledDistances.bounds`."""
+        """Lower bounds, see `CompiledDistances.bounds`."""
         return self._compiled.bounds(frames, pairs, within, known)
 
-    def bead_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
-        """See `CompiledDistances.bead_bounds`."""
-        return self._compiled.bead_bounds(frames, configuration, pair)
+    def cover_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
+        """Lower bounds by covering spheres, see `CompiledDistances.cover_bounds`."""
+        return self._compiled.cover_bounds(frames, configuration, pair)
 
     def witness_points(
         self,
@@ -87,42 +86,43 @@ class PairGeometry:
     ) -> WitnessPoints:
         """Witness points of pairs (k,) at configurations (k,).
 
-        The distance of a patch of a cloud is that of its nearest part, infinite if above `within`
-        [m]. Where `part` (k,) is not negative, it is that of this part.
+        The distance of a patch of a cloud is the distance of its nearest part, infinite if it
+        exceeds `within` [m], or of `part` (k,) if that is not negative.
         """
         result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair))
-        left = np.flatnonzero(~self.is_closed_form[pair])
-        of_cloud = self.is_cloud[pair[left]]
-        for chosen, is_cloud in ((left[~of_cloud], False), (left[of_cloud], True)):
+        remaining = np.flatnonzero(~self.is_closed_form[pair])
+        of_cloud = self.is_cloud[pair[remaining]]
+        for chosen, is_cloud in ((remaining[~of_cloud], False), (remaining[of_cloud], True)):
             if not chosen.size:
                 continue
-            case = frames, configuration[chosen]
+            selection = frames, configuration[chosen]
             if is_cloud:
                 parts = np.full(len(chosen), -1) if part is None else part[chosen]
                 beyond = within + self._arrays.growth[pair[chosen]]
-                found = self._clouds.witness_points(
-                    *case, *self._bodies(pair[chosen]), beyond, parts
+                witness = self._clouds.witness_points(
+                    *selection, *self._bodies(pair[chosen]), beyond, parts
                 )
             else:
-                found = self._by_coal(*case, pair[chosen])
-            result.distance[chosen], result.normal[chosen], result.point[chosen] = found
+                witness = self._by_coal(*selection, pair[chosen])
+            result.distance[chosen], result.normal[chosen], result.point[chosen] = witness
         result.distance[:] -= self._arrays.growth[pair]
         return result
 
-    def surface_points(self, pair: Indices, found: WitnessPoints) -> Array:
+    def surface_points(self, pair: Indices, witness: WitnessPoints) -> Array:
         """Nearest points (k, 2, 3) [m] of the first and the second body of pairs (k,), without
         margins.
         """
         first, second = self._bodies(pair)
-        gap = (found.distance + self._arrays.growth[pair])[:, None] * found.normal
-        # the witness point is on the second core, apart from these pairs
+        gap = (witness.distance + self._arrays.growth[pair])[:, None] * witness.normal
+        # The witness point is on the first core for these pairs, and on the second core for all
+        # others.
         on_first = (self._arrays.kinds[pair] == PairKind.SEGMENT_BOX)[:, None]
         cores = (
-            found.point - np.where(on_first, 0.0, gap),
-            found.point + np.where(on_first, gap, 0.0),
+            witness.point - np.where(on_first, 0.0, gap),
+            witness.point + np.where(on_first, gap, 0.0),
         )
         radii = self._arrays.radii
-        outward = radii[first][:, None] * found.normal, -radii[second][:, None] * found.normal
+        outward = radii[first][:, None] * witness.normal, -radii[second][:, None] * witness.normal
         return np.stack([core + out for core, out in zip(cores, outward, strict=True)], axis=1)
 
     def near_parts(
@@ -131,7 +131,7 @@ class PairGeometry:
         """All (case, part) (m,) of clouds with distances of at most `within` (k,) [m], for pairs
         (k,) of patches.
 
-        A few that are farther away are among them.
+        A few parts beyond it may be included.
         """
         return self._clouds.near(
             frames, configuration, *self._bodies(pair), within + self._arrays.growth[pair]
@@ -146,8 +146,11 @@ class PairGeometry:
         normals: tuple[Array, Array],
         part: Indices,
     ) -> Array:
-        """See `CompiledDistances.separations`. Where `part` (k,) is not negative, the first body is
-        this part of a cloud, which does not move; else it is the box around the patch."""
+        """Separations, see `CompiledDistances.separations`.
+
+        If `part` (k,) is not negative, the first body is this part of a cloud, which does not move;
+        otherwise it is the box around the patch.
+        """
         result = self._compiled.separations(frames, begin, end, pair, normals)
         chosen = np.flatnonzero(part >= 0)
         if chosen.size:
@@ -168,7 +171,7 @@ class PairGeometry:
         normals: Sequence[Array],
         part: Indices,
     ) -> Array:
-        """The separations (k,) [m] of parts of clouds."""
+        """Separations (k,) [m] of parts of clouds."""
         first, second = self._bodies(pair)
         best = np.full(len(pair), -np.inf)
         for normal in normals:
@@ -178,13 +181,13 @@ class PairGeometry:
         return np.asarray(best)
 
     def gradients(
-        self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints
+        self, frames: Array, configuration: Indices, pair: Indices, witness: WitnessPoints
     ) -> Array:
-        """See `CompiledDistances.gradients`."""
-        return self._compiled.gradients(frames, configuration, pair, found.normal, found.point)
+        """Gradients of signed distances, see `CompiledDistances.gradients`."""
+        return self._compiled.gradients(frames, configuration, pair, witness.normal, witness.point)
 
     def _bodies(self, pair: Indices) -> tuple[Indices, Indices]:
-        """The first and the second body of pairs (k,)."""
+        """First and second bodies of pairs (k,)."""
         first, second = self._arrays.pairs[pair].T
         return first, second
 

@@ -1,9 +1,8 @@
-"""What a tool and a payload that have no shape would touch: a rod up to the TCP and a ball stand in
-for them.
+"""Stand-ins for a tool and a payload without shapes: a rod up to the TCP, and a ball.
 
-Only links, given shapes and obstacles are kept apart. Where the flange carries a tool or a payload
-whose shape is not given, a motion can be certified although the gripper goes through the table. The
-stand-ins find this out on the final motion. They constrain nothing.
+Only links, given shapes and obstacles are kept apart. If the shape of a carried tool or payload is
+not given, a motion can be certified although the gripper passes through the table. The stand-ins
+detect this on the final motion; they do not constrain it.
 """
 
 from __future__ import annotations
@@ -22,26 +21,27 @@ from joulepath.optimizer.result.certificate import Clearance
 
 @dataclass(frozen=True)
 class StandInSettings:
-    """Sizes of the bodies that stand in for what has no shape. They are small, so that the real
-    body is hardly ever smaller."""
+    """Sizes of the stand-ins. They are small, so that a real body is rarely smaller."""
 
     tool_radius: float = 0.02
-    """Radius of the rod from the flange to the TCP [m]: slimmer than any gripper or torch that an
-    arm carries, and as slim as the suction cups."""
+    """Radius of the rod from the flange to the TCP [m]: at most the radius of any usual gripper,
+    torch or suction cup.
+    """
     payload_density: float = 1500.0
-    """Density [kg/m³] of the ball that has the payload's mass and centre: of plastics, or of metal
-    parts with the hollows that they have. Denser parts are smaller balls, but no part is as compact
-    as a ball."""
+    """Density [kg/m³] of the ball with the payload's mass and centre of mass: typical of plastics,
+    or of metal parts with their hollows. Denser parts are smaller balls, but no part is as compact
+    as a ball.
+    """
     contact: float = 1e-3
-    """Depth [m] up to which a contact is not told: a TCP that is set down on a surface is that near
-    to it.
+    """Depth [m] up to which a contact is not reported: a TCP set down on a surface is that near to
+    it.
     """
 
 
 @dataclass(frozen=True)
 class StandIns:
-    """The collision model of the stand-ins of an arm and its obstacles, without margins and without
-    the links.
+    """Collision model of the stand-ins of an arm and its obstacles, without margins and without the
+    links.
     """
 
     model: CollisionModel
@@ -49,8 +49,8 @@ class StandIns:
 
     @classmethod
     def of(cls, arm: Arm, settings: StandInSettings | None = None) -> StandIns | None:
-        """The stand-ins; None if there are no obstacles, if nothing lacks a shape, or if no
-        collisions are checked.
+        """Stand-ins of an arm; None without obstacles, without missing shapes, or without collision
+        checks.
         """
         settings = StandInSettings() if settings is None else settings
         if not (arm.collisions and arm.scene.obstacles):
@@ -69,25 +69,23 @@ class StandIns:
         return cls(CollisionModel(alone), settings)
 
     def contacts(self, t: Array, q: Array) -> list[Clearance]:
-        """The deepest contact of each stand-in at samples q (k, nq) [rad] of a motion, at times t
-        (k,) [s].
+        """Deepest contact of every stand-in at samples q (k, nq) [rad] of a motion, at times t (k,)
+        [s].
         """
-        distance = self.model.along(q, 0.0)
-        found = dict[str, Clearance]()
+        distance = self.model.distances_along(q, 0.0)
+        deepest = dict[str, Clearance]()
         for column in np.argsort(distance.min(axis=0), kind="stable"):
             row = int(distance[:, column].argmin())
             least = float(distance[row, column])
             if least >= -self.settings.contact:
                 break
             pair = self.model.names(int(column))
-            found.setdefault(pair[1], Clearance(least, least, pair, float(t[row])))
-        return list(found.values())
+            deepest.setdefault(pair[1], Clearance(least, least, pair, float(t[row])))
+        return list(deepest.values())
 
 
 def _rod(arm: Arm, radius: float) -> Attachment | None:
-    """The rod that begins at the flange and ends at the TCP; None for an arm with a tool, or with
-    no TCP of its own.
-    """
+    """Rod from the flange to the TCP; None for an arm with a tool, or without a TCP of its own."""
     tcp = arm.T_flange_tcp[:3, 3]
     length = float(np.linalg.norm(tcp))
     if arm.tool or not 2 * SIZES.smallest <= length <= SIZES.largest:
@@ -97,9 +95,7 @@ def _rod(arm: Arm, radius: float) -> Attachment | None:
 
 
 def _ball(arm: Arm, density: float) -> Attachment | None:
-    """The ball about the payload's centre of mass; None for one without mass, or with a shape of
-    its own.
-    """
+    """Ball about the payload's centre of mass; None for a payload without mass, or with a shape."""
     payload = arm.payload
     radius = float(np.cbrt(3 * payload.mass / (4 * np.pi * density)))
     if (

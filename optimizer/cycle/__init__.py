@@ -1,1 +1,1 @@
-"""Work cycles of many stops: the configuration at each stop, by a shortest path."""
+"""Cycles of many stops: least chains of configurations, with the motions between them."""

@@ -10,6 +10,7 @@ from operator import add
 
 import numpy as np
 
+from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import (
     CycleBaseline,
@@ -20,8 +21,9 @@ from joulepath.optimizer.cycle.cycle_solution import (
 from joulepath.optimizer.cycle.moves import moves_of
 from joulepath.optimizer.cycle.rest_energy import dwell_energies, rest_sensitivity
 from joulepath.optimizer.deadline import Clock
-from joulepath.optimizer.dynamics.interval import Known, saving_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, saving_interval
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import is_given_order_allowed
 from joulepath.optimizer.result.baseline import Baseline
@@ -117,7 +119,7 @@ def chain_baseline(
     sensitivity = reduce(add, [move.sensitivity for move in moves]) + rest_sensitivity_of_chain(
         search, nodes
     )
-    known = Known(energy, sensitivity, sum(move.duration for move in moves))
+    known = MotionEnergy(energy, sensitivity, sum(move.duration for move in moves))
     theirs = CycleEnergies(known, sum(move.energy.mechanical.total for move in moves))
     baseline = cycle_baseline(search.cycle, name, duration, theirs, True, ours)
     return replace(baseline, moves=moves_of(search, nodes, moves, {}))
@@ -153,22 +155,9 @@ def controller_default(
         prepared, q_start = leg.prepared, leg.start.q[node]
         q_goal = nearest(prepared.problem, q_start, leg.goal.q[goals])
         node = next(g for g in goals if (leg.goal.q[g] == q_goal).all())
-        found: dict[str, Baseline] = {
-            each.name: each
-            for each in baselines(
-                prepared.problem,
-                q_start,
-                q_goal[None],
-                1.0,
-                0.0,
-                prepared.torques,
-                prepared.potential,
-                prepared.broken_on_the_way,
-            )
-        }
-        if "controller_default" not in found:
+        move = _default_motion(prepared, q_start, q_goal)
+        if move is None:
             return None
-        move = found["controller_default"]
         total, work = total + move.electrical, work + move.mechanical
         duration += move.duration
         held &= move.within_limits
@@ -178,7 +167,7 @@ def controller_default(
     if search.cycle.clamped_duration(duration) != duration:
         return None
     sensitivity = reduce(add, sensitivities) + rest_sensitivity_of_chain(search, nodes)
-    known = Known(
+    known = MotionEnergy(
         total + sum(dwell_energies_of_chain(search, nodes)),
         sensitivity,
         duration - search.cycle.dwell_time,
@@ -186,6 +175,13 @@ def controller_default(
     return cycle_baseline(
         search.cycle, "controller_default", duration, CycleEnergies(known, work), held, ours
     )
+
+
+def _default_motion(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> Baseline | None:
+    """Motion of the robot's own controller at its default speed; None if this is not known."""
+    oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way
+    found = baselines(prepared.problem, q_start, q_goal[None], 1.0, 0.0, *oracle)
+    return next((motion for motion in found if motion.name == "controller_default"), None)
 
 
 def recompared(cycle: Cycle, known: CycleBaseline, ours: CycleEnergies) -> CycleBaseline:

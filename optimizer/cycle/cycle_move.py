@@ -14,7 +14,7 @@ from joulepath.optimizer.result.solution import Solution
 class CycleMove:
     """A move of the cycle with the rests after it.
 
-    Args:
+    Attributes:
         planned: the move as planned.
         solution: its motion.
         t0: start of the move in the cycle [s].

@@ -15,7 +15,7 @@ import numpy as np
 
 from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.declared import Internal, Joules, NotEmpty, Ratio, Seconds, Watts
-from joulepath.optimizer.dynamics.interval import Known, with_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.presentation.chart import Chart, joint_curves
 from joulepath.optimizer.presentation.files import Saved
 from joulepath.optimizer.presentation.result import Result, Rows
@@ -46,7 +46,7 @@ class CycleEnergies:
     moves.
     """
 
-    electrical: Known
+    electrical: MotionEnergy
     mechanical: float
 
     def of(self, objective: Objective) -> float:
@@ -317,7 +317,7 @@ def _texts(*figures: float) -> list[str]:
 def energies_of(moves: Sequence[CycleMove]) -> CycleEnergies:
     """Energies of moves and their rests."""
     sensitivity = reduce(add, [move.sensitivity for move in moves])
-    known = Known(
+    known = MotionEnergy(
         sum(move.energy for move in moves),
         sensitivity,
         sum(move.solution.duration for move in moves),

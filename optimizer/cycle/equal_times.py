@@ -1,4 +1,4 @@
-"""What a cycle saves against other cycles in the same time, the waiting priced."""
+"""Savings of a cycle against other cycles in the same time, with the energy of waiting."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleEnergies, CycleSolution
 from joulepath.optimizer.cycle.rest_energy import rest_energy, rest_sensitivity
 from joulepath.optimizer.dynamics.dwell import holding_power
-from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from joulepath.optimizer.problem.cycle import Cycle
@@ -57,17 +57,17 @@ def _priced(cycle: Cycle, found: CycleSolution, each: CycleBaseline) -> CycleBas
     return replace(each, saving=again.saving, saving_interval=again.saving_interval)
 
 
-def _rest(cycle: Cycle, move: CycleMove, length: float) -> Known:
+def _rest(cycle: Cycle, move: CycleMove, length: float) -> MotionEnergy:
     """A wait of `length` [s] after a move."""
     q, arm = move.solution.goal.q, move.planned.arm_after
     still = np.zeros((1, len(q)))
     hold = float(holding_power(arm, Plant(arm).torques(q[None], still, still)[0]))
     energy = rest_energy(cycle, move.planned, length, hold)
-    return Known(energy, rest_sensitivity(cycle, move.planned, length, q), 0.0)
+    return MotionEnergy(energy, rest_sensitivity(cycle, move.planned, length, q), 0.0)
 
 
-def _sum(first: Known, second: Known) -> Known:
-    return Known(
+def _sum(first: MotionEnergy, second: MotionEnergy) -> MotionEnergy:
+    return MotionEnergy(
         first.energy + second.energy,
         first.sensitivity + second.sensitivity,
         first.duration + second.duration,
@@ -77,8 +77,13 @@ def _sum(first: Known, second: Known) -> Known:
 def _by_motions(
     cycle: Cycle, found: CycleSolution, name: Literal["ruckig_slowed", "straight"]
 ) -> CycleBaseline | None:
-    """The same configurations and times, by other motions between them: along lines and paths by
-    the answer's own. None where a move has no such motion, or a storage values the whole cycle.
+    """Baseline with other motions between the same configurations in the same times.
+
+    Lines and paths keep the motions of the answer.
+
+    Returns:
+        The baseline; None if a free move has no such motion, or an energy storage couples the
+        moves.
     """
     if found.storage is not None:
         return None
@@ -89,20 +94,20 @@ def _by_motions(
         if not same and move.planned.tool_path is None:
             return None
         parts.append(same[0] if same else None)
-    ours, needed = found.energies, found.energies
+    ours, energies = found.energies, found.energies
     for move, part in zip(found.moves, parts, strict=True):
         if part is not None:
-            needed = _with_motion(needed, move.solution, part)
+            energies = _with_motion(energies, move.solution, part)
     changed = [part for part in parts if part is not None]
     if not changed:
         return None
     held = all(part.within_limits for part in changed)
-    return cycle_baseline(cycle, name, found.duration, needed, held, ours)
+    return cycle_baseline(cycle, name, found.duration, energies, held, ours)
 
 
-def _with_motion(needed: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:
-    """What a cycle needs with another motion in place of its own."""
-    known, gone = needed.electrical, own.sensitivity
+def _with_motion(energies: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:
+    """Energies of a cycle with one motion replaced."""
+    known, gone = energies.electrical, own.sensitivity
     return CycleEnergies(
         replace(
             known,
@@ -111,5 +116,5 @@ def _with_motion(needed: CycleEnergies, own: Solution, other: Baseline) -> Cycle
             + other.sensitivity
             + Sensitivity(-gone.gradient, -gone.shift),
         ),
-        needed.mechanical + other.mechanical - own.energy.mechanical.total,
+        energies.mechanical + other.mechanical - own.energy.mechanical.total,
     )

@@ -23,7 +23,7 @@ from joulepath.optimizer.cycle.lazy_search import Pair
 from joulepath.optimizer.cycle.time_allocation import total_duration
 from joulepath.optimizer.cycle.timed_cycle import TimedChain, TimedSearch
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, lasting, retimed
 from joulepath.optimizer.result.solution import Solution
@@ -47,7 +47,7 @@ FEASIBLE = FeasibleCycleSettings()
 class FeasibleCycle:
     """A cycle with known motions.
 
-    Args:
+    Attributes:
         timing: search in the given time.
         nodes: chain of the cycle.
         motions: motion of every move.
@@ -174,7 +174,8 @@ class FeasibleCycle:
         )
         length = sum(spline.duration for spline in self.motions)
         theirs = CycleEnergies(
-            Known(electrical, sensitivity, length), sum(each.mechanical.total for each in moving)
+            MotionEnergy(electrical, sensitivity, length),
+            sum(each.mechanical.total for each in moving),
         )
         duration = length + self.wait_time + search.cycle.dwell_time
         return cycle_baseline(search.cycle, self.name, duration, theirs, self.confirmed, ours)

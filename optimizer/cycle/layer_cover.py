@@ -48,7 +48,7 @@ COVER = LayerCoverSettings()
 class CoverCells:
     """Cells of the angle of the tool, with the boxes of their configurations.
 
-    Args:
+    Attributes:
         angle: middle of every cell, shape (n,) [rad].
         width: half width of every cell, shape (n,) [rad].
         branch: branch of the arm, shape (n,).

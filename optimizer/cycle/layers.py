@@ -103,7 +103,7 @@ def layer_of(
     q = np.array([end.q for end in found])
     causes_of_arms = [check_configurations(PreparedProblem.of(each), q) for each in problems]
     either = [
-        next((each for each in causes if each is not None), None)
+        next((cause for cause in causes if cause is not None), None)
         for causes in zip(*causes_of_arms, strict=True)
     ]
     raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in found], either)
@@ -122,19 +122,12 @@ def layer_of(
         )
     end = np.array([k for k, _ in nodes])
     positions = np.array([node for _, node in nodes])
-    turns = np.round(
-        (positions - np.array([each.q for each in feasible])[end]) / (2 * np.pi)
-    ).astype(np.intp)
+    of_ends = np.array([each.q for each in feasible])[end]
+    turns = np.round((positions - of_ends) / (2 * np.pi)).astype(np.intp)
     kinematics = inverse_kinematics_for(cycle.arm.robot)
     given = all(isinstance(member, np.ndarray) for member in members(problem.goal))
-    return Layer(
-        name,
-        feasible,
-        positions,
-        end,
-        turns,
-        given or (kinematics is not None and kinematics.complete),
-    )
+    complete = given or (kinematics is not None and kinematics.complete)
+    return Layer(name, feasible, positions, end, turns, complete)
 
 
 def arms_at(cycle: Cycle, place: str) -> list[Arm]:

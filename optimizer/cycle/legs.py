@@ -26,7 +26,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.problem.stops import PlannedMove
 
 
@@ -139,7 +139,7 @@ class Leg:
         """The leg with given kinds, and their bounds."""
         displacement, levels = displacements_between(prepared, start, goal, pair)
         longest = (
-            LONGEST_DURATION
+            DURATIONS.longest
             if prepared.problem.duration_max is None
             else prepared.problem.duration_max
         )

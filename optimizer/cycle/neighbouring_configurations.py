@@ -31,7 +31,7 @@ from joulepath.optimizer.search.sliding import POSE_FREEDOMS
 
 @dataclass(frozen=True)
 class NeighbourSettings:
-    """Settings of the configurations that are tried with_neighbours a found one."""
+    """Settings of the configurations tried beside a found one."""
 
     singular: float = 1e-2
     """Singular values below this share of the largest are cut off, so that steps stay short near a

@@ -24,7 +24,7 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.result.cycle import Pass
 
 
@@ -83,7 +83,7 @@ class PassingLeg(Leg):
                 f"{PASSING.most_pairs} pairs of arm configurations: give fewer targets, a "
                 "`branch`, or `windings` false.",
             )
-        return cls._of_direct(Leg.of(prepared, start, goal, dwell), between, 0.0, LONGEST_DURATION)
+        return cls._of_direct(Leg.of(prepared, start, goal, dwell), between, 0.0, DURATIONS.longest)
 
     @classmethod
     def _of_direct(

@@ -14,7 +14,7 @@ from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline, sampled
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods import solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.solve.methods.fastest_motion import FastestMotion
@@ -65,7 +65,7 @@ def priced_motion(
     """
     weights = {leg.prepared.problem.objective: 1.0}
     p = leg.prepared.parameters(**weights, time=price)
-    interval = DurationInterval(p, LEAST_DURATION, longest, price=price)
+    interval = DurationInterval(p, DURATIONS.least, longest, price=price)
     return _recalled_or_solved(leg, s, g, interval, deadline, guess)
 
 

@@ -6,7 +6,12 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.layers import Layer
-from joulepath.optimizer.dynamics.dwell import brake_power, dwell_energy, holding_power, waits
+from joulepath.optimizer.dynamics.dwell import (
+    brake_power,
+    dwell_energy,
+    holding_power,
+    holding_times,
+)
 from joulepath.optimizer.dynamics.interval import arm_spread
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.dynamics.sensitivity import waiting_sensitivity
@@ -63,7 +68,7 @@ def rest_sensitivity(cycle: Cycle, move: PlannedMove, length: float, q: Array) -
     dwell = cycle.dwell_of(length)
     still = np.zeros((1, len(q)))
     held = Plant(arm).torques(q[None], still, still)[0]
-    return waiting_sensitivity(arm, q, held, *waits(dwell, 0.0), dwell, spread)
+    return waiting_sensitivity(arm, q, held, *holding_times(dwell, 0.0), dwell, spread)
 
 
 def dwell_energies(cycle: Cycle, move: PlannedMove, goal: Layer) -> Array:

@@ -17,7 +17,7 @@ from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleEnergie
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.moves import Wait
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
-from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.motion.joined import joined
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.result.solution import Solution
@@ -49,7 +49,7 @@ class StoppingCycle:
 
     solution: CycleSolution
     nodes: list[int]
-    known: Known
+    known: MotionEnergy
 
 
 def moves_between_rests(cycle: Cycle, stopping: CycleSolution) -> Iterator[list[CycleMove]]:

@@ -16,7 +16,7 @@ from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.cycle.rest_energy import holding_powers, long_wait_powers
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class TimedBound:
         if longest <= self.longest or base <= 0:
             return longest
         beside = self._least(-base, longest)
-        return float(np.clip((known - beside) / base, LEAST_DURATION, longest))
+        return float(np.clip((known - beside) / base, DURATIONS.least, longest))
 
     def _least(self, price: float, longest: float) -> float:
         """Least sum [J] of the bounds on energy + price · duration over all chains.

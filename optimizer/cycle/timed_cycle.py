@@ -32,7 +32,7 @@ from joulepath.optimizer.cycle.time_allocation import (
 )
 from joulepath.optimizer.cycle.timed_bound import TimedBound
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class TimedSearch:
     def __init__(self, search: CycleSearch, duration: float) -> None:
         self.search, self.cycle, self.legs = search, search.cycle, search.legs
         self.time = duration - self.cycle.dwell_time
-        self.longest = min(max(self.time, LEAST_DURATION), LONGEST_DURATION)
+        self.longest = min(max(self.time, DURATIONS.least), DURATIONS.longest)
         # only the routes through passes found in the cycle's own time are followed
         self.exact = not self.cycle.has_passes
         # moves before a possible wait
@@ -158,7 +158,7 @@ class TimedSearch:
     def _fast_search(self) -> PricedSearch:
         """Search at a price at which motions are nearly as fast as possible."""
         if self._fast is None:
-            self._fast = self._priced(ALLOCATION.prices[-1], LONGEST_DURATION)
+            self._fast = self._priced(ALLOCATION.prices[-1], DURATIONS.longest)
         return self._fast
 
     def _priced(self, price: float, longest: float) -> PricedSearch:

@@ -4,10 +4,10 @@ After Meike, Ribickis 2011; Meike, Pellicciari, Berselli 2014. The motors hold t
 the goal configuration; static friction would carry part of it and is ignored. With the duration T
 [s] of the motion:
 
-P_hold   = base + Σ_j (copper_j i_j² + inverter_j(i_j)) [W],  i = tau_gravity / torque_constant [A]
-dwell(T) = P_hold · min(time - T, brake_delay) + P_brake · max(time - T - brake_delay, 0) [J]
+    P_hold   = base + Σ_j (copper_j i_j² + inverter_j(i_j)) [W],  i = tau_gravity / torque_constant
+    dwell(T) = P_hold · min(time - T, brake_delay) + P_brake · max(time - T - brake_delay, 0) [J]
 
-Without brakes the delay is infinite. So dwell is linear in T on both sides of time - brake_delay.
+Without brakes the delay is infinite. So dwell(T) is linear on both sides of T = time - brake_delay.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ class LinearDwell:
 
     @staticmethod
     def none() -> LinearDwell:
-        """No wait after a motion, of whatever duration."""
+        """No wait after a motion of any duration."""
         return LinearDwell(0.0, np.inf, np.zeros(1), np.zeros(1))
 
 
 def linear_dwells(dwell: Dwell, arm: Arm, hold: Array) -> list[LinearDwell]:
-    """The intervals of [0, dwell.time] on which dwell(T) is linear, in order, for holding powers
-    `hold` (...) [W].
+    """Intervals of [0, dwell.time] on which dwell(T) is linear, in order, for holding powers `hold`
+    (...) [W].
     """
     if dwell.hold == "motors":
         return [LinearDwell(0.0, dwell.time, hold, hold * dwell.time)]
@@ -55,22 +55,24 @@ def linear_dwells(dwell: Dwell, arm: Arm, hold: Array) -> list[LinearDwell]:
 def dwell_energy(dwell: Dwell, arm: Arm, hold: float, duration: float) -> float:
     """Energy [J] drawn after a motion of `duration` [s] at a goal with holding power `hold` [W].
 
-    Zero if the motion lasts the whole dwell.
+    It is zero if the motion lasts for the whole dwell.
     """
-    by_motors, by_brakes = waits(dwell, duration)
+    by_motors, by_brakes = holding_times(dwell, duration)
     return hold * by_motors + brake_power(dwell, arm) * by_brakes
 
 
-def waits(dwell: Dwell, duration: float) -> tuple[float, float]:
-    """How long [s] motors, and then brakes, hold the arm after a motion of `duration` [s]."""
+def holding_times(dwell: Dwell, duration: float) -> tuple[float, float]:
+    """Times [s] for which first the motors and then the brakes hold the arm after a motion of
+    `duration` [s].
+    """
     wait = max(dwell.time - duration, 0.0)
     by_motors = wait if dwell.hold == "motors" else min(wait, dwell.brake_delay)
     return by_motors, wait - by_motors
 
 
 def holding_power(arm: Arm, tau: Array) -> Array:
-    """Power (...) [W] that the arm draws while its motors hold torques tau (..., nq) [N·m] at
-    standstill.
+    """Power (...) [W] that the arm draws at standstill while its motors hold torques tau (..., nq)
+    [N·m].
     """
     still = np.zeros_like(tau)
     joints = power_flow(tau, still, still, arm.drives, arm.friction_law).joints
@@ -78,5 +80,5 @@ def holding_power(arm: Arm, tau: Array) -> Array:
 
 
 def brake_power(dwell: Dwell, arm: Arm) -> float:
-    """Power [W] that the arm draws in all while its brakes hold it."""
+    """Total power [W] that the arm draws while its brakes hold it."""
     return arm.base_power if dwell.brake_power is None else dwell.brake_power

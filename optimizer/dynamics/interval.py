@@ -1,7 +1,7 @@
-"""How well a motion's energy is known, from the errors that the figures of the arm may have.
+"""Uncertainty of the energy of a motion, from the possible errors of the figures of the arm.
 
-The variance has three parts: that of the figures, by the gradient of the energy; what the model
-cannot express of a motion, a mean power times its duration; and the friction of another day. See
+The variance has three parts: the errors of the figures, through the gradient of the energy; the
+model error of a motion, a mean power times its duration; and the day-to-day change of friction. See
 `joulepath.models.uncertainty.spread`.
 """
 
@@ -18,12 +18,13 @@ from joulepath.models.uncertainty.spread import Spread, spread_of
 from joulepath.optimizer.problem.arm import INVERTER_COEFFICIENTS, Arm
 from joulepath.optimizer.result.energy import Energy, EnergyInterval, SavingInterval, Sensitivity
 
-MOVE = "move"
+MOTION_SOURCE = "move"
+"""Name of the model error among the sources of the variance."""
 
 
 @dataclass(frozen=True)
-class Known:
-    """The energy [J] of a motion of `duration` [s], and its sensitivity."""
+class MotionEnergy:
+    """Energy [J] of a motion of `duration` [s], and its sensitivity."""
 
     energy: float
     sensitivity: Sensitivity
@@ -31,7 +32,9 @@ class Known:
 
 
 def arm_spread(arm: Arm) -> Spread:
-    """The errors that the figures of an arm may have. What the request gives itself is known."""
+    """Possible errors of the figures of an arm, without the figures that the request gives
+    itself.
+    """
     known = tuple(
         f"inverter_{part}"
         for part in INVERTER_COEFFICIENTS
@@ -42,20 +45,20 @@ def arm_spread(arm: Arm) -> Spread:
 
 def with_interval(energy: Energy, sensitivity: Sensitivity, duration: float, arm: Arm) -> Energy:
     """The energy with the interval of its electrical total."""
-    known = Known(energy.electrical.total, sensitivity, duration)
+    known = MotionEnergy(energy.electrical.total, sensitivity, duration)
     return replace(energy, electrical=replace(energy.electrical, interval=interval_of(known, arm)))
 
 
-def interval_of(known: Known, arm: Arm) -> EnergyInterval:
-    """P5, P95, standard deviation [J], and each source's share of the variance."""
+def interval_of(known: MotionEnergy, arm: Arm) -> EnergyInterval:
+    """Percentiles 5 and 95, standard deviation [J], and share of every source in the variance."""
     spread, gradient = arm_spread(arm), known.sensitivity.gradient
-    low, high = _ends(_drawn(spread, [known], 0))[:, 0].tolist()
+    low, high = _percentiles(_energy_draws(spread, [known], 0))[:, 0].tolist()
     parts = {
         name: float(gradient @ covariance @ gradient)
         for name, covariance in spread.covariances.items()
     }
     if spread.move_sd:
-        parts[MOVE] = (known.duration * spread.move_sd) ** 2
+        parts[MOTION_SOURCE] = (known.duration * spread.move_sd) ** 2
     total = sum(parts.values())
     shares = (
         {"idle_power" if n == BASE_POWER else n: part / total for n, part in parts.items()}
@@ -65,35 +68,37 @@ def interval_of(known: Known, arm: Arm) -> EnergyInterval:
     return EnergyInterval(low, high, float(np.sqrt(total)), shares)
 
 
-def saving_interval(ours: Known, theirs: Known, arm: Arm) -> SavingInterval:
-    """P5, P95 and standard deviation of 1 - ours / theirs, with errors that both motions share; 0
-    where theirs is 0.
+def saving_interval(ours: MotionEnergy, theirs: MotionEnergy, arm: Arm) -> SavingInterval:
+    """Percentiles 5 and 95 and standard deviation of the saving 1 - ours / theirs, with errors
+    common to both motions; the saving is 0 if theirs is 0.
     """
     return saving_intervals(ours, [theirs], arm)[0]
 
 
-def saving_intervals(ours: Known, theirs: Sequence[Known], arm: Arm) -> list[SavingInterval]:
-    """The `saving_interval` to each of several energies."""
+def saving_intervals(
+    ours: MotionEnergy, theirs: Sequence[MotionEnergy], arm: Arm
+) -> list[SavingInterval]:
+    """`saving_interval` for several energies."""
     if not theirs:
         return []
     spread = arm_spread(arm)
-    first, second = _drawn(spread, [ours], 0), _drawn(spread, theirs, 1)
+    first, second = _energy_draws(spread, [ours], 0), _energy_draws(spread, theirs, 1)
     size = np.abs(second)
     savings = np.divide(second - first, size, out=np.zeros_like(size), where=size > 0)
-    found = np.append(_ends(savings), savings.std(axis=0)[None], axis=0)
-    return [SavingInterval(*each) for each in found.T.tolist()]
+    statistics = np.append(_percentiles(savings), savings.std(axis=0)[None], axis=0)
+    return [SavingInterval(*column) for column in statistics.T.tolist()]
 
 
-def _drawn(spread: Spread, known: Sequence[Known], move: int) -> Array:
-    """Draws (n, m) of the energies [J] of m motions."""
-    means = np.array([each.energy + each.sensitivity.shift for each in known])
-    gradients = np.stack([each.sensitivity.gradient for each in known], axis=1)
-    durations = np.array([each.duration for each in known])
+def _energy_draws(spread: Spread, known: Sequence[MotionEnergy], move: int) -> Array:
+    """Random draws (n, m) of the energies [J] of m motions."""
+    means = np.array([motion.energy + motion.sensitivity.shift for motion in known])
+    gradients = np.stack([motion.sensitivity.gradient for motion in known], axis=1)
+    durations = np.array([motion.duration for motion in known])
     return np.asarray(
         means + spread.draws @ gradients + np.outer(spread.move_draws[move], durations)
     )
 
 
-def _ends(draws: Array) -> Array:
-    """P5 and P95 (2, m) of draws (n, m)."""
+def _percentiles(draws: Array) -> Array:
+    """Percentiles 5 and 95 (2, m) of draws (n, m)."""
     return np.asarray(np.quantile(draws, [0.05, 0.95], axis=0))

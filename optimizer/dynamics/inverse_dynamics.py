@@ -14,10 +14,10 @@ _Z = ca.DM([0, 0, 1])
 
 @dataclass(frozen=True)
 class SymbolicPayload:
-    """A body fixed to the flange, as symbols.
+    """Symbols of a body fixed to the flange.
 
     `mass` [kg], `com` (3,) [m] in the flange frame, `inertia` (6,) [kg·m²] ixx ixy ixz iyy iyz izz
-    about the com, in flange axes.
+    about the center of mass, in flange axes.
     """
 
     mass: ca.SX
@@ -26,8 +26,8 @@ class SymbolicPayload:
 
 
 def _tidy(matrix: np.ndarray) -> ca.DM:
-    """The matrix without the rounding of sines and cosines of right angles: CasADi drops the terms
-    that are zero.
+    """The matrix with entries within 1e-12 of an integer rounded, so that CasADi drops terms that
+    are zero but for the rounding of sines and cosines of right angles.
     """
     rounded = np.round(matrix)
     return ca.sparsify(ca.DM(np.where(np.abs(matrix - rounded) < 1e-12, rounded, matrix)))
@@ -53,15 +53,22 @@ def inverse_dynamics(
     rotor: ca.SX,
     link_mass_scale: ca.SX | None = None,
 ) -> ca.SX:
-    """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with the payload at
-    the frame `flange`.
+    """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with a payload at the
+    flange.
 
-    q [rad], v [rad/s], a [rad/s²] (nv,). `gravity` (3,) [m/s²] is in the base frame, `rotor` (nv,)
-    [kg·m²] the reflected rotor inertia; armature and gravity of the model are not read.
-    `link_mass_scale` (nv,) [1] multiplies mass and inertia of the moving links, not of the payload;
-    None: 1.
+    Args:
+        model: serial chain with a frame `flange`; its armature and gravity are not read.
+        q: joint positions (nv,) [rad].
+        v: joint speeds (nv,) [rad/s].
+        a: joint accelerations (nv,) [rad/s²].
+        payload: body at the frame `flange`.
+        gravity: acceleration of gravity (3,) [m/s²] in the base frame.
+        rotor: reflected rotor inertia (nv,) [kg·m²].
+        link_mass_scale: factor (nv,) [1] on mass and inertia of the moving links, but not of the
+            payload; None means 1.
 
-    Raises ValueError if a joint is not revolute about its z axis.
+    Raises:
+        ValueError: a joint is not revolute about its z axis.
     """
     _check_chain(model)
     scales: Sequence[ca.SX | int] = (
@@ -81,12 +88,14 @@ joint frame.
 def body_torques(
     model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX, bodies: Sequence[Body]
 ) -> list[ca.SX]:
-    """Torques [N·m] at every joint of rigid bodies on the links of the chain; inertias of the model
+    """Torques [N·m] of rigid bodies on the links of a chain, one per joint; the model's inertias
     are not read.
 
     Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5). The
-    torques are linear in what describes the bodies. Raises ValueError if a joint is not revolute
-    about its z axis.
+    torques are linear in the entries of the bodies.
+
+    Raises:
+        ValueError: a joint is not revolute about its z axis.
     """
     _check_chain(model)
     joints = range(1, model.njoints)
@@ -135,15 +144,15 @@ def _check_chain(model: pin.Model) -> None:
 
 
 def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int) -> Body:
-    """What describes link i. The last link includes the payload. `scale` multiplies the link's own
-    part.
+    """Body of link i. `scale` multiplies mass and inertia of the link itself; the last link
+    includes the payload.
     """
     body = model.inertias[i]
     com = ca.SX(_tidy(body.lever))
-    # constants first, then their factor: one product for each
-    own = ca.SX(body.mass)
-    mass, moment = scale * own, scale * (own * com)
-    inertia = scale * _about_origin(own, com, ca.SX(_tidy(body.inertia)))
+    # Constants are multiplied first, so that the scale costs one product per entry.
+    link_mass = ca.SX(body.mass)
+    mass, moment = scale * link_mass, scale * (link_mass * com)
+    inertia = scale * _about_origin(link_mass, com, ca.SX(_tidy(body.inertia)))
     if i == model.njoints - 1:
         flange = model.frames[model.getFrameId("flange")].placement
         R = _tidy(flange.rotation)

@@ -1,14 +1,11 @@
-"""The per-node functions of the NLP, ready to be called: compiled once per robot, evaluated from
-any thread.
+"""Per-node functions of the NLP, compiled once per robot and callable from any thread.
 
 `node` gives cost, limited torque and their first and second derivatives at one instant of a motion.
 Everything that a request may change (payload, gravity, drives, friction, objective) is a parameter.
-The functions are compiled by the system's C compiler and stored on disk: see `kernel_cache`. Until
-the compiled library exists, or if there is no compiler, CasADi's virtual machine evaluates the same
-expressions.
+The system's C compiler compiles the functions, and `kernel_cache` stores them on disk. Until the
+library exists, or without a compiler, CasADi's virtual machine evaluates the same expressions.
 
-`python -m joulepath.optimizer.dynamics.precompile` compiles the kernels of all robots, or of those
-named.
+`python -m joulepath.optimizer.dynamics.precompile` compiles the kernels of all or of named robots.
 """
 
 from __future__ import annotations
@@ -16,6 +13,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -35,15 +33,23 @@ from joulepath.optimizer.native.library_cache import is_intact, mark_used, seal_
 
 log = logging.getLogger(__name__)
 
-# nodes per call of a function whose number of nodes varies from caller to caller
-CHUNK = 64
-# such chunks between two looks at the deadline: some ten milliseconds
-CHUNKS_PER_CHECK = 128
+
+@dataclass(frozen=True)
+class KernelSettings:
+    """Division of evaluations of any number of samples."""
+
+    chunk_nodes: int = 64
+    """Nodes per call of a compiled function."""
+    chunks_per_check: int = 128
+    """Chunks between two checks of the deadline, about ten milliseconds."""
+
+
+KERNEL = KernelSettings()
 
 
 class _Evaluations(threading.local):
-    """The calling thread's evaluations by function and number of nodes. They are freed when the
-    thread ends.
+    """The calling thread's evaluations by function and number of nodes, freed when the thread
+    ends.
     """
 
     def __init__(self) -> None:
@@ -51,11 +57,11 @@ class _Evaluations(threading.local):
 
 
 class Kernel:
-    """A robot's functions on arrays of nodes. Any number of threads may call one kernel at the same
-    time.
+    """Functions of a robot on arrays of nodes. Any number of threads may call one kernel at the
+    same time.
 
-    Every thread has its own memory for arguments and results, because functions run without
-    Python's global lock.
+    The functions run without Python's global lock, so every thread has its own memory for arguments
+    and results.
     """
 
     def __init__(self, robot: Robot, functions: Functions) -> None:
@@ -71,11 +77,18 @@ class Kernel:
         return known[key]
 
     def node(self, y: Array, multiplier: Array, weight: Array, p: Array) -> tuple[Array, ...]:
-        """Cost (N,), tau_limited (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N,
-        3nq, 3nq).
+        """Cost and limited torque with their derivatives at N nodes.
 
-        y (N, 3nq) = q, v, a; multiplier (N, nq); weight (N,); p packed `Parameters`. The results
-        are views: the thread's next call with as many nodes overwrites them.
+        Args:
+            y: states (N, 3nq) = q, v, a.
+            multiplier: weights (N, nq) of the limited torques in the Hessian.
+            weight: weights (N,) of the cost in the Hessian.
+            p: packed `Parameters`.
+
+        Returns:
+            Cost (N,), tau_limited (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq) and Hessian (N,
+            3nq, 3nq). They are views, overwritten by the thread's next call with the same number of
+            nodes.
         """
         count, nq = len(y), self.nq
         cost, tau, gradient, jacobian, hessian = self._evaluation("node", count)(
@@ -90,8 +103,8 @@ class Kernel:
         )
 
     def value(self, y: Array, p: Array) -> tuple[Array, Array]:
-        """Cost (N,) and tau_limited (N, nq) [N·m]. Views: the thread's next call with as many nodes
-        overwrites them.
+        """Cost (N,) and tau_limited (N, nq) [N·m]: views, overwritten by the thread's next call
+        with the same number of nodes.
         """
         cost, tau = self._evaluation("value", len(y))(y, p)
         return cost[:, 0], tau
@@ -102,31 +115,31 @@ class Kernel:
         return cost[:, 0], tau
 
     def torque(self, q: Array, v: Array, a: Array, p: Array) -> Array:
-        """Rigid body and rotor torque tau (k, nq) [N·m] for any number of samples."""
+        """Rigid-body and rotor torques tau (k, nq) [N·m] for any number of samples."""
         (tau,) = self._in_chunks("torque", np.hstack([q, v, a]), p, (self.nq,))
         return tau
 
-    def _in_chunks(self, name: str, given: Array, p: Array, sizes: Sequence[int]) -> list[Array]:
-        """The results (k, size) of a function of (y, p) for any number of samples y (k, 3nq)."""
-        count = len(given)
-        evaluation = self._evaluation(name, CHUNK)
-        y = np.zeros((-(-count // CHUNK) * CHUNK, 3 * self.nq))
-        y[:count] = given
+    def _in_chunks(self, name: str, samples: Array, p: Array, sizes: Sequence[int]) -> list[Array]:
+        """Results (k, size) of a function of (y, p) for any number of samples y (k, 3nq)."""
+        count, chunk = len(samples), KERNEL.chunk_nodes
+        evaluation = self._evaluation(name, chunk)
+        y = np.zeros((-(-count // chunk) * chunk, 3 * self.nq))
+        y[:count] = samples
         results = [np.empty((len(y), size)) for size in sizes]
-        for k, i in enumerate(range(0, len(y), CHUNK)):
-            if k % CHUNKS_PER_CHECK == CHUNKS_PER_CHECK - 1:
+        for k, i in enumerate(range(0, len(y), chunk)):
+            if k % KERNEL.chunks_per_check == KERNEL.chunks_per_check - 1:
                 checkpoint()
-            for result, value in zip(results, evaluation(y[i : i + CHUNK], p), strict=True):
-                result[i : i + CHUNK] = value
+            for result, value in zip(results, evaluation(y[i : i + chunk], p), strict=True):
+                result[i : i + chunk] = value
         return [result[:count] for result in results]
 
 
 class _Loader:
-    """Loads a robot's kernel, for any number of threads: compiled as soon as the library exists,
-    else interpreted.
+    """Loader of a robot's kernel, for any number of threads: the compiled kernel as soon as the
+    library exists, else the interpreted one.
 
     The interpreted kernel stays referenced after the compiled one has replaced it: other threads
-    may still use it, and expressions must be freed under `SYMBOLICS`.
+    may still use it, and expressions may only be freed under `SYMBOLICS`.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -138,7 +151,7 @@ class _Loader:
         self._compiling: threading.Thread | None = None
 
     def get(self) -> Kernel:
-        # read once: other threads only ever set it
+        # Read once, since other threads may set it meanwhile.
         compiled = self._compiled
         if compiled is not None:
             return compiled
@@ -150,10 +163,10 @@ class _Loader:
             seal_path(path).exists() for path in self.paths
         ):
             return self._interpreted
-        found = next(filter(is_intact, self.paths), None)
-        if found is not None:
-            mark_used(found)
-            self._compiled = Kernel(self._robot, Compiled(found, self._robot.nq))
+        path = next(filter(is_intact, self.paths), None)
+        if path is not None:
+            mark_used(path)
+            self._compiled = Kernel(self._robot, Compiled(path, self._robot.nq))
             return self._compiled
         if self._interpreted is None:
             self._interpreted = Kernel(self._robot, Interpreted(build(self._robot)))
@@ -182,10 +195,11 @@ def _loader(robot: Robot) -> _Loader:
 
 
 def kernel_for(robot: Robot) -> Kernel:
-    """The kernel of a robot: compiled if the library is on disk, else interpreted while the
-    compiler runs.
+    """Kernel of a robot: compiled if the library is on disk, else interpreted while the compiler
+    runs.
     """
-    # the cache lets two threads that miss at the same time both build: only one loader may compile
+    # Two threads that miss the cache at the same time would both build a loader, but only one may
+    # compile.
     with _LOADERS:
         loader = _loader(robot)
     return loader.get()

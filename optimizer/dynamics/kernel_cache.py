@@ -1,6 +1,4 @@
-"""Compiled kernels on disk: the cache holds one library per robot, whose name has a digest of all
-it depends on.
-"""
+"""Cache of compiled kernels on disk: one library per robot, named by a digest of all its inputs."""
 
 from __future__ import annotations
 
@@ -15,67 +13,88 @@ import joulepath.models.robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.dynamics import inverse_dynamics, kernel_expressions, kernel_source, losses
 from joulepath.optimizer.dynamics.kernel_expressions import SYMBOLICS, build
-from joulepath.optimizer.dynamics.kernel_source import PORTABLE, Vectors, source, vectors
+from joulepath.optimizer.dynamics.kernel_source import PORTABLE, VectorUnit, source, widest_vectors
 from joulepath.optimizer.native import library_cache
 from joulepath.optimizer.native.library_cache import (
-    PATIENCE,
-    Patience,
+    CACHE,
+    CacheSettings,
     cache_directory,
     compile_library,
 )
 
-# at -O1 it takes twice as long to compile, and runs a tenth faster: the code is one long run of
-# multiplications. All processors round alike without contraction
 COMPILER_FLAGS = ("-Og", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off", "-Wno-psabi")
-# modules whose code decides what is compiled
-SOURCES = (joulepath.models.robot, inverse_dynamics, losses, kernel_expressions, kernel_source)
+"""Compiler flags. The code is one long run of multiplications: -O1 takes twice as long to compile
+and runs only a tenth faster. Without contraction, all processors round equally.
+"""
+
+SOURCE_MODULES = (
+    joulepath.models.robot,
+    inverse_dynamics,
+    losses,
+    kernel_expressions,
+    kernel_source,
+)
+"""Modules that determine the compiled code."""
 
 
-def digest(robot: Robot, using: Vectors) -> str:
-    """Hash of everything that the compiled functions depend on: the chain, the sources, versions,
-    compiler flags.
+def digest(robot: Robot, vectors: VectorUnit) -> str:
+    """Hash of all inputs of the compiled functions: the chain, sources, versions and compiler
+    flags.
     """
     h = hashlib.sha256()
-    for path in (*(str(module.__file__) for module in SOURCES), __file__, library_cache.__file__):
+    for path in (
+        *(str(module.__file__) for module in SOURCE_MODULES),
+        __file__,
+        library_cache.__file__,
+    ):
         h.update(Path(path).read_bytes())
-    h.update(repr((version("casadi"), COMPILER_FLAGS, using, os.uname().machine)).encode())
+    h.update(repr((version("casadi"), COMPILER_FLAGS, vectors, os.uname().machine)).encode())
     h.update(repr(robot.has_load_friction).encode())
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     constants = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
     constants += [body.toDynamicParameters() for body in robot.model.inertias]
     for constant in constants:
-        # rounded, since the last digit of a sine differs between processors; + 0.0 makes -0.0 and
-        # 0.0 one
+        # Rounded, since the last digit of a sine differs between processors; + 0.0 turns -0.0 into
+        # 0.0.
         h.update((np.round(constant, 12) + 0.0).tobytes())
     return h.hexdigest()[:24]
 
 
-def library_path(robot: Robot, using: Vectors) -> Path:
+def library_path(robot: Robot, vectors: VectorUnit) -> Path:
     """Path of a robot's compiled kernel."""
-    return cache_directory() / f"{robot.name}-{digest(robot, using)}.so"
+    return cache_directory() / f"{robot.name}-{digest(robot, vectors)}.so"
 
 
 def library_paths(robot: Robot) -> list[Path]:
-    """Paths of the compiled kernels that this machine can use, the fastest first."""
-    return list(dict.fromkeys(library_path(robot, using) for using in (vectors(), PORTABLE)))
+    """Paths of the compiled kernels that this machine can run, the fastest first."""
+    return list(
+        dict.fromkeys(library_path(robot, vectors) for vectors in (widest_vectors(), PORTABLE))
+    )
 
 
-def compile_kernel(robot: Robot, portable: bool = False, patience: Patience = PATIENCE) -> Path:
-    """Compile a robot's functions, once however many threads and processes ask. Returns the path of
-    the library.
+def compile_kernel(robot: Robot, portable: bool = False, settings: CacheSettings = CACHE) -> Path:
+    """Compiles a robot's functions, once for any number of threads and processes that ask.
 
-    It is for this machine's processor, or, if `portable`, for every one of its kind, which takes
-    twice as long to run. Raises as `compile_library`.
+    Args:
+        robot: the robot.
+        portable: whether the library runs on every processor of this architecture, at half the
+            speed, instead of using the vectors of this machine's processor.
+        settings: time limits of the compilation.
+
+    Returns:
+        Path of the library.
+
+    Raises:
+        RuntimeError, OSError: as `compile_library`.
     """
-    count, flags = using = PORTABLE if portable else vectors()
-    target = library_path(robot, using)
-    compile_library(target, (*COMPILER_FLAGS, *flags), lambda: _source(robot, count), patience)
+    vectors = PORTABLE if portable else widest_vectors()
+    target = library_path(robot, vectors)
+    flags = (*COMPILER_FLAGS, *vectors.flags)
+    compile_library(target, flags, lambda: _source(robot, vectors.lanes), settings)
     return target
 
 
-def _source(robot: Robot, count: int) -> str:
-    """The functions of a robot as C, of so many nodes at once; their expressions are freed before
-    the lock is.
-    """
+def _source(robot: Robot, lanes: int) -> str:
+    """C code of the functions of a robot. Expressions are freed before the lock is released."""
     with SYMBOLICS:
-        return source(build(robot), count)
+        return source(build(robot), lanes)

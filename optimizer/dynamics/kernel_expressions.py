@@ -1,4 +1,4 @@
-"""The per-node functions of the NLP as CasADi expressions, and their parameters."""
+"""CasADi expressions of the per-node functions of the NLP, and their parameters."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from joulepath.models.robot import Array, Drives, FrictionLaw, Robot
 from joulepath.optimizer.dynamics.inverse_dynamics import SymbolicPayload, inverse_dynamics
 from joulepath.optimizer.dynamics.losses import drawn_power, flow_with, friction_torque, smooth_abs
 
-# Held while expressions are built, turned into functions, mapped or freed. CasADi works on them
-# without Python's global lock, all expressions share constants and caches, and only some of its
-# builds guard these against other threads. Evaluating a function needs no lock, as long as every
-# thread has a buffer of its own.
 SYMBOLICS = threading.RLock()
+"""Lock to hold while expressions are built, turned into functions, mapped or freed.
 
-# fields of `Parameters` that are one number; those of other sizes than one number per joint
+CasADi works on expressions without Python's global lock. All expressions share constants and
+caches, and only some builds of CasADi guard these against other threads. Evaluating a function
+needs no lock, as long as every thread has its own buffer.
+"""
+
+# Scalar fields of `Parameters`, and sizes of all fields without one number per joint.
 _SCALARS = frozenset(
     (
         "mass",
@@ -39,20 +41,21 @@ _SIZES = {"com": 3, "inertia": 6, "gravity": 3} | dict.fromkeys(_SCALARS, 1)
 
 @dataclass(frozen=True)
 class Parameters:
-    """Everything that a request may change, in the order in which the compiled functions take it.
+    """All parameters that a request may change, in the order of the compiled functions' parameter
+    vector.
 
     The payload: `mass` [kg], `com` (3,) [m] in the flange frame, `inertia` (6,) ixx ixy ixz iyy iyz
-    izz about the com [kg·m²]. `gravity` (3,) [m/s²] in the base frame. Per joint (nq,):
+    izz about the center of mass [kg·m²]. `gravity` (3,) [m/s²] in the base frame. Per joint (nq,):
     `rotor_inertia` [kg·m²]; friction `coulomb`, `curved` [N·m], `speed` [rad/s], `viscous`
     [N·m·s/rad], `load` [1]; drives `torque_constant` [N·m/A], `copper` [W/A²], `inverter_constant`
     [W], `inverter_linear` [W/A], `inverter_quadratic` [W/A²]; `link_mass_scale` [1].
 
-    `link_side` is 1 if the limited torque is that of the link, 0 if that of the motor. `base_power`
-    [W] of the electronics; `regeneration` [1], the fraction of net surplus that the supply takes
-    back; `isolated` is 1 if every joint dissipates its own surplus, else 0. `electrical`,
-    `mechanical` [1] and `time` [W] weigh the parts of the cost. `knee` [rad/s] smooths the reversal
-    of friction, `bend` (nq,) [N·m] the corner of its growth with the load, `width` [W] the corners
-    of the cost. `load` is None in a kernel without such friction.
+    `link_side` is 1 if the torque limit applies at the link, 0 if it applies at the motor.
+    `base_power` [W] is the power of the electronics; `regeneration` [1] the fraction of net surplus
+    that the supply takes back; `isolated` is 1 if every joint dissipates its own surplus, else 0.
+    `electrical`, `mechanical` [1] and `time` [W] weight the parts of the cost. `knee` [rad/s]
+    smooths the reversal of friction, `bend` (nq,) [N·m] the corner of load-dependent friction, and
+    `width` [W] the corners of the cost. `load` is None in a kernel without load-dependent friction.
     """
 
     mass: Any
@@ -101,7 +104,7 @@ class Parameters:
 
     @property
     def friction(self) -> FrictionLaw:
-        """The friction law of these coefficients."""
+        """Friction law with these coefficients."""
         law = FrictionLaw(
             "symbolic", self.coulomb, self.curved, self.speed, self.viscous, self.knee
         )
@@ -109,7 +112,7 @@ class Parameters:
 
     @property
     def drives(self) -> Drives:
-        """The drives of these coefficients; the gear ratio plays no part."""
+        """Drives with these coefficients; the gear ratio is not used."""
         return Drives(
             gear_ratio=None,  # type: ignore[arg-type]
             torque_constant=self.torque_constant,
@@ -123,25 +126,25 @@ class Parameters:
 
 @dataclass(frozen=True)
 class _Power:
-    """The cost and the friction in the limited torque, as functions of the torque tau (nq,) [N·m],
-    the speed v (nq,) [rad/s] and the acceleration a (nq,) [rad/s²] alone.
+    """Cost, and friction in the limited torque, as functions of the inner variables (tau, v, a).
 
-    `slope` (3 nq,) and `bend` (3 nq, 3 nq) are the cost's derivatives by tau, v and a;
-    `friction_slope` (nq, 3 nq) is that of the friction, `friction_bend` (3 nq, 3 nq) the second one
-    of multiplier · friction.
+    The inner variables are the torque tau (nq,) [N·m], the speed v (nq,) [rad/s] and the
+    acceleration a (nq,) [rad/s²]. `gradient` (3 nq,) and `hessian` (3 nq, 3 nq) are derivatives of
+    the cost by them, `friction_jacobian` (nq, 3 nq) is the derivative of the friction, and
+    `friction_hessian` (3 nq, 3 nq) the second derivative of multiplier · friction.
     """
 
     cost: ca.SX
     friction: ca.SX
-    slope: ca.SX
-    bend: ca.SX
-    friction_slope: ca.SX
-    friction_bend: ca.SX
+    gradient: ca.SX
+    hessian: ca.SX
+    friction_jacobian: ca.SX
+    friction_hessian: ca.SX
 
 
 def sizes(nq: int) -> dict[str, tuple[tuple[int, ...], tuple[int, ...]]]:
-    """How many numbers each argument and each result of the functions of an arm of nq joints has,
-    by function.
+    """Numbers of entries of all arguments and of all results of the functions of an arm of nq
+    joints, by function.
     """
     state, parameters = (
         3 * nq,
@@ -155,13 +158,13 @@ def sizes(nq: int) -> dict[str, tuple[tuple[int, ...], tuple[int, ...]]]:
 
 
 def build(robot: Robot) -> list[ca.Function]:
-    """The functions of a robot as CasADi expressions.
+    """Per-node functions of a robot as CasADi expressions of the stacked state y = (q, v, a).
 
-    `torque`(y, p) → tau: rigid body and rotor torque [N·m]. `value`(y, p) → cost [W], tau_limited
-    [N·m]: the torque that is limited, see `limited_torque`. `node`(y, multiplier, weight, p) →
-    cost, tau_limited, gradient of the cost, Jacobian of tau_limited (nq, 3 nq), and the Hessian (3
-    nq, 3 nq) of weight · cost + multiplier · tau_limited, without what the smoothed reversal of
-    friction makes concave. y = (q, v, a) stacked.
+    - `torque`(y, p) → tau: rigid-body and rotor torque [N·m].
+    - `value`(y, p) → cost [W], and tau_limited [N·m], see `limited_torque`.
+    - `node`(y, multiplier, weight, p) → cost, tau_limited, gradient of the cost, Jacobian (nq, 3
+      nq) of tau_limited, and Hessian (3 nq, 3 nq) of weight · cost + multiplier · tau_limited
+      without the negative curvature of the smoothed reversal of friction.
     """
     with SYMBOLICS:
         return _functions(robot)
@@ -179,7 +182,7 @@ def _functions(robot: Robot) -> list[ca.Function]:
     )
     multiplier, weight = ca.SX.sym("multiplier", nq), ca.SX.sym("weight")
     power = _power(par, tau, v, a, multiplier)
-    # on the link's side without the rotor
+    # At the link, the torque limit does not include the rotor.
     rotor = par.link_side * par.rotor_inertia
     gradient, jacobian, hessian = _derivatives(power, tau, rotor, y, multiplier, weight)
     dense = ca.densify
@@ -193,44 +196,52 @@ def _functions(robot: Robot) -> list[ca.Function]:
 
 
 def _power(par: Parameters, tau: ca.SX, v: ca.SX, a: ca.SX, multiplier: ca.SX) -> _Power:
-    """Cost and friction at torque tau, speed v and acceleration a, differentiated before these are
-    put in.
+    """Cost and friction at torque tau, speed v and acceleration a.
+
+    They are differentiated by symbols, and the expressions of tau, v and a are substituted
+    afterwards.
     """
     nq = tau.numel()
-    t, w, x, lost = (ca.SX.sym(name, nq) for name in ("t", "w", "x", "lost"))
+    t, w, x, tau_friction = (ca.SX.sym(name, nq) for name in ("t", "w", "x", "tau_friction"))
     inner = ca.vertcat(t, w, x)
     law = friction_torque(par.friction, par.drives, t, w, x, ca)
-    by_friction = _cost(par, t, w, lost)
-    cost, worth = ca.substitute([by_friction, ca.gradient(by_friction, lost)], [lost], [law])
-    bend, slope = ca.hessian(cost, inner)
-    bend[nq : 2 * nq, nq : 2 * nq] -= ca.diag(_concave(par, worth, t, w, x))
+    general_cost = _cost(par, t, w, tau_friction)
+    cost, cost_by_friction = ca.substitute(
+        [general_cost, ca.gradient(general_cost, tau_friction)], [tau_friction], [law]
+    )
+    hessian, gradient = ca.hessian(cost, inner)
+    hessian[nq : 2 * nq, nq : 2 * nq] -= ca.diag(
+        _reversal_concavity(par, cost_by_friction, t, w, x)
+    )
     friction = (1 - par.link_side) * law
-    friction_bend, _ = ca.hessian(ca.dot(multiplier, friction), inner)
-    local = [cost, friction, slope, bend, ca.jacobian(friction, inner), friction_bend]
+    friction_hessian, _ = ca.hessian(ca.dot(multiplier, friction), inner)
+    local = [cost, friction, gradient, hessian, ca.jacobian(friction, inner), friction_hessian]
     return _Power(*ca.substitute(local, [t, w, x], [tau, v, a]))
 
 
-def _concave(par: Parameters, worth: ca.SX, t: ca.SX, w: ca.SX, x: ca.SX) -> ca.SX:
-    """What the smoothed reversal of friction takes from the cost's second derivatives by speed
-    (nq,), where it does.
+def _reversal_concavity(
+    par: Parameters, cost_by_friction: ca.SX, t: ca.SX, w: ca.SX, x: ca.SX
+) -> ca.SX:
+    """Negative part (nq,) of the cost's second derivatives by speed due to the smoothed reversal of
+    friction.
 
-    |v| is convex, v² / sqrt(v² + knee²) is not beyond its knee. `worth` (nq,) is the cost's
-      derivative by friction.
+    |v| is convex, but v² / sqrt(v² + knee²) is not beyond its knee. `cost_by_friction` (nq,) is the
+    derivative of the cost by the friction torque.
     """
     dry = replace(par.friction, curved=0 * par.curved, viscous=0 * par.viscous)
     reversal = friction_torque(dry, par.drives, t, w, x, ca)
-    curvature = worth * ca.diag(ca.jacobian(ca.diag(ca.jacobian(reversal, w)), w))
-    # the least of this and zero
+    curvature = cost_by_friction * ca.diag(ca.jacobian(ca.diag(ca.jacobian(reversal, w)), w))
+    # The smaller of the curvature and zero.
     concave: ca.SX = (curvature - ca.fabs(curvature)) / 2
     return concave
 
 
-def _cost(par: Parameters, t: ca.SX, w: ca.SX, lost: ca.SX) -> ca.SX:
-    """Smoothed cost [W] for torques t, speeds w and friction torques `lost`."""
-    # the inverter's |i| is smoothed over a tenth of an ampere per watt of width
-    flow = flow_with(lost, t, w, par.drives, 0.1 * par.width, ca)
+def _cost(par: Parameters, t: ca.SX, w: ca.SX, tau_friction: ca.SX) -> ca.SX:
+    """Smoothed cost [W] at torques t, speeds w and friction torques `tau_friction`."""
+    # |i| of the inverter is smoothed over a tenth of an ampere per watt of width.
+    flow = flow_with(tau_friction, t, w, par.drives, 0.1 * par.width, ca)
     shared = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
-    # one corner per joint instead of one for all: each is smoothed over its share of the width
+    # One corner per joint instead of a common one, smoothed over its share of the width.
     isolated = par.base_power + ca.sum1(drawn_power(flow.joints, 0, par.width / t.numel(), ca))
     drawn = (1 - par.isolated) * shared + par.isolated * isolated
     mechanical = ca.sum1(smooth_abs(t * w, par.width, ca))
@@ -242,28 +253,31 @@ def _derivatives(
     power: _Power, tau: ca.SX, rotor: ca.SX, y: ca.SX, multiplier: ca.SX, weight: ca.SX
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Gradient of the cost, Jacobian of tau_limited, and Hessian of weight · cost + multiplier ·
-    tau_limited, all by y.
+    tau_limited, all with respect to y.
 
-    `rotor` (nq,) [kg·m²] is the inertia that the limited torque leaves out. The chain rule is
-    applied by hand: it takes a third of the operations that differentiating the composed cost twice
-    takes.
+    The chain rule is applied by hand: this takes a third of the operations of differentiating the
+    composed cost twice. `rotor` (nq,) [kg·m²] is the inertia that the limited torque leaves out.
     """
     nq = tau.numel()
     J_tau = ca.jacobian(tau, y)
     J_inner = ca.vertcat(J_tau, ca.horzcat(ca.SX(2 * nq, nq), ca.SX.eye(2 * nq)))
-    pull = ca.SX.sym("pull", nq)
-    pulled = weight * power.slope[:nq] + multiplier + power.friction_slope[:, :nq].T @ multiplier
-    dynamics_bend = ca.substitute(ca.hessian(ca.dot(pull, tau), y)[0], pull, pulled)
-    hessian = (
-        dynamics_bend
-        + _congruent(J_inner, weight * power.bend)
-        + _congruent(J_inner, power.friction_bend)
+    symbolic_weights = ca.SX.sym("symbolic_weights", nq)
+    tau_weights = (
+        weight * power.gradient[:nq] + multiplier + power.friction_jacobian[:, :nq].T @ multiplier
     )
-    jacobian = J_tau + power.friction_slope @ J_inner
+    dynamics_hessian = ca.substitute(
+        ca.hessian(ca.dot(symbolic_weights, tau), y)[0], symbolic_weights, tau_weights
+    )
+    hessian = (
+        dynamics_hessian
+        + _congruent(J_inner, weight * power.hessian)
+        + _congruent(J_inner, power.friction_hessian)
+    )
+    jacobian = J_tau + power.friction_jacobian @ J_inner
     jacobian[:, 2 * nq :] -= ca.diag(rotor)
-    return J_inner.T @ power.slope, jacobian, hessian
+    return J_inner.T @ power.gradient, jacobian, hessian
 
 
 def _congruent(J: ca.SX, symmetric: ca.SX) -> ca.SX:
-    """Jᵀ · symmetric · J: half of the product, mirrored."""
+    """The product Jᵀ · symmetric · J: one half is computed and mirrored."""
     return ca.tril2symm(ca.tril(J.T @ (symmetric @ J)))

@@ -1,5 +1,5 @@
-"""A kernel's functions for a fixed number of nodes: by CasADi's virtual machine, or by a compiled
-library.
+"""Per-node functions for a fixed number of nodes, evaluated by CasADi's virtual machine or by a
+compiled library.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from joulepath.optimizer.dynamics.kernel_expressions import SYMBOLICS, sizes
 
 
 class Evaluation:
-    """A function of a fixed number of nodes, with its own memory: for one thread.
+    """A function of a fixed number of nodes, with its own memory, for use by one thread.
 
-    Arguments and results are numpy arrays that the function reads and writes in place, without
+    The function reads its arguments from numpy arrays and writes its results into others, without
     copies or conversions.
     """
 
@@ -31,8 +31,12 @@ class Evaluation:
     run: Callable[[], object]
 
     def __call__(self, *arguments: Array) -> list[Array]:
-        """Evaluate; row k of every argument belongs to node k, the last one to all. The next call
-        overwrites the results."""
+        """Evaluates the function. The next call overwrites the results.
+
+        Args:
+            arguments: one array per argument. Row k belongs to node k; all nodes share the last
+                argument.
+        """
         for own, given in zip(self.arguments, arguments, strict=True):
             own[...] = given
         self.run()
@@ -40,17 +44,17 @@ class Evaluation:
 
 
 class Functions(Protocol):
-    """Where the functions of `kernel_expressions` are evaluated."""
+    """Evaluator of the functions of `kernel_expressions`."""
 
     compiled: bool
 
     def evaluation(self, name: str, count: int) -> Evaluation:
-        """A function of so many nodes, for the calling thread."""
+        """Evaluation of the function `name` of `count` nodes, for the calling thread."""
         ...
 
 
 class Interpreted:
-    """CasADi functions in its virtual machine."""
+    """Functions evaluated by CasADi's virtual machine."""
 
     compiled = False
 
@@ -59,7 +63,7 @@ class Interpreted:
         self._mapped: dict[tuple[str, int], ca.Function] = {}
 
     def evaluation(self, name: str, count: int) -> Evaluation:
-        """See `Functions`."""
+        """Evaluation of a function, see `Functions`."""
         key = (name, count)
         with SYMBOLICS:
             if key not in self._mapped:
@@ -68,27 +72,29 @@ class Interpreted:
 
 
 class Compiled:
-    """The functions in a library that was compiled from `kernel_source`, of an arm of nq joints.
+    """Functions of an arm of nq joints, in a library compiled from `kernel_source`.
 
-    The library is unloaded when neither this nor any of its evaluations is left. Raises OSError if
-    it cannot be loaded.
+    The library is unloaded when neither this object nor any of its evaluations is referenced.
+
+    Raises:
+        OSError: the library cannot be loaded.
     """
 
     compiled = True
 
     def __init__(self, path: Path, nq: int) -> None:
         self._library, self._nq = ctypes.CDLL(str(path)), nq
-        # ctypes itself never does: users may bring any number of arms. At the end of the process it
-        # may be in use
+        # ctypes never unloads a library, and users may bring any number of arms. At the end of the
+        # process another thread may still use the library, so it is not unloaded then.
         weakref.finalize(self, _ctypes.dlclose, self._library._handle).atexit = False
 
     def evaluation(self, name: str, count: int) -> Evaluation:
-        """See `Functions`."""
+        """Evaluation of a function, see `Functions`."""
         return _Called(self, getattr(self._library, name), *sizes(self._nq)[name], count)
 
 
 class _Mapped(Evaluation):
-    """A CasADi function, mapped over the nodes."""
+    """CasADi function mapped over the nodes."""
 
     def __init__(self, mapped: ca.Function) -> None:
         self._buffer, self.run = mapped.buffer()
@@ -101,7 +107,7 @@ class _Mapped(Evaluation):
 
 
 class _Called(Evaluation):
-    """A function of a library, which goes through the nodes itself. It keeps the library loaded."""
+    """Library function with its own loop over the nodes; it keeps the library loaded."""
 
     def __init__(
         self,

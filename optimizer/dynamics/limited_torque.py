@@ -1,8 +1,8 @@
-"""The torque that the limit on torque is for: that of the motor, or that of the link behind gear
-and bearings.
+"""The torque to which the torque limit applies: at the motor, or at the link behind gear and
+bearings.
 
-Makers mean one or the other: a limit of the drive holds with rotor and friction, that of a torque
-sensor at the link, or of what a link bears, without them.
+Manufacturers differ: a limit of the drive includes rotor and friction; a limit of a torque sensor
+at the link, or of the strength of the link, does not.
 """
 
 from __future__ import annotations
@@ -15,30 +15,38 @@ from joulepath.optimizer.problem.arm import Arm
 
 
 def limited_parts(
-    arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None = None
+    arm: Arm, tau: Array, v: Array, a: Array, tau_friction: Array | None = None
 ) -> tuple[Array, Array]:
-    """The parts (k, nq) [N·m] of the limited torque that are smooth, and the friction in it.
+    """Smooth part of the limited torque, and the friction in it, (k, nq) [N·m] each.
 
-    `tau` is rigid body and rotor torque at speeds v [rad/s] and accelerations a [rad/s²], `lost`
-    friction's torque if it is known, all (k, nq).
+    Args:
+        arm: the arm.
+        tau: rigid-body and rotor torques (k, nq) [N·m].
+        v: joint speeds (k, nq) [rad/s].
+        a: joint accelerations (k, nq) [rad/s²].
+        tau_friction: friction torques (k, nq) [N·m] if they are known already.
     """
     if arm.robot.torque_side == "link":
         return tau - arm.drives.rotor_inertia * a, np.zeros_like(tau)
-    return tau, friction_torque(arm.friction_law, arm.drives, tau, v, a) if lost is None else lost
+    return tau, friction_torque(
+        arm.friction_law, arm.drives, tau, v, a
+    ) if tau_friction is None else tau_friction
 
 
-def limited_torque(arm: Arm, tau: Array, v: Array, a: Array, lost: Array | None = None) -> Array:
-    """The torque (k, nq) [N·m] that the limit is for: see `limited_parts`."""
-    smooth, friction = limited_parts(arm, tau, v, a, lost)
+def limited_torque(
+    arm: Arm, tau: Array, v: Array, a: Array, tau_friction: Array | None = None
+) -> Array:
+    """Torque (k, nq) [N·m] to which the limit applies, the sum of `limited_parts`."""
+    smooth, friction = limited_parts(arm, tau, v, a, tau_friction)
     return smooth + friction
 
 
 def greatest_smooth_part(arm: Arm) -> Array:
-    """The greatest absolute value (nq,) [N·m] that the smooth part of the limited torque has within
-    the limits.
+    """Upper bound (nq,) [N·m] on the smooth part of the limited torque of motions within the
+    limits.
 
-    Friction helps a motor that holds a load back. With f(v_max) that of an unloaded joint,
-    |tau_link| ≤ |tau| + rotor · a_max, and |tau| ≤ tau_max + f + load |tau_link|:
+    Friction helps a motor to hold back a load. With the friction f(v_max) of an unloaded joint,
+    |tau_link| ≤ |tau| + rotor · a_max and |tau| ≤ tau_max + f + load |tau_link|, hence
 
         |tau| ≤ (tau_max + f(v_max) + load · rotor · a_max) / (1 - load).
     """

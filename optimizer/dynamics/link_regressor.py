@@ -1,8 +1,8 @@
-"""Torques of an arm's rigid bodies, and their regressor: the torques are linear in the bodies' ten
-parameters each.
+"""Torques of an arm's rigid bodies, and their regressor.
 
-Of a body: mass m, first moments m·c (3) and inertia about the joint's frame Ixx, Ixy, Iyy, Ixz,
-Iyz, Izz, in the frame of its joint (Pinocchio's order). Rotors are not in them.
+Torques are linear in ten parameters per body: mass m, first moments m·c (3), and inertia Ixx, Ixy,
+Iyy, Ixz, Iyz, Izz about the origin of the joint frame, in the axes of the joint frame and in
+Pinocchio's order. Rotors are not included.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ import pinocchio as pin
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import checkpoint
 
-BODY = 10
-"""Parameters of a body."""
+PARAMETERS_PER_BODY = 10
+"""Rigid-body parameters of one body."""
 
 
 def rigid_torques(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
-    """Torques (n, nq) [N·m] of rigid bodies, without rotors, at states q, v, a (n, nq)."""
+    """Rigid-body torques (n, nq) [N·m] without rotors, at states q, v, a (n, nq) [rad, rad/s,
+    rad/s²].
+    """
     bare = without_rotors(model)
     data = bare.createData()
     torques = np.empty_like(q)
@@ -28,36 +30,37 @@ def rigid_torques(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
 
 
 def rigid_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
-    """The matrices (n, nq, 10 nq) whose products with the bodies' parameters are the rigid bodies'
-    torques.
-    """
+    """Matrices (n, nq, 10 nq) that map the parameters of the bodies to the rigid-body torques."""
     data = model.createData()
-    found = np.empty((len(q), model.nq, BODY * model.nq))
+    regressor = np.empty((len(q), model.nq, PARAMETERS_PER_BODY * model.nq))
     for row in range(len(q)):
-        found[row] = pin.computeJointTorqueRegressor(model, data, q[row], v[row], a[row])
-    return found
+        regressor[row] = pin.computeJointTorqueRegressor(model, data, q[row], v[row], a[row])
+    return regressor
 
 
 def base_wrench_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
-    """The matrices (n, 6, 10 nq) whose products with the bodies' parameters are the wrench of the
-    links on the base: force [N] and torque [N·m] about its origin, in its axes. Rotors are
-    neglected."""
+    """Matrices (n, 6, 10 nq) that map the parameters of the bodies to the wrench of the links on
+    the base.
+
+    The wrench is a force [N] and a torque [N·m] about the origin of the base, in base axes. Rotors
+    are neglected.
+    """
     data = model.createData()
-    found = np.empty((len(q), 6, BODY * model.nq))
+    regressor = np.empty((len(q), 6, PARAMETERS_PER_BODY * model.nq))
     for row in range(len(q)):
         checkpoint()
         pin.rnea(model, data, q[row], v[row], a[row])
         pin.forwardKinematics(model, data, q[row])
         for joint in range(1, model.njoints):
             body = pin.jointBodyRegressor(model, data, joint)
-            at = slice(BODY * (joint - 1), BODY * joint)
-            # minus: what the base exerts on the links acts back on it
-            found[row, :, at] = -data.oMi[joint].toDualActionMatrix() @ body
-    return found
+            columns = slice(PARAMETERS_PER_BODY * (joint - 1), PARAMETERS_PER_BODY * joint)
+            # Minus: the wrench on the base opposes the wrench of the base on the links.
+            regressor[row, :, columns] = -data.oMi[joint].toDualActionMatrix() @ body
+    return regressor
 
 
 def without_rotors(model: pin.Model) -> pin.Model:
-    """A copy of the model without rotor inertia."""
+    """Copy of the model without rotor inertia."""
     bare = model.copy()
     bare.armature = np.zeros(model.nq)
     return bare

@@ -1,16 +1,15 @@
-"""Drive losses, power on the bus and the parts of a motion's energy: one definition for optimiser,
-report, certificate.
+"""Drive losses, power on the bus, and the parts of a motion's energy.
 
-tau_motor = tau + friction [N·m],  i = tau_motor / torque_constant [A]
-inverter  = constant + linear |i| + quadratic i² [W]  (Hansen, Öltjen, Meike, Ortmaier 2012)
-P_net     = base + Σ_j (tau_motor_j v_j + copper_j i_j² + inverter_j(i_j)) [W],  base = idle +
-controller
-P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0) [W] on a shared bus; for other buses see
-`bus_flow`
+    tau_motor = tau + tau_friction [N·m],  i = tau_motor / torque_constant [A]
+    inverter  = constant + linear |i| + quadratic i² [W]  (Hansen, Öltjen, Meike, Ortmaier 2012)
+    P_net     = base + Σ_j (tau_motor_j v_j + copper_j i_j² + inverter_j(i_j)) [W]
+    base      = idle + controller [W]
+    P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0) [W] on a shared bus
 
-The formulas take numpy arrays (report, certificate) or CasADi symbols (optimiser). `xp` is the
-module whose `sqrt` and `asinh` fit. The optimiser smooths |x| to sqrt(x² + width²); with width 0
-the same lines are exact.
+`bus_flow` has the other buses. Optimiser, report and certificate share these formulas: they take
+numpy arrays (report, certificate) or CasADi symbols (optimiser), and `xp` is the module with `sqrt`
+and `asinh` for them. The optimiser smooths |x| to sqrt(x² + width²); with width 0 the formulas are
+exact.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from joulepath.models.robot import Array, Drives, FrictionLaw
-from joulepath.optimizer.dynamics.bus_flow import exchange
+from joulepath.optimizer.dynamics.bus_flow import BusFlow, exchange
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.energy import (
     ElectricalEnergy,
@@ -31,15 +30,16 @@ from joulepath.optimizer.result.energy import (
     StorageUse,
 )
 
-ENERGY_FLOOR = 1e-6  # J; errors of energies below it are relative to it
+ENERGY_FLOOR = 1e-6
+"""Smallest magnitude of an energy as the reference of a relative error [J]."""
 
 
 @dataclass(frozen=True)
 class PowerFlow:
-    """Power at an instant per joint (..., nq) [W], and the motor torque (..., nq) [N·m] at the
-    joint.
+    """Power of every joint at an instant (..., nq) [W], and the motor torque at the joint (..., nq)
+    [N·m].
 
-    `friction` is lost in the gear, `copper` in the motor windings, `inverter` in the inverter;
+    `friction` is the loss in the gear, `copper` in the motor windings, `inverter` in the inverter.
     `shaft` is tau_motor · v, negative while the joint brakes.
     """
 
@@ -51,8 +51,9 @@ class PowerFlow:
 
     @property
     def joints(self) -> Any:
-        """Power that each joint takes from the bus (..., nq) [W]; negative if it feeds power
-        back."""
+        """Power that each joint takes from the bus (..., nq) [W]; negative while it feeds power
+        back.
+        """
         return self.shaft + self.copper + self.inverter
 
 
@@ -64,7 +65,7 @@ def smooth_abs(x: Any, width: Any, xp: Any) -> Any:
 def friction_torque(
     law: FrictionLaw, drives: Drives, tau: Any, v: Any, a: Any, xp: Any = np
 ) -> Any:
-    """Friction torque (..., nq) [N·m] of a motion; tau, v, a as in `power_flow`."""
+    """Friction torques (..., nq) [N·m] of a motion; tau, v and a as in `power_flow`."""
     return law.torque(v, None if law.load is None else tau - drives.rotor_inertia * a, xp)
 
 
@@ -73,19 +74,25 @@ def power_flow(
 ) -> PowerFlow:
     """Losses and shaft power of every joint.
 
-    tau (..., nq) [N·m] are torques of rigid body and rotor, without friction; v [rad/s], a [rad/s²]
-    (..., nq). `width` [A] smooths the |i| of the inverter.
+    Args:
+        tau: rigid-body and rotor torques (..., nq) [N·m], without friction.
+        v: joint speeds (..., nq) [rad/s].
+        a: joint accelerations (..., nq) [rad/s²].
+        drives: drives of the joints.
+        friction: friction law.
+        width: smoothing width of |i| in the inverter [A].
+        xp: module of the arrays, numpy or CasADi.
     """
     return flow_with(friction_torque(friction, drives, tau, v, a, xp), tau, v, drives, width, xp)
 
 
 def flow_with(
-    lost: Any, tau: Any, v: Any, drives: Drives, width: Any = 0.0, xp: Any = np
+    tau_friction: Any, tau: Any, v: Any, drives: Drives, width: Any = 0.0, xp: Any = np
 ) -> PowerFlow:
-    """Losses and shaft power of every joint at friction torques `lost` (..., nq) [N·m]; see
+    """Losses and shaft power of every joint with friction torques (..., nq) [N·m], see
     `power_flow`.
     """
-    tau_motor = tau + lost
+    tau_motor = tau + tau_friction
     i = tau_motor / drives.torque_constant
     inverter = (
         drives.inverter_constant
@@ -94,7 +101,7 @@ def flow_with(
     )
     return PowerFlow(
         tau_motor=tau_motor,
-        friction=lost * v,
+        friction=tau_friction * v,
         copper=drives.copper * i * i,
         inverter=inverter,
         shaft=tau_motor * v,
@@ -102,8 +109,8 @@ def flow_with(
 
 
 def drawn_power(net: Any, regeneration: Any, width: Any = 0.0, xp: Any = np) -> Any:
-    """Power that a shared bus draws from the supply for a net demand [W]; `width` [W] smooths the
-    corner at zero.
+    """Power [W] that a shared bus draws from the supply for a net demand [W]; `width` [W] smooths
+    the corner at zero.
     """
     return ((1 - regeneration) * smooth_abs(net, width, xp) + (1 + regeneration) * net) / 2
 
@@ -116,24 +123,27 @@ def breakdown(
     potential: float,
     arm: Arm,
     kinetic: float = 0.0,
-    lost: Array | None = None,
+    tau_friction: Array | None = None,
 ) -> Energy:
     """Energy of a motion of an arm from its samples, in order of time.
 
-    `weights` (k,) [s] are those of the quadrature; they add up to the duration. v [rad/s], a
-    [rad/s²] and tau [N·m] (k, nq) are the samples; tau are torques of rigid body and rotor, without
-    friction. `potential` and `kinetic` [J] are the gains of energy from the first to the last
-    state, known without quadrature. `lost` (k, nq) [N·m] are the friction torques if they are
-    known. A part that is zero is 0.0, never -0.0.
+    A part of zero is 0.0, never -0.0.
+
+    Args:
+        weights: quadrature weights (k,) [s]; they add up to the duration.
+        v: joint speeds (k, nq) [rad/s].
+        a: joint accelerations (k, nq) [rad/s²].
+        tau: rigid-body and rotor torques (k, nq) [N·m], without friction.
+        potential: gain of potential energy from the first to the last state [J].
+        arm: the arm.
+        kinetic: gain of kinetic energy from the first to the last state [J].
+        tau_friction: friction torques (k, nq) [N·m] if they are known already.
     """
-    duration = float(weights.sum())
-    if lost is None:
-        lost = friction_torque(arm.friction_law, arm.drives, tau, v, a)
-    flow = flow_with(lost, tau, v, arm.drives)
-    bus, joints = arm.bus, flow.joints
-    flows = exchange(bus, arm.regeneration, arm.base_power, joints, weights)
-    surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())
-    drawn, discharge = float(flows.drawn.sum()), float(flows.charge[0] - flows.charge[-1])
+    if tau_friction is None:
+        tau_friction = friction_torque(arm.friction_law, arm.drives, tau, v, a)
+    flow = flow_with(tau_friction, tau, v, arm.drives)
+    flows = exchange(arm.bus, arm.regeneration, arm.base_power, flow.joints, weights)
+    duration, drawn = float(weights.sum()), float(flows.drawn.sum())
     per_joint = JointEnergy(
         friction=weights @ flow.friction,
         copper=weights @ flow.copper,
@@ -141,34 +151,49 @@ def breakdown(
         shaft=weights @ flow.shaft,
     )
     mechanical = weights @ np.abs(tau * v)
+    power = np.divide(flows.drawn, weights, out=np.zeros_like(weights), where=weights > 0)
     return Energy(
-        electrical=ElectricalEnergy(
-            total=drawn + discharge,
-            idle=arm.base_power * duration,
-            potential=potential,
-            kinetic=kinetic,
-            friction=float(per_joint.friction.sum()),
-            copper=float(per_joint.copper.sum()),
-            inverter=float(per_joint.inverter.sum()),
-            braking=surplus,
-            # subtracted from 0.0, since a product of -1 and 0.0 is -0.0
-            recovered=0.0 - arm.regeneration * surplus,
-            storage_loss=(1 - bus.efficiency) * charged,
-        ),
+        electrical=_electrical_energy(flows, per_joint, duration, potential, kinetic, arm),
         mechanical=MechanicalEnergy(total=float(mechanical.sum()), per_joint=mechanical),
         per_joint=per_joint,
-        peak_power=float(
-            np.divide(flows.drawn, weights, out=np.zeros_like(weights), where=weights > 0).max()
-        ),
+        peak_power=float(power.max()),
         mean_power=drawn / duration if duration > 0 else 0.0,
-        storage=None
-        if bus.mode != "storage"
-        else StorageUse(
-            initial=float(flows.charge[0]),
-            final=float(flows.charge[-1]),
-            charged=charged,
-            discharged=float(flows.discharged.sum()),
-        ),
+        storage=_storage_use(flows) if arm.bus.mode == "storage" else None,
+    )
+
+
+def _electrical_energy(
+    flows: BusFlow,
+    per_joint: JointEnergy,
+    duration: float,
+    potential: float,
+    kinetic: float,
+    arm: Arm,
+) -> ElectricalEnergy:
+    """Electrical energy and its parts [J], see `breakdown`."""
+    surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())
+    drawn, discharge = float(flows.drawn.sum()), float(flows.charge[0] - flows.charge[-1])
+    return ElectricalEnergy(
+        total=drawn + discharge,
+        idle=arm.base_power * duration,
+        potential=potential,
+        kinetic=kinetic,
+        friction=float(per_joint.friction.sum()),
+        copper=float(per_joint.copper.sum()),
+        inverter=float(per_joint.inverter.sum()),
+        braking=surplus,
+        # Subtracted from 0.0, since -1 times 0.0 would be -0.0.
+        recovered=0.0 - arm.regeneration * surplus,
+        storage_loss=(1 - arm.bus.efficiency) * charged,
+    )
+
+
+def _storage_use(flows: BusFlow) -> StorageUse:
+    return StorageUse(
+        initial=float(flows.charge[0]),
+        final=float(flows.charge[-1]),
+        charged=float(flows.charged.sum()),
+        discharged=float(flows.discharged.sum()),
     )
 
 

@@ -24,40 +24,61 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.result.energy import Energy, Sensitivity
 from joulepath.optimizer.result.solution import Trajectory
 
-Found = TypeVar("Found")
-# quadrature weights (k,) [s], and q, v, a, torques and friction's torques (k, nq) of a motion
+Result = TypeVar("Result")
 ReportSamples = tuple[Array, Array, Array, Array, Array, Array]
+"""Quadrature weights (k,) [s], then q, v, a, torques and friction torques (k, nq) of a motion."""
 
-# smoothing in the optimiser's cost: the reversal of friction [rad/s], the corner of the load that
-# friction grows with as a share of the robot's torque limit, and the corners of |power| [W]
-KNEE = 0.02
-BEND = 0.01
-WIDTH = 0.5
-# widths [W] of the solves that follow, one from the other, where every joint has a corner of its
-# own
-SHARPER_WIDTHS = (0.1, 0.02)
-# quadrature points per panel for reported energies
-REPORT_NODES = 8
-# a last sample nearer to the one before than this fraction of a period is rounding
-LEAST_STEP = 1e-6
+
+@dataclass(frozen=True)
+class SmoothingSettings:
+    """Smoothing of the optimiser's cost; reports and certificates use the exact formulas."""
+
+    knee: float = 0.02
+    """Speed range of the reversal of friction [rad/s]."""
+    load_share: float = 0.01
+    """Range of the corner of load-dependent friction, relative to the torque limit [1]."""
+    power_width: float = 0.5
+    """Range of the corners of |power| [W]."""
+    sharper_power_widths: tuple[float, float] = (0.1, 0.02)
+    """Ranges [W] of two subsequent solves, each from the previous solution, if every joint's power
+    has a corner of its own.
+    """
+
+
+@dataclass(frozen=True)
+class ReportSettings:
+    """Sampling of reported motions."""
+
+    nodes_per_panel: int = 8
+    """Quadrature points per panel of the reported energy."""
+    smallest_step: float = 1e-6
+    """Smallest distance of the last sample from the one before, in periods [1]; a smaller distance
+    is rounding.
+    """
+
+
+SMOOTHING = SmoothingSettings()
+REPORT = ReportSettings()
 
 
 def has_corners(objective: str, arm: Arm) -> bool:
-    """Whether every joint's power has a corner of its own in the objective: mechanical work, and an
-    isolated bus.
+    """Whether the power of every joint has a corner of its own in the objective: for mechanical
+    work, and on an isolated bus.
     """
     return objective == "mechanical" or (objective == "electrical" and arm.bus.mode == "isolated")
 
 
 @dataclass(eq=False)
-class _OfTheLast(Generic[Found]):
-    """What was computed of the last motion: a motion is valued several times, and then reported."""
+class _LastResult(Generic[Result]):
+    """Result for the last motion: a motion is evaluated several times and then reported."""
 
-    known: tuple[Spline, Found] | None = None
+    known: tuple[Spline, Result] | None = None
 
-    def of(self, spline: Spline, compute: Callable[[Spline], Found]) -> Found:
-        """What `compute` finds of the motion, which may be known."""
-        # read once: other threads may replace it
+    def of(self, spline: Spline, compute: Callable[[Spline], Result]) -> Result:
+        """Result of `compute` for the motion, computed only if the motion differs from the last
+        one.
+        """
+        # Read once, since other threads may replace it.
         known = self.known
         if known is None or known[0] is not spline:
             known = self.known = spline, compute(spline)
@@ -66,24 +87,24 @@ class _OfTheLast(Generic[Found]):
 
 @dataclass(frozen=True)
 class Plant:
-    """An arm with its kernel and Pinocchio model. Any number of threads may use one plant."""
+    """Arm with its kernel and Pinocchio model. Any number of threads may use one plant."""
 
     arm: Arm
 
     @cached_property
     def kernel(self) -> Kernel:
-        """The robot's compiled functions."""
+        """Compiled functions of the robot."""
         return kernel_for(self.arm.robot)
 
     @cached_property
     def model(self) -> pin.Model:
-        """Pinocchio model of the arm, payload and gravity included."""
+        """Pinocchio model of the arm, including payload and gravity."""
         return rigid_body_model(self.arm)
 
     @cached_property
     def _data(self) -> pin.Data:
-        # Threads may share it for functions that return a number: Pinocchio's calls hold Python's
-        # global lock, so that no other thread writes into the data before the number is returned.
+        # Threads may share it for functions with a scalar result: Pinocchio's calls hold Python's
+        # global lock, so no other thread writes into the data before the scalar is returned.
         return self.model.createData()
 
     def parameters(
@@ -92,23 +113,30 @@ class Plant:
         mechanical: float = 0.0,
         time: float = 0.0,
         regeneration: float | None = None,
-        width: float = WIDTH,
+        width: float = SMOOTHING.power_width,
     ) -> Array:
-        """Packed kernel parameters: the arm's, and weights of electrical and mechanical energy [1]
-        and duration [W].
+        """Packed kernel parameters: the figures of the arm, and the weights of the cost.
 
-        `regeneration` [1] is the value of a joule of surplus, by default what the arm's supply
-        takes back. The cost of an instant cannot depend on a charge: with an energy storage, this
-        value stands for it. `width` [W] smooths the corners of the cost.
+        Args:
+            electrical: weight of the electrical energy [1].
+            mechanical: weight of the mechanical energy [1].
+            time: weight of the duration [W].
+            regeneration: value of a joule of surplus [1], by default the share that the arm's
+                supply takes back. It stands for an energy storage, since the cost of an instant
+                cannot depend on a charge.
+            width: smoothing width of the corners of the cost [W].
         """
         return self._parameters(electrical, mechanical, time, regeneration, width).pack()
 
     @cached_property
     def frictionless_parameters(self) -> Array:
-        """Packed kernel parameters of a cost of zero, whose limited torque is that of rigid bodies
-        and rotors.
+        """Packed kernel parameters without friction and with zero cost: the limited torque is then
+        the torque of rigid bodies and rotors.
         """
-        parts, none = self._parameters(0.0, 0.0, 0.0, None, WIDTH), np.zeros(self.arm.robot.nq)
+        parts, none = (
+            self._parameters(0.0, 0.0, 0.0, None, SMOOTHING.power_width),
+            np.zeros(self.arm.robot.nq),
+        )
         return replace(
             parts, coulomb=none, curved=none, viscous=none, load=none, link_side=0.0
         ).pack()
@@ -138,7 +166,7 @@ class Plant:
             speed=friction.speed,
             viscous=friction.viscous,
             load=np.zeros(nq) if friction.load is None else friction.load,
-            bend=BEND * self.arm.robot.limits.tau_max,
+            bend=SMOOTHING.load_share * self.arm.robot.limits.tau_max,
             torque_constant=drives.torque_constant,
             copper=drives.copper,
             inverter_constant=drives.inverter_constant,
@@ -152,30 +180,30 @@ class Plant:
             electrical=electrical,
             mechanical=mechanical,
             time=time,
-            knee=KNEE,
+            knee=SMOOTHING.knee,
             width=width,
         )
 
     @cached_property
     def electrical_parameters(self) -> Array:
-        """Parameters with the electrical energy as the cost."""
+        """Packed kernel parameters with the electrical energy as the cost."""
         return self.parameters(electrical=1.0)
 
     @property
     def friction(self) -> FrictionLaw:
-        """The friction law in force."""
+        """Friction law in use."""
         return self.arm.friction_law
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
-        """Rigid body and rotor torques (k, nq) [N·m]."""
+        """Rigid-body and rotor torques (k, nq) [N·m]."""
         return self.kernel.torque(q, v, a, self.electrical_parameters)
 
     def limited_torques(self, q: Array, v: Array, a: Array) -> Array:
-        """The torques (k, nq) [N·m] that the limit is for: see `limited_torque`."""
+        """Torques (k, nq) [N·m] to which the torque limit applies, see `limited_torque`."""
         return limited_torque(self.arm, self.torques(q, v, a), v, a)
 
     def motor_torques(self, q: Array, v: Array, a: Array) -> Array:
-        """Motor torques at the joint (k, nq) [N·m]: rigid body, rotor and friction."""
+        """Motor torques at the joints (k, nq) [N·m]: rigid bodies, rotors and friction."""
         return np.asarray(
             power_flow(self.torques(q, v, a), v, a, self.arm.drives, self.friction).tau_motor
         )
@@ -185,51 +213,55 @@ class Plant:
         return float(pin.computePotentialEnergy(self.model, self._data, q))
 
     def energy(self, spline: Spline) -> Energy:
-        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed
+        """Energy [J] of a spline motion by Gauss-Legendre quadrature of the exact, unsmoothed
         formulas.
         """
         return self._last_energy.of(spline, self._computed_energy)
 
     def _computed_energy(self, spline: Spline) -> Energy:
-        weights, _, v, a, tau, lost = self.report_samples(spline)
+        weights, _, v, a, tau, tau_friction = self.report_samples(spline)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
-        return breakdown(weights, v, a, tau, change, self.arm, lost=lost)
+        return breakdown(weights, v, a, tau, change, self.arm, tau_friction=tau_friction)
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
-        """How the electrical energy of a spline motion hangs on the arm's figures."""
-        weights, q, v, a, tau, lost = self.report_samples(spline)
-        return energy_sensitivity(weights, q, v, a, tau, self.arm, arm_spread(self.arm), lost)
+        """Sensitivity of the electrical energy of a spline motion to the figures of the arm."""
+        weights, q, v, a, tau, tau_friction = self.report_samples(spline)
+        return energy_sensitivity(
+            weights, q, v, a, tau, self.arm, arm_spread(self.arm), tau_friction
+        )
 
     def report_samples(self, spline: Spline) -> ReportSamples:
         """Samples of a motion at the Gauss-Legendre points of its reported energy."""
         return self._last_samples.of(spline, self._computed_samples)
 
     def _computed_samples(self, spline: Spline) -> ReportSamples:
-        weights, q, v, a = fine_samples(spline, REPORT_NODES)
+        weights, q, v, a = fine_samples(spline, REPORT.nodes_per_panel)
         tau = self.torques(q, v, a)
         return weights, q, v, a, tau, friction_torque(self.friction, self.arm.drives, tau, v, a)
 
     def net_demand(self, spline: Spline) -> tuple[Array, Array]:
-        """Net demand (k,) [J] on the bus in the intervals of a motion's reported energy, and their
-        lengths (k,) [s].
+        """Net demand (k,) [J] on the bus in the intervals of the reported energy, and their lengths
+        (k,) [s].
         """
-        weights, _, v, _, tau, lost = self.report_samples(spline)
-        joints = flow_with(lost, tau, v, self.arm.drives).joints
+        weights, _, v, _, tau, tau_friction = self.report_samples(spline)
+        joints = flow_with(tau_friction, tau, v, self.arm.drives).joints
         return weights * (self.arm.base_power + joints.sum(axis=1)), weights
 
     @cached_property
-    def _last_energy(self) -> _OfTheLast[Energy]:
-        return _OfTheLast()
+    def _last_energy(self) -> _LastResult[Energy]:
+        return _LastResult()
 
     @cached_property
-    def _last_samples(self) -> _OfTheLast[ReportSamples]:
-        return _OfTheLast()
+    def _last_samples(self) -> _LastResult[ReportSamples]:
+        return _LastResult()
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
-        """Samples of a spline motion every `period` [s]; the last one lies on the end."""
+        """Samples of a spline motion every `period` [s]; the last sample lies on the end."""
         duration = spline.duration
-        t = np.append(np.arange(int(np.ceil(duration / period - LEAST_STEP))) * period, duration)
+        t = np.append(
+            np.arange(int(np.ceil(duration / period - REPORT.smallest_step))) * period, duration
+        )
         q, v, a = sample(spline, t)
         tau = self.torques(q, v, a)
         flow = power_flow(tau, v, a, self.arm.drives, self.friction)
@@ -243,7 +275,7 @@ class Plant:
     def _charge(self, spline: Spline, t: Array) -> Array:
         """Charge (k,) [J] of the energy storage at times t (k,) [s]; zero without storage.
 
-        By the quadrature of the reported energy, linear in between.
+        The quadrature of the reported energy gives the charge, linear between its points.
         """
         if self.arm.bus.mode != "storage":
             return np.zeros_like(t)

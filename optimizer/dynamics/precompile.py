@@ -1,9 +1,11 @@
-"""`python -m joulepath.optimizer.dynamics.precompile [--portable] [ROBOT …]` compiles the kernels of
-robots, so that no request is interpreted.
+"""Compiles the kernels of robots, so that no request uses an interpreted kernel.
 
-Without a name it compiles those of all robots. With `--portable` they serve on every processor of
-this kind, as in an image for many machines; without, they are for this one, and twice as fast.
-"""  # noqa: E501
+    python -m joulepath.optimizer.dynamics.precompile [--portable] [ROBOT …]
+
+Without a name, the kernels of all robots are compiled. With `--portable` they run on every
+processor of this architecture, as in an image for many machines; without, they use the vectors of
+this machine's processor and are twice as fast.
+"""
 
 from __future__ import annotations
 

@@ -1,22 +1,25 @@
-"""How a motion's electrical energy hangs on the figures of the arm; the motion stays the same.
+"""Sensitivity of a motion's electrical energy to the figures of the arm, for an unchanged motion.
 
 A joint takes P = u v + inverter(i) + copper i² with u = tau + friction and i = u / torque_constant,
-so that
+so
 
     ∂P/∂u = v + (2 copper i + linear sign(i) + 2 quadratic i) / torque_constant.
 
-Friction's coefficients change u by their own terms, the rotor's inertia by a, and the links'
-parameters by the regressor of the rigid bodies' torques. P is taken as linear in the figures. The
-bus is not: a watt is worth 1 while the bus draws, and what the supply or the energy storage takes
-of it while there is a surplus. Where errors of the figures decide which it is, the expected worth
-counts (statistical linearisation): with a power P of mean m and standard deviation σ,
+Coefficients of friction change u by their own terms, the rotor inertia changes u by a, and link
+parameters change u by the regressor of rigid-body torques. P is taken as linear in the figures. The
+bus is not linear: a watt has the value 1 while the bus draws, and the recovered share of supply or
+storage while there is a surplus. The sign of P may depend on the errors, so the expected value
+counts (statistical linearisation): for a power P of mean m and standard deviation σ,
 
     E max(P, 0) = m Φ(m / σ) + σ φ(m / σ),      dE/dm = Φ(m / σ).
 
-What a joule more in the storage changes later on, where it is full or empty, is left out.
+The effect of a joule more in the storage on later instants, with a full or empty storage, is left
+out.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
@@ -25,16 +28,24 @@ from joulepath.models.robot import Array
 from joulepath.models.uncertainty.parameters import PER_JOINT, count
 from joulepath.models.uncertainty.spread import Spread
 from joulepath.optimizer.dynamics.bus_flow import exchange
-from joulepath.optimizer.dynamics.link_regressor import BODY, rigid_regressor
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, rigid_regressor
 from joulepath.optimizer.dynamics.losses import friction_torque
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.result.energy import Sensitivity
 
-# of a surplus that is stored, the storage takes all but rounding
-_STORED = 1e-9
-# standard deviation of a power that counts as none [W]
-_CERTAIN = 1e-9
+
+@dataclass(frozen=True)
+class SensitivitySettings:
+    """Rounding in sensitivities."""
+
+    storage_rounding: float = 1e-9
+    """Largest surplus beside the storage, relative to the charged energy, that counts as zero."""
+    smallest_deviation: float = 1e-9
+    """Smallest standard deviation of a power [W]; a smaller one would be divided by zero."""
+
+
+SENSITIVITY = SensitivitySettings()
 
 
 def energy_sensitivity(
@@ -45,39 +56,48 @@ def energy_sensitivity(
     tau: Array,
     arm: Arm,
     spread: Spread,
-    lost: Array | None = None,
+    tau_friction: Array | None = None,
 ) -> Sensitivity:
-    """That of a motion to the errors of `spread`; q (k, nq) [rad], the other arguments as in
-    `losses.breakdown`.
+    """Sensitivity of the energy of a motion to the errors of `spread`.
+
+    Args:
+        weights: quadrature weights (k,) [s].
+        q: joint positions (k, nq) [rad].
+        v: joint speeds (k, nq) [rad/s].
+        a: joint accelerations (k, nq) [rad/s²].
+        tau: rigid-body and rotor torques (k, nq) [N·m], without friction.
+        arm: the arm.
+        spread: errors of its figures.
+        tau_friction: friction torques (k, nq) [N·m] if they are known already.
     """
-    rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread, lost)
+    rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread, tau_friction)
     figures, nq, size = rates.shape
     base, behind = np.full(size, arm.base_power), count(nq)
     if arm.bus.mode == "isolated":
-        # by figure and joint, as PER_JOINT orders them
+        # By figure and joint, in the order of PER_JOINT.
         root, mean = (
             spread.root[1:behind].reshape(figures, nq, -1),
             spread.mean[1:behind].reshape(figures, nq),
         )
         means = joints + np.einsum("cjk,cj->kj", rates, mean) + by_link @ spread.mean[behind:]
         factors = (rates.transpose(1, 2, 0) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
-        worth, expected = _expected(means, factors + by_link @ spread.root[behind:], np.zeros(nq))
+        value, expected = _expected(means, factors + by_link @ spread.root[behind:], np.zeros(nq))
         drawn, plain = (
             base + spread.mean[0] + expected.sum(axis=1),
             base + np.maximum(joints, 0.0).sum(axis=1),
         )
-        electronics, watts = np.ones(size), weights[:, None] * worth
+        electronics, watts = np.ones(size), weights[:, None] * value
         gradient = np.append(
             np.einsum("kj,cjk->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link)
         )
     else:
-        net, taken = base + joints.sum(axis=1), _taken(arm, joints, weights)
+        net, recovered = base + joints.sum(axis=1), _recovered_share(arm, joints, weights)
         flat = rates.reshape(-1, size)
         if by_link.shape[2]:
             flat = np.vstack([flat, by_link.sum(axis=1).T])
         means = net + spread.mean[0] + spread.mean[1:] @ flat
-        electronics, drawn = _expected(means, flat.T @ spread.root[1:] + spread.root[0], taken)
-        plain = np.maximum(net, 0.0) - taken * np.maximum(-net, 0.0)
+        electronics, drawn = _expected(means, flat.T @ spread.root[1:] + spread.root[0], recovered)
+        plain = np.maximum(net, 0.0) - recovered * np.maximum(-net, 0.0)
         gradient = flat @ (weights * electronics)
     shift = float(weights @ (drawn - plain))
     return Sensitivity(np.append(float(weights @ electronics), gradient), shift)
@@ -86,8 +106,17 @@ def energy_sensitivity(
 def waiting_sensitivity(
     arm: Arm, q: Array, tau: Array, motors: float, brakes: float, dwell: Dwell, spread: Spread
 ) -> Sensitivity:
-    """That of standing still at q (nq,) [rad]: for so long [s] while motors hold torques tau (nq,)
-    [N·m], then by brakes."""
+    """Sensitivity of the energy of standing still at q (nq,) [rad].
+
+    Args:
+        arm: the arm.
+        q: configuration (nq,) [rad].
+        tau: torques (nq,) [N·m] that the motors hold.
+        motors: time for which the motors hold the arm [s].
+        brakes: time for which the brakes hold it [s].
+        dwell: the dwell.
+        spread: errors of the arm's figures.
+    """
     still = np.zeros((1, len(tau)))
     rates, by_link, _ = _power_rates(q[None], still, still, tau[None], arm, spread)
     electronics = motors + (brakes if dwell.brake_power is None else 0.0)
@@ -97,38 +126,52 @@ def waiting_sensitivity(
     return Sensitivity(gradient, float(gradient @ spread.mean))
 
 
-def _expected(means: Array, factors: Array, taken: Array) -> tuple[Array, Array]:
-    """What a watt more is worth, and the drawn power [W], both expected: of powers with these
-    means, and independent standard normal factors (..., r), of whose surplus the share `taken` is
-    given back."""
-    sd = np.maximum(np.sqrt((factors * factors).sum(axis=-1)), _CERTAIN)
+def _expected(means: Array, factors: Array, recovered: Array) -> tuple[Array, Array]:
+    """Expected value of a watt more, and expected drawn power [W].
+
+    The powers have the given means (...) and depend on independent standard normal errors through
+    `factors` (..., r); the share `recovered` of a surplus is given back.
+    """
+    sd = np.maximum(np.sqrt((factors * factors).sum(axis=-1)), SENSITIVITY.smallest_deviation)
     x = means / sd
     above = ndtr(x)
     positive = means * above + sd * np.exp(-x * x / 2) / np.sqrt(2 * np.pi)
-    return taken + (1 - taken) * above, taken * means + (1 - taken) * positive
+    return recovered + (1 - recovered) * above, recovered * means + (1 - recovered) * positive
 
 
-def _taken(arm: Arm, joints: Array, weights: Array) -> Array:
-    """The share (k,) of the surplus that supply or energy storage take."""
-    taken = np.full(len(joints), arm.regeneration)
+def _recovered_share(arm: Arm, joints: Array, weights: Array) -> Array:
+    """Share (k,) of the surplus that supply or energy storage recover."""
+    recovered = np.full(len(joints), arm.regeneration)
     if arm.bus.mode != "storage":
-        return taken
+        return recovered
     flows = exchange(arm.bus, arm.regeneration, arm.base_power, joints, weights)
     return np.where(
-        (flows.charged > 0) & (flows.surplus <= _STORED * flows.charged), arm.bus.efficiency, taken
+        (flows.charged > 0) & (flows.surplus <= SENSITIVITY.storage_rounding * flows.charged),
+        arm.bus.efficiency,
+        recovered,
     )
 
 
 def _power_rates(
-    q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread, lost: Array | None = None
+    q: Array,
+    v: Array,
+    a: Array,
+    tau: Array,
+    arm: Arm,
+    spread: Spread,
+    tau_friction: Array | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Derivatives (c, nq, k) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by
-    the parameters of all links, of which p = 0 have errors where the links are known, and the power
-    (k, nq) itself [W]."""
+    """Derivatives of the joints' power, and the power itself.
+
+    Returns:
+        Derivatives (c, nq, k) of the power of a joint by its figures in PER_JOINT, derivatives (k,
+        nq, p) by the parameters of all links (p = 0 if the links are known), and the power (k, nq)
+        [W].
+    """
     drives, law = arm.drives, arm.friction_law
-    if lost is None:
-        lost = friction_torque(law, drives, tau, v, a)
-    u = tau + lost
+    if tau_friction is None:
+        tau_friction = friction_torque(law, drives, tau, v, a)
+    u = tau + tau_friction
     i = u / drives.torque_constant
     size, square = np.abs(i), i * i
     linear, quadratic = drives.inverter_linear, drives.copper + drives.inverter_quadratic
@@ -151,20 +194,18 @@ def _power_rates(
         "inverter_linear": size,
         "inverter_quadratic": square,
     }
-    by_link = by_rigid[:, :, None] * _of_links(q, v, a, arm, spread)
-    # samples last: what follows sums over them, or over the figures, of one joint
+    by_link = by_rigid[:, :, None] * _rates_by_links(q, v, a, arm, spread)
+    # Samples are the last axis: subsequent sums run over samples, or over figures, of one joint.
     return np.array([rates[name].T for name in PER_JOINT]), by_link, joints
 
 
-def _of_links(q: Array, v: Array, a: Array, arm: Arm, spread: Spread) -> Array:
-    """Derivatives (k, nq, p) of the rigid bodies' torques by the links' parameters that have
-    errors.
-    """
+def _rates_by_links(q: Array, v: Array, a: Array, arm: Arm, spread: Spread) -> Array:
+    """Derivatives (k, nq, p) of the rigid-body torques by the uncertain parameters of the links."""
     nq = q.shape[1]
     if len(spread.mean) == count(nq):
         return np.zeros((*q.shape, 0))
     model = arm.robot.model.copy()
     model.gravity.linear = arm.gravity
     return rigid_regressor(model, q, v, a) * np.repeat(
-        np.broadcast_to(arm.link_mass_scale, nq), BODY
+        np.broadcast_to(arm.link_mass_scale, nq), PARAMETERS_PER_BODY
     )

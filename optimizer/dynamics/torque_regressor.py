@@ -1,5 +1,5 @@
-"""Symbolic regressor of the rigid bodies' torques, in CasADi: they are linear in ten parameters of
-each body.
+"""Symbolic regressor of rigid-body torques in CasADi; torques are linear in ten parameters per
+body.
 """
 
 from __future__ import annotations
@@ -11,12 +11,21 @@ from joulepath.optimizer.dynamics.inverse_dynamics import Body, body_torques
 
 
 def torque_regressor(model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX) -> ca.SX:
-    """The matrix (nv, 10 nv) whose product with the parameters of all bodies is their torques,
-    without rotors.
+    """Matrix (nv, 10 nv) that maps the parameters of all bodies to their torques [N·m], without
+    rotors.
 
-    Of a body: mass, first moments (3) and inertia Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the origin of
-    its joint frame, as Pinocchio has them. q [rad], v [rad/s], a [rad/s²] (nv,); `gravity` (3,)
-    [m/s²] is in the base frame. Raises ValueError if a joint is not revolute about its z axis.
+    The parameters of a body are its mass, first moments (3) and inertia Ixx, Ixy, Iyy, Ixz, Iyz,
+    Izz about the origin of its joint frame, in Pinocchio's order.
+
+    Args:
+        model: serial chain.
+        q: joint positions (nv,) [rad].
+        v: joint speeds (nv,) [rad/s].
+        a: joint accelerations (nv,) [rad/s²].
+        gravity: acceleration of gravity (3,) [m/s²] in the base frame.
+
+    Raises:
+        ValueError: a joint is not revolute about its z axis.
     """
     parameters = ca.SX.sym("parameters", 10 * model.nv)
     bodies = [_body(each) for each in ca.vertsplit(parameters, 10)]

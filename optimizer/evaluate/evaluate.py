@@ -152,6 +152,7 @@ class _Evaluator:
         self._speed_jumps = 0
         self._spread = arm_spread(arm)
         self._sensitivity = Sensitivity(np.zeros_like(self._spread.mean), 0.0)
+        self._sensitivities: dict[int, Sensitivity] = {}
         self._charge = arm.bus.initial
         self._last: PiecewiseMotion | None = None
 
@@ -168,17 +169,21 @@ class _Evaluator:
             known = np.append(0.0, nodes.weights.cumsum()) + block.breakpoints[0]
             self._sampler.update(block, lambda t: np.interp(t, known, charge))
         self._add_energies(block, nodes, steps, charge)
-        charged = self._arm_with_charge(float(charge[0]))
-        parts = nodes.weights, nodes.q, nodes.v, nodes.a, nodes.tau
-        self._sensitivity += energy_sensitivity(*parts, charged, self._spread)
+        if self._segment_count > MOTION_LIMITS.max_intervals:
+            self._sensitivity += self._sensitivity_of(nodes, slice(None), float(charge[0]))
         self._last = block
 
     def finish(self) -> Evaluation:
         """The evaluation of all blocks."""
         assert self._last is not None  # motions without a block are refused
         segments = [self._intervals[k] for k in sorted(self._intervals)]
+        total = self._with_interval(join_intervals(segments), self._sensitivity)
+        segments = [
+            self._with_interval(segment, self._sensitivities[k]) if self._sensitivities else segment
+            for k, segment in zip(sorted(self._intervals), segments, strict=True)
+        ]
         return Evaluation(
-            total=self._total(segments),
+            total=total,
             segments=segments if self._segment_count <= MOTION_LIMITS.max_segments else [],
             segment_count=self._segment_count,
             speed_jumps=self._speed_jumps,
@@ -191,11 +196,18 @@ class _Evaluator:
             unmodelled=[] if self._clearance is None else self._clearance.unmodelled,
         )
 
-    def _total(self, segments: list[IntervalEnergy]) -> IntervalEnergy:
-        """The whole motion, with the interval of its energy."""
-        total = join_intervals(segments)
-        return replace(
-            total, energy=with_interval(total.energy, self._sensitivity, total.duration, self._arm)
+    def _with_interval(self, part: IntervalEnergy, sensitivity: Sensitivity) -> IntervalEnergy:
+        """A part of the motion with the interval of its energy."""
+        energy = with_interval(part.energy, sensitivity, part.duration, self._arm)
+        return replace(part, energy=energy)
+
+    def _sensitivity_of(self, nodes: _Nodes, inside: slice, charge: float) -> Sensitivity:
+        """Sensitivity of the energy of some nodes, with the initial charge [J] of a storage."""
+        weights, q, v, a, tau = (
+            part[inside] for part in (nodes.weights, nodes.q, nodes.v, nodes.a, nodes.tau)
+        )
+        return energy_sensitivity(
+            weights, q, v, a, tau, self._arm_with_charge(charge), self._spread
         )
 
     def _charge_at_nodes(self, nodes: _Nodes) -> Array:
@@ -241,6 +253,12 @@ class _Evaluator:
             part = IntervalEnergy(
                 float(block.breakpoints[low]), float(block.breakpoints[high]), energy, *kinetic
             )
+            if self._segment_count <= MOTION_LIMITS.max_intervals:
+                nodes_inside = slice(int(first[low]), int(first[high]))
+                own = self._sensitivity_of(nodes, nodes_inside, float(charge[first[low]]))
+                known = self._sensitivities.get(int(segment[low]))
+                self._sensitivities[int(segment[low])] = own if known is None else known + own
+                self._sensitivity += own
             before = self._intervals.get(int(segment[low]))
             self._intervals[int(segment[low])] = (
                 part if before is None else join_intervals([before, part])

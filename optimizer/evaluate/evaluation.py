@@ -28,7 +28,8 @@ class EvaluatedMotion:
     """The whole motion."""
     segments: Sequence[IntervalEnergy]
     """Segments between configurations. A trajectory is one segment, and a log has one per move and
-    rest. Empty if there are more than 10,000."""
+    rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
+    electrical energies."""
     segment_count: Count
     """Number of segments."""
     speed_jumps: Count

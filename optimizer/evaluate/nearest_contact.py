@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.close_pass import CLOSE, model_without_margins
+from joulepath.optimizer.collision.close_pass import CLOSE_PASS, model_without_margins
 from joulepath.optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from joulepath.optimizer.collision.stand_ins import StandIns
 from joulepath.optimizer.deadline import checkpoint
@@ -56,7 +56,8 @@ class ClearanceMonitor:
 
     Attributes:
         nearest: the least clearance with margins subtracted; None if no pair is checked.
-        close_pass: the least distance without margins; None unless it is below CLOSE at a sample.
+        close_pass: the least distance without margins; None unless below `CLOSE_PASS.distance`
+            at a sample.
         unmodelled: the deepest contacts of the stand-ins for a tool and a payload without a shape.
     """
 
@@ -81,7 +82,7 @@ class ClearanceMonitor:
         )
         self._spacing = max((end - begin) / (len(t) - 1), self._spacing)
         q = motion.at_times(t)[0]
-        if self._beyond_margins.add(t, q) < CLOSE:
+        if self._beyond_margins.add(t, q) < CLOSE_PASS.distance:
             self._without_margins.add(t, q)
         for contact in () if self._stand_ins is None else self._stand_ins.contacts(t, q):
             known = self._contacts.get(contact.pair[1])
@@ -100,11 +101,11 @@ class ClearanceMonitor:
 
     @property
     def close_pass(self) -> LeastClearance | None:
-        """The least distance of all blocks, if below CLOSE."""
-        if self.nearest is None or self.nearest.distance >= CLOSE:
+        """The least distance of all blocks, if below CLOSE_PASS.distance."""
+        if self.nearest is None or self.nearest.distance >= CLOSE_PASS.distance:
             return None
         least = self._without_margins.least(self._spacing)
-        return least if least is not None and least.distance < CLOSE else None
+        return least if least is not None and least.distance < CLOSE_PASS.distance else None
 
 
 class _LeastSampled:

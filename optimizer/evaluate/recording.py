@@ -40,6 +40,8 @@ class GivenMotionLimits:
     [1]."""
     max_segments: int = 10_000
     """Largest number of segments that are listed one by one."""
+    max_intervals: int = 200
+    """Largest number of segments with intervals of their energies, a millisecond each."""
     max_samples: int = 20_000
     """Largest number of samples in an answer: some 13 MB of JSON for six joints."""
     period_tolerance: float = 1e-6

@@ -11,7 +11,7 @@ from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.linear_algebra import one_thread
-from joulepath.optimizer.problem.problem import LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.certificate import Certificate
 
 
@@ -29,10 +29,10 @@ def certified(program: Program) -> list[Certificate]:
     certificates = []
     for index, move in enumerate(program.moves):
         checkpoint()
-        if move.duration > LONGEST_DURATION:
+        if move.duration > DURATIONS.longest:
             raise InvalidProblem(
                 "speed_scale",
-                f"A move takes more than {LONGEST_DURATION:g} s: give a larger speed_scale.",
+                f"A move takes more than {DURATIONS.longest:g} s: give a larger speed_scale.",
             )
         ends = move.spline.control_points[0], move.spline.control_points[-1]
         try:

@@ -1,5 +1,5 @@
-"""Clamped B-splines on [0, 1] with given knots: basis matrices, quadrature nodes, and the grid of
-the limits.
+"""Clamped B-splines on [0, 1] with given knots: basis matrices, quadrature nodes, and the grid for
+limits.
 """
 
 from __future__ import annotations
@@ -19,60 +19,79 @@ from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.quadrature import quadrature
 
 DEGREE = 5
-# at rest (v = a = 0) at both ends, the first three control points coincide, and the last three
+"""Degree of the splines."""
+
 REST_POINTS = 3
-# least number of quadrature nodes of the cost, and of grid points at which the peaks of the rates
-# are searched
-LEAST_NODES = 31
-# least number of nodes per span: the power v · a of a constant inertia has degree 7, for which four
-# are exact. With three, the error of the quadrature gave the Hessian of the cost a negative
-# eigenvalue for each joint and end
-LEAST_PER_SPAN = 4
-GRID_POINTS = 512
-# points at which path constraints are bounded; an excess between them is found afterwards and
-# repaired
-PATH_POINTS = 96
-# points of a short span, its ends included, among evenly spaced ones that may miss it
-SPAN_POINTS, SHORT = 6, 0.25
-# weight of the third derivative by τ beside the positions in a smooth fit
-THIRD = 3e-3
-# a switch nearer to an end of [0, 1] is none
-NEXT_TO_END = 1e-3
-# parts into which the anchors of speed, acceleration and jerk divide a span, where these have
-# degree 4, 3 and 2
-ANCHORS = (2, 4, 4)
+"""Control points that coincide at either end of a motion at rest there (v = a = 0)."""
+
+
+@dataclass(frozen=True)
+class BasisSettings:
+    """Points at which a spline space is evaluated, and fits to samples."""
+
+    least_nodes: int = 31
+    """Least number of quadrature nodes of the cost."""
+    least_nodes_per_span: int = 4
+    """Least number of quadrature nodes per knot span. The power v · a of a constant inertia has
+    degree 7, and four nodes are exact for it. With three, the quadrature error gave the Hessian of
+    the cost a negative eigenvalue for every joint and end.
+    """
+    grid_points: int = 512
+    """Points of the grid for the peaks of speed, acceleration and jerk."""
+    path_points: int = 96
+    """Points at which path constraints are bounded; an excess between them is repaired later."""
+    short_span_points: int = 6
+    """Points of a short knot span, including its ends, beside evenly spaced points that may miss
+    it.
+    """
+    short_span: float = 0.25
+    """Length of a short knot span relative to the longest one [1]."""
+    third_derivative_weight: float = 3e-3
+    """Weight of the third derivative, relative to the positions, in a smooth fit."""
+    end_margin: float = 1e-3
+    """Distance from an end of [0, 1] within which a switch is left out."""
+    anchor_parts: tuple[int, int, int] = (2, 4, 4)
+    """Parts into which the anchors of speed, acceleration and jerk divide a span, in which these
+    have the degrees 4, 3 and 2.
+    """
+
+
+BASIS = BasisSettings()
 
 
 def clamped(breaks: Array) -> Array:
-    """Clamped knots over [0, 1] from breakpoints (k,), of which the first is 0 and the last is
-    1."""
+    """Clamped knots over [0, 1] from breakpoints (k,); the first is 0 and the last is 1."""
     return np.concatenate([np.zeros(DEGREE), breaks, np.ones(DEGREE)])
 
 
 def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
-    """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
+    """Values (k, n) of a derivative of the basis functions at `points` (k,) in [0, 1]."""
     n = len(knots) - DEGREE - 1
-    # its checks take longer than the values
+    # Without SciPy's checks, since they take longer than the values.
     return np.ascontiguousarray(
         BSpline.construct_fast(knots, np.eye(n), DEGREE)(points, derivative)
     )
 
 
 def in_all_spans(knots: Array, count: int) -> Array:
-    """Points from 0 to the last knot, ascending: `count` evenly spaced ones, and SPAN_POINTS in
-    every span that is shorter than the distance between these and than the share SHORT of the
-    widest one."""
+    """Ascending points from 0 to the last knot, with points in every knot span.
+
+    They are `count` evenly spaced points, and `BASIS.short_span_points` points in every span
+    shorter than the spacing and than the share `BASIS.short_span` of the widest span.
+    """
     points, breaks = np.linspace(0.0, knots[-1], count), np.unique(knots)
     spans = np.diff(breaks)
-    short = np.flatnonzero(spans < min(points[1], SHORT * spans.max()))
+    short = np.flatnonzero(spans < min(points[1], BASIS.short_span * spans.max()))
     if not len(short):
         return points
-    return np.unique(np.append(points, np.linspace(breaks[short], breaks[short + 1], SPAN_POINTS)))
+    return np.unique(
+        np.append(points, np.linspace(breaks[short], breaks[short + 1], BASIS.short_span_points))
+    )
 
 
 def greville(knots: Array) -> Array:
-    """Greville points (n,): the abscissae of the control values, at which interpolation by a spline
-    is unique.
+    """Greville points (n,): abscissae of the control values, at which interpolation by a spline is
+    unique.
     """
     return np.asarray(sliding_window_view(knots[1:-1], DEGREE).mean(axis=1))
 
@@ -80,8 +99,8 @@ def greville(knots: Array) -> Array:
 def fit(samples: Array, at: Array, knots: Array, resting: int = REST_POINTS) -> Array:
     """Control points (n, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1].
 
-    The first and the last sample are met exactly. As many control points as are `resting` coincide
-    at either end: with REST_POINTS the curve is at rest there, with one it is not.
+    The first and the last sample are met exactly. `resting` control points coincide at either end:
+    with REST_POINTS the curve is at rest there, with one it is not.
     """
     matrix = basis_matrix(knots, at)
     points = np.zeros((matrix.shape[1], samples.shape[1]))
@@ -92,32 +111,36 @@ def fit(samples: Array, at: Array, knots: Array, resting: int = REST_POINTS) -> 
 
 
 def smooth_fit(samples: Array, at: Array, knots: Array) -> Array:
-    """Control points (n, r) of the least-squares fit to samples (k, r) of a smooth motion at (k,)
-    in [0, 1], and to the third derivative of the quintic spline through them; at rest at both ends,
-    where the samples are met exactly.
+    """Control points (n, r) of a fit to samples (k, r) of a smooth motion at (k,) in [0, 1].
 
-    Next to repeated knots, a fit to the positions alone has a third derivative of many times the
-    samples'.
+    The least-squares fit is to the samples and to the third derivative of the quintic spline
+    through them, at rest at both ends and exact there. Next to repeated knots, a fit to the
+    positions alone has a third derivative many times as large as that of the samples.
     """
     _, apart = np.unique(at, return_index=True)
     motion = make_interp_spline(at[apart], samples[apart], k=DEGREE)
-    # samples may miss short spans
+    # The samples may miss short spans.
     nodes, _ = quadrature(knots, 3)
-    matrix = np.concatenate([basis_matrix(knots, at), THIRD * basis_matrix(knots, nodes, 3)])
+    matrix = np.concatenate(
+        [basis_matrix(knots, at), BASIS.third_derivative_weight * basis_matrix(knots, nodes, 3)]
+    )
     points = np.zeros((matrix.shape[1], samples.shape[1]))
     points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
-    wanted = np.concatenate([samples, THIRD * motion(nodes, 3)]) - matrix @ points
+    wanted = (
+        np.concatenate([samples, BASIS.third_derivative_weight * motion(nodes, 3)])
+        - matrix @ points
+    )
     inner = slice(REST_POINTS, len(points) - REST_POINTS)
     points[inner] = np.linalg.lstsq(matrix[:, inner], wanted, rcond=None)[0]
     return points
 
 
 def smoothed(samples: Array, at: Array, knots: Array) -> Array:
-    """Control points (n, r) that are the values, at the Greville points, of the cubic spline
-    through samples (k, r) of a motion at (k,) in [0, 1]; at rest at both ends.
+    """Control points (n, r) at the values, at the Greville points, of the cubic spline through
+    samples (k, r) of a motion at (k,) in [0, 1]; at rest at both ends.
 
-    Such a curve varies less than the motion (Schoenberg), whatever the knots: it hardly exceeds the
-    motion's rates.
+    For any knots, such a curve varies less than the motion (Schoenberg) and hardly exceeds its
+    rates.
     """
     _, apart = np.unique(at, return_index=True)
     points = np.asarray(make_interp_spline(at[apart], samples[apart], k=3)(greville(knots)))
@@ -139,14 +162,14 @@ def refit(points: Array, knots: Array, onto: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """A spline space over [0, 1] with n control points, and all of it that does not depend on a
+    """Spline space over [0, 1] with n control points, and all its data that do not depend on a
     request.
 
-    `nodes`, `weights` (N,): Gauss-Legendre points of every knot span, at which cost and torque are
-    evaluated; `at_nodes` (3, N, n): basis functions and their first two derivatives there.
-    `at_grid` (3, M, n): first to third derivative on a grid fine enough for the peaks of speed,
-    acceleration and jerk. `anchors` (3, M) marks a few grid points per span; bounding these bounds
-    a derivative that stays at its limit for a while.
+    `nodes`, `weights` (N,) are Gauss-Legendre points of every knot span, at which cost and torque
+    are evaluated; `at_nodes` (3, N, n) are the basis functions and their first two derivatives
+    there. `at_grid` (3, M, n) are the first to third derivative on a grid fine enough for the peaks
+    of speed, acceleration and jerk. `anchors` (3, M) marks a few grid points per span; bounds at
+    the anchors also bound a derivative that stays at its limit for a while.
     """
 
     knots: Array
@@ -157,8 +180,9 @@ class Basis:
     anchors: Mask
 
     degree: ClassVar[int] = DEGREE
-    # number of control points that rest fixes at either end
+
     resting: ClassVar[int] = REST_POINTS
+    """Number of control points fixed by rest at either end."""
 
     @property
     def n(self) -> int:
@@ -167,12 +191,13 @@ class Basis:
 
     @property
     def free(self) -> slice:
-        """The control points that rest at both ends does not fix."""
+        """Control points that are not fixed by rest at the ends."""
         return slice(self.resting, self.n - self.resting)
 
     def to_spline(self, points: Array) -> Array:
-        """Control points of the B-spline over `knots` for the points of this space: here the
-        same."""
+        """Control points of the B-spline over `knots` for the points of this space, here the points
+        themselves.
+        """
         return points
 
     def fit(self, samples: Array, at: Array) -> Array:
@@ -183,39 +208,41 @@ class Basis:
 
     @cached_property
     def at_path(self) -> Array:
-        """Basis functions and their first derivative (2, M, n) at M ≥ PATH_POINTS path points
-        inside (0, 1).
-        """
+        """Basis functions and their first derivative (2, M, n) at the path points inside (0, 1)."""
         return np.stack([self.matrix(self.path_points, d) for d in range(2)])
 
     @cached_property
     def path_points(self) -> Array:
-        """The path points (M,), ascending."""
-        return in_all_spans(self.knots, PATH_POINTS + 2)[1:-1]
+        """Path points (M,), ascending, at least `BASIS.path_points`."""
+        return in_all_spans(self.knots, BASIS.path_points + 2)[1:-1]
 
     def matrix(self, points: Array, derivative: int = 0) -> Array:
-        """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
+        """Values (k, n) of a derivative of the basis functions at `points` (k,) in [0, 1]."""
         return basis_matrix(self.knots, points, derivative)
 
     @cached_property
     def quintic(self) -> Array:
-        """Control values (n,) of the rest-to-rest quintic, which every space contains."""
+        """Control values (n,) of the rest-to-rest quintic, an element of every space."""
         x = greville(self.knots)
         return np.asarray(
             np.linalg.solve(basis_matrix(self.knots, x), quintic.fraction(x)), dtype=float
         )
 
     @staticmethod
-    def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:
-        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; inner knots have multiplicity
-        three at most.
+    def of(
+        knots: Array, least_nodes: int = BASIS.least_nodes, grid_points: int = BASIS.grid_points
+    ) -> Basis:
+        """Space of clamped knots (n + DEGREE + 1,) over [0, 1]; inner knots have at most
+        multiplicity three.
 
-        With no `grid_points`, the grid is too coarse for peaks.
+        With zero `grid_points`, the grid is too coarse for peaks.
         """
         spans = len(np.unique(knots)) - 1
-        nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), LEAST_PER_SPAN))
+        nodes, weights = quadrature(
+            knots, max(math.ceil(least_nodes / spans), BASIS.least_nodes_per_span)
+        )
         edges = np.unique(knots)
-        # slightly inside the span: at a repeated knot jerk jumps, and both of its values count
+        # Slightly inside the span: jerk jumps at a repeated knot, and both values count.
         per_span = 4 * max(math.ceil(grid_points / spans / 4), 4 if grid_points else 1)
         grid = (
             edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)
@@ -227,13 +254,13 @@ class Basis:
             weights=weights,
             at_nodes=np.stack([basis_matrix(knots, nodes, d) for d in range(3)]),
             at_grid=np.stack([basis_matrix(knots, grid, d) for d in range(1, 4)]),
-            anchors=np.stack([step % (per_span // parts) == 0 for parts in ANCHORS]),
+            anchors=np.stack([step % (per_span // parts) == 0 for parts in BASIS.anchor_parts]),
         )
 
 
 @cache
 def uniform(n: int) -> Basis:
-    """The space of n ≥ 7 control points with evenly spaced knots."""
+    """Space of n ≥ 7 control points with evenly spaced knots."""
     return Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)))
 
 
@@ -242,15 +269,20 @@ def graded(
     repeat: int,
     widest: float = 0.13,
     growth: float = np.inf,
-    next_to_end: float = NEXT_TO_END,
+    next_to_end: float = BASIS.end_margin,
 ) -> Basis:
-    """A space with knots of multiplicity `repeat` at the switches (k,), and further knots at most
-    `widest` apart.
+    """Space with knots of multiplicity `repeat` at the switches (k,), and further knots between
+    them.
 
-    At a knot of multiplicity two the slope of the third derivative may jump, at multiplicity three
-    the third derivative itself, as jerk does between its limits. No span between two switches is
-    wider than `growth` times the one before or after it. A switch is left out if it is no farther
-    than `next_to_end` from an end of [0, 1].
+    At a knot of multiplicity two the slope of the third derivative may jump; at multiplicity three
+    the third derivative itself may jump, as jerk does between its limits.
+
+    Args:
+        switches: switches (k,) in [0, 1], ascending.
+        repeat: multiplicity of the knots at the switches.
+        widest: greatest length of a span.
+        growth: greatest ratio of a span between two switches to the span before or after it.
+        next_to_end: distance from an end of [0, 1] up to which a switch is left out.
     """
     edges = np.concatenate([[0.0], _inner(switches, next_to_end), [1.0]])
     spans = np.concatenate([[np.inf], np.diff(edges), [np.inf]])
@@ -264,8 +296,8 @@ def graded(
 def _between(
     a: float, b: float, before: float, after: float, widest: float, growth: float
 ) -> list[float]:
-    """Breakpoints between a and b, whose spans grow from those `before` and `after` them to
-    `widest`.
+    """Breakpoints between a and b, with spans that grow from the neighbouring spans `before` and
+    `after` up to `widest`.
     """
     lower, upper = [a], [b]
     while True:
@@ -283,10 +315,10 @@ def _between(
 
 
 def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
-    """Knots of a `graded` space, moved so that those of multiplicity `repeat` are at other switches
-    (k,).
+    """Knots of a `graded` space after a shift of its knots of multiplicity `repeat` to other
+    switches (k,).
 
-    The others keep their places between them. None if there are not as many switches.
+    The other knots keep their relative places between them. None if the number of switches differs.
     """
     breaks, counts = np.unique(knots, return_counts=True)
     old, new = breaks[1:-1][counts[1:-1] == repeat], _inner(switches)
@@ -296,6 +328,6 @@ def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
     return np.repeat(np.interp(breaks, old, new), counts)
 
 
-def _inner(switches: Array, next_to_end: float = NEXT_TO_END) -> Array:
-    """The switches that are not at either end."""
+def _inner(switches: Array, next_to_end: float = BASIS.end_margin) -> Array:
+    """Switches farther than `next_to_end` from both ends."""
     return switches[(switches > next_to_end) & (switches < 1 - next_to_end)]

@@ -1,4 +1,4 @@
-"""The spline of a motion whose joints each have phases of constant jerk, from rest to rest."""
+"""Spline of a rest-to-rest motion with phases of constant jerk in every joint."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline
 
-# how much the jerk of a joint changes where it has none, beside where it has the greatest
-ELSEWHERE = 1e-3
-
 
 def spline_of_phases(
     ends: Array, jerk: Array, q_start: Array, q_goal: Array, closest: float
 ) -> Spline:
-    """The motion from q_start to q_goal (nq,) [rad] with jerk (nq, p) [rad/s³] in phases that last
-    to `ends` (nq, p).
+    """Motion from rest to rest with phases of constant jerk.
 
-    The last end [s] is the duration. Knots are threefold where the jerk of a joint jumps. Jumps
-    closer than `closest`, as a fraction of the duration, become one, since rounding makes jerk of
-    its own between them; then the jerk changes a little, so that the motion still ends at rest at
-    its goal.
+    Knots have multiplicity three at jumps of the jerk of any joint. Jumps closer than `closest` are
+    merged, since rounding would cause jerk of its own between them; the jerk then changes slightly,
+    so that the motion still ends at rest at its goal.
+
+    Args:
+        ends: ends of the phases (nq, p) [s]; the last end is the duration.
+        jerk: jerk in the phases (nq, p) [rad/s³].
+        q_start: start (nq,) [rad].
+        q_goal: goal (nq,) [rad].
+        closest: distance of merged jumps as a fraction of the duration.
     """
     duration = float(ends.max())
     breaks, ends = _joined(ends / duration, closest)
@@ -41,8 +43,8 @@ def spline_of_phases(
 
 
 def _joined(ends: Array, closest: float) -> tuple[Array, Array]:
-    """The breaks (b,) in [0, 1], those that are close as one, with both ends; and the phases' ends
-    at these breaks.
+    """Breaks (b,) in [0, 1] with close ones merged and both ends included, and the ends of the
+    phases at these breaks.
     """
     every, where = np.unique(np.append(ends, [0.0, 1.0]), return_inverse=True)
     group = np.append(0, np.cumsum(np.diff(every) > closest))
@@ -51,28 +53,39 @@ def _joined(ends: Array, closest: float) -> tuple[Array, Array]:
     return breaks, breaks[group[where[: ends.size]]].reshape(ends.shape)
 
 
-def _ending(lengths: Array, spans: Array, greatest: Array, step: Array) -> Array:
-    """The jerks (b - 1, nq) near `spans`, of these lengths (b - 1,) [s], that lead from rest to
-    rest over a step (nq,) [rad]. They change where a joint has jerk, and elsewhere only if that
-    does not do; `greatest` (nq,) is that of each.
+def _ending(
+    lengths: Array,
+    spans: Array,
+    greatest: Array,
+    step: Array,
+    weight_without_jerk: float = 1e-3,
+) -> Array:
+    """Jerks (b - 1, nq) near `spans` for a motion from rest to rest.
+
+    Args:
+        lengths: lengths of the spans (b - 1,) [s].
+        spans: jerks (b - 1, nq) [rad/s³].
+        greatest: greatest jerk of every joint (nq,) [rad/s³].
+        step: displacement (nq,) [rad].
+        weight_without_jerk: change of the jerk in spans without jerk, relative to its change in
+            spans with the greatest jerk. Those spans then change only if the others do not suffice.
     """
-    left = lengths.sum() - np.cumsum(lengths)
-    speed = lengths * (lengths / 2 + left)
-    way = lengths * (lengths**2 / 6 + lengths * left / 2 + left**2 / 2)
-    rows = np.array([lengths, speed, way])
+    remaining = lengths.sum() - np.cumsum(lengths)
+    speed = lengths * (lengths / 2 + remaining)
+    travel = lengths * (lengths**2 / 6 + lengths * remaining / 2 + remaining**2 / 2)
+    rows = np.array([lengths, speed, travel])
     missing = np.outer([0.0, 0.0, 1.0], step) - rows @ spans
     changed = spans.copy()
-    for joint, weight in enumerate((np.abs(spans) + ELSEWHERE * greatest).T):
-        own = rows * weight
-        scale = np.maximum(np.linalg.norm(own, axis=1), 1e-300)
-        changed[:, joint] += (
-            weight * np.linalg.lstsq(own / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
-        )
+    for joint, weight in enumerate((np.abs(spans) + weight_without_jerk * greatest).T):
+        joint_rows = rows * weight
+        scale = np.maximum(np.linalg.norm(joint_rows, axis=1), 1e-300)
+        scaled = joint_rows / scale[:, None], missing[:, joint] / scale
+        changed[:, joint] += weight * np.linalg.lstsq(*scaled, rcond=None)[0]
     return changed
 
 
 def _states(breaks: Array, spans: Array, q_start: Array) -> tuple[Array, Array, Array]:
-    """Positions, speeds and accelerations (b - 1, nq) at the beginning of every span, of jerk
+    """Positions, speeds and accelerations (b - 1, nq) at the beginning of every span, for jerks
     `spans` (b - 1, nq).
     """
     length = np.diff(breaks)[:, None]
@@ -89,10 +102,11 @@ def _states(breaks: Array, spans: Array, q_start: Array) -> tuple[Array, Array, 
 def _control_points(
     knots: Array, breaks: Array, states: tuple[Array, Array, Array], spans: Array
 ) -> Array:
-    """Control points (n, nq): the blossom, at its inner knots, of the cubic in the widest span that
-    each one reaches.
+    """Control points (n, nq): blossom, at the inner knots of every control point, of the cubic in
+    the widest span of its support.
 
-    The blossom of t^m at u_1 … u_5 is the mean of the products of m of them (Ramshaw 1989).
+    The blossom of t^m at u_1 … u_5 is the mean of all products of m of these arguments (Ramshaw
+    1989).
     """
     q, v, a = states
     points = np.empty((len(knots) - bspline.DEGREE - 1, q.shape[1]))

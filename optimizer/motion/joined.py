@@ -1,4 +1,4 @@
-"""Motions one after the other, as one."""
+"""Concatenation of motions."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from joulepath.optimizer.motion.spline import Spline
 
 
 def joined(motions: Sequence[Spline]) -> Spline:
-    """One motion of several of degree DEGREE, each of which begins at rest where the one before
-    comes to rest.
+    """One motion from several motions of degree DEGREE, at rest where one ends and the next begins.
 
-    At rest, three control points coincide at the end of one, and at the start of the next: three of
-    the six are enough at a knot of multiplicity three, where speed and acceleration are zero.
+    At rest, three control points coincide at the end of one motion, and at the start of the next.
+    Three of these six are enough at a knot of multiplicity three with zero speed and acceleration.
     """
     knots, points, t = (
         [motions[0].knots[:-REST_POINTS]],

@@ -6,24 +6,25 @@ import numpy as np
 
 from joulepath.models.robot import Array, Limits
 
-# a limit counts as exceeded only beyond this ratio of it: rounding, in the certificate and wherever
-# ratios are judged
 RATIO_TOLERANCE = 1e-6
+"""Excess over 1 up to which a ratio of value to limit counts as rounding, in certificates and in
+all other checks of limits.
+"""
 
 
 def limit_ratios(
     limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_limited: Array
 ) -> dict[str, float]:
-    """The largest value / limit over samples and joints of arrays (k, nq); k may differ between the
-    arrays.
+    """Largest ratio of value to limit, over samples and joints of arrays (k, nq), by name of the
+    limit; k may differ between the arrays.
     """
     return {
         name: float(each.max()) for name, each in ratios(limits, q, v, a, jerk, tau_limited).items()
     }
 
 
-def too_much(name: str, ratio: float) -> str:
-    """In words, by how much a limit is broken: value / limit is `ratio` > 1."""
+def excess_text(name: str, ratio: float) -> str:
+    """Text on a broken limit, for a ratio of value to limit > 1."""
     words = name.replace("_", " ")
     return (
         f"{words} {(ratio - 1) * 100:.3g} % above its limit"
@@ -35,10 +36,10 @@ def too_much(name: str, ratio: float) -> str:
 def ratios(
     limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_limited: Array
 ) -> dict[str, Array]:
-    """Value / limit (k, nq) of every sample and joint; k may differ between the arrays.
+    """Ratios of value to limit (k, nq) of every sample and joint; k may differ between the arrays.
 
     The ratio of a position is its distance from the middle of the joint's range over half the
-    range: 1 is on a limit, even if the two limits are not opposite.
+    range: 1 is on a limit, even for asymmetric limits.
     """
     middle, half = (limits.q_max + limits.q_min) / 2, (limits.q_max - limits.q_min) / 2
     return {

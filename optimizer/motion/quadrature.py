@@ -5,6 +5,7 @@ a uniform grid.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -15,6 +16,23 @@ from joulepath.models.robot import Array
 Indices = npt.NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class QuadratureSettings:
+    """Density of quadrature points over a motion."""
+
+    lobatto_panels: int = 72
+    """Least number of Gauss-Lobatto panels: the relative error of the energy is below 1e-5."""
+    grid_period: float = 1e-3
+    """Greatest interval of the certificate's grid [s]."""
+    least_grid_intervals: int = 500
+    """Least number of intervals of the certificate's grid. In a motion of a quarter of a second,
+    1 ms misses sign changes of the torque, and the energy is uncertain by more than 1e-3.
+    """
+
+
+QUADRATURE = QuadratureSettings()
+
+
 @cache
 def _gauss_legendre(n: int) -> tuple[Array, Array]:
     """Nodes and weights (n,) over [-1, 1]."""
@@ -22,17 +40,17 @@ def _gauss_legendre(n: int) -> tuple[Array, Array]:
 
 
 def _parts(counts: Indices) -> tuple[Indices, Indices]:
-    """For every part (k,) of intervals that are divided into `counts` (m,) parts: its interval, and
-    its place there.
+    """Index of the interval, and index within the interval, of every part (k,) of intervals divided
+    into `counts` (m,) parts.
     """
     interval = np.repeat(np.arange(len(counts)), counts)
     return interval, np.arange(len(interval)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def quadrature(knots: Array, per_panel: int, longest: float = np.inf) -> tuple[Array, Array]:
-    """Gauss-Legendre points and weights (panels · per_panel,) over the knots' range.
+    """Gauss-Legendre points and weights (panels · per_panel,) over the range of the knots.
 
-    Panels are the knot spans, divided evenly if they are longer than `longest`.
+    Panels are the knot spans; spans longer than `longest` are divided evenly.
     """
     x, w = _gauss_legendre(per_panel)
     spans = np.unique(knots)
@@ -44,27 +62,28 @@ def quadrature(knots: Array, per_panel: int, longest: float = np.inf) -> tuple[A
     return (starts[:, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
 
-# least number of Gauss-Lobatto panels over a motion: relative error of the energy below 1e-5
-PANELS = 72
-# Gauss-Lobatto points and weights on [0, 1]: exact for polynomials of degree 9. The ends of a panel
-# are among them: there torque peaks if acceleration jumps or bends
 _INNER = np.sqrt((7 + 2 * math.sqrt(7) * np.array([1, -1])) / 21)
 LOBATTO = (1 + np.array([-1.0, -_INNER[0], -_INNER[1], _INNER[1], _INNER[0], 1.0])) / 2
+"""Gauss-Lobatto points on [0, 1]: exact for polynomials of degree 9. They include the ends of a
+panel, at which torque peaks if acceleration jumps or bends.
+"""
 LOBATTO_WEIGHTS = (
     np.array([2, 14 - math.sqrt(7), 14 + math.sqrt(7), 14 + math.sqrt(7), 14 - math.sqrt(7), 2])
     / 60
 )
+"""Weights of the Gauss-Lobatto points."""
 
 
 def lobatto_panels(breaks: Array, panels: Indices) -> tuple[Indices, Array, Array]:
-    """Gauss-Lobatto nodes over the intervals between breaks (m + 1,), each divided into panels (m,)
-    equal parts.
+    """Gauss-Lobatto nodes over the intervals between breaks (m + 1,), with panels (m,) equal parts
+    per interval.
 
-    For every node (k,): the index of its interval, its offset from the start of the interval, and
-    its weight.
+    Returns:
+        For every node (k,): index of its interval, offset from the start of the interval, and
+        weight.
     """
     interval, panel = _parts(panels)
-    # fractions of the interval first: the last node of an interval is then exactly its end
+    # Fractions of the interval first, so that the last node of an interval is exactly its end.
     starts, ends = (np.diff(breaks)[interval] * ((panel + k) / panels[interval]) for k in (0, 1))
     lengths = (ends - starts)[:, None]
     offset = (starts[:, None] + lengths * LOBATTO).ravel()
@@ -75,28 +94,22 @@ def lobatto_nodes(breaks: Array) -> tuple[Array, Array]:
     """Gauss-Lobatto nodes and weights (k,) over [0, 1] on panels that end at every one of the
     ascending breaks.
     """
-    panels = np.maximum(np.ceil(np.diff(breaks) * PANELS), 1).astype(np.int64)
+    panels = np.maximum(np.ceil(np.diff(breaks) * QUADRATURE.lobatto_panels), 1).astype(np.int64)
     interval, offset, weights = lobatto_panels(breaks, panels)
     return breaks[interval] + offset, weights
 
 
-# greatest interval of the certificate's grid [s], and least number of intervals: in a motion of a
-# quarter of a second, 1 ms misses where torque changes sign, and leaves the energy uncertain by
-# more than 1e-3
-GRID_PERIOD, LEAST_INTERVALS = 1e-3, 500
-
-
 def grid(duration: float) -> Array:
     """Times (k,) [s] from 0 to `duration`, in an even number of equal intervals of at most
-    GRID_PERIOD.
+    `QUADRATURE.grid_period`.
     """
-    pairs = math.ceil(max(duration / GRID_PERIOD, LEAST_INTERVALS) / 2)
+    pairs = math.ceil(max(duration / QUADRATURE.grid_period, QUADRATURE.least_grid_intervals) / 2)
     return np.linspace(0.0, duration, 2 * pairs + 1)
 
 
 def simpson_weights(t: Array) -> Array:
-    """Weights (k,) [s] of Simpson's rule on the grid t (k,); at a corner of |x| the error is O(h²),
-    not O(h⁴).
+    """Weights (k,) [s] of Simpson's rule on the grid t (k,); the error is O(h⁴), but O(h²) at a
+    corner of |x|.
     """
     weights = np.full(len(t), 2.0)
     weights[1::2] = 4.0

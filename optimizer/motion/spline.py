@@ -16,13 +16,24 @@ from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.presentation.equality import Comparable
 
-# quadrature panels: their greatest length [s], and their least and greatest number unless knot
-# spans ask for more
-LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
-# samples per knot span at which the peaks of speed, acceleration and jerk are searched
-RATE_POINTS = 33
-# samples of a motion that another is fitted to
-FIT_SAMPLES = 201
+
+@dataclass(frozen=True)
+class SamplingSettings:
+    """Sampling of motions."""
+
+    longest_panel: float = 0.2
+    """Greatest length of a quadrature panel [s]."""
+    least_panels: int = 64
+    """Least number of quadrature panels of a motion."""
+    most_panels: int = 2000
+    """Greatest number of quadrature panels of a motion with fewer knot spans."""
+    points_per_span: int = 33
+    """Samples per knot span in the search for peaks of speed, acceleration and jerk."""
+    fit_samples: int = 201
+    """Samples of a motion to which another spline is fitted."""
+
+
+SAMPLING = SamplingSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +62,12 @@ class Spline(Comparable):
     @property
     def curve(self) -> BSpline:
         """SciPy's spline: curve(t, d) is the d-th derivative of q, (k, nq), at times t (k,) [s]."""
-        # without its checks, which take longer than most evaluations
+        # Without SciPy's checks, since they take longer than most evaluations.
         return BSpline.construct_fast(self.knots, self.control_points, self.degree)
 
 
 def spline_of(basis: bspline.Basis, points: Array, duration: float) -> Spline:
-    """The motion of `duration` [s] with the points (n, nq) [rad] of a spline space."""
+    """Motion of `duration` [s] with the points (n, nq) [rad] of a spline space."""
     return Spline(basis.degree, basis.knots * duration, basis.to_spline(points))
 
 
@@ -67,10 +78,10 @@ def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
 
 
 def sampled(spline: Spline) -> tuple[Array, Array]:
-    """At least FIT_SAMPLES samples q (k, nq) [rad] at times t (k,) [s] in all knot spans, to fit
-    another spline to.
+    """At least `SAMPLING.fit_samples` samples q (k, nq) [rad] at times t (k,) [s], with samples in
+    all knot spans, for fits of other splines.
     """
-    t = bspline.in_all_spans(spline.knots, FIT_SAMPLES)
+    t = bspline.in_all_spans(spline.knots, SAMPLING.fit_samples)
     return np.asarray(spline.curve(t)), t
 
 
@@ -78,7 +89,10 @@ def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, A
     """Quadrature weights (k,) [s] and q, v, a (k, nq) at the Gauss-Legendre points of panels within
     the knot spans.
     """
-    longest = max(min(LONGEST_PANEL, spline.duration / LEAST_PANELS), spline.duration / MOST_PANELS)
+    longest = max(
+        min(SAMPLING.longest_panel, spline.duration / SAMPLING.least_panels),
+        spline.duration / SAMPLING.most_panels,
+    )
     points, weights = quadrature(spline.knots, per_panel, longest)
     return weights, *sample(spline, points)
 
@@ -92,20 +106,20 @@ def span_peak_rates(spline: Spline) -> Array:
     """Greatest absolute speed, acceleration and jerk of every joint in every knot span, (3, spans,
     nq).
 
-    Every knot span is expanded around its middle, so that both sides of a repeated knot count.
-    Every sample is raised to the vertex of the parabola through it and its neighbours: exact for a
-    quintic's jerk, which is such a parabola. Samples are denser if the degree is higher.
+    Every knot span is expanded around its middle, so both sides of a repeated knot count. Every
+    sample is raised to the vertex of the parabola through the sample and its neighbours; this is
+    exact for a quintic, since its jerk is a parabola. Samples are denser for higher degrees.
     """
     terms, curve = spline.degree + 1, spline.curve
     edges = np.unique(spline.knots)
     middle, half = (edges[:-1] + edges[1:]) / 2, np.diff(edges) / 2
-    # the spans as polynomials in x ∈ [-1, 1] around their middles
+    # Spans as polynomials in x ∈ [-1, 1] around their middles.
     series = np.stack([curve(middle, k) * half[:, None] ** k for k in range(terms)])
     powers, flat = _powers(spline.degree), series.reshape(terms, -1)
     size = np.abs([powers[:, : terms - d] @ flat[d:] for d in range(1, 4)])
     low, top, high = size[:, :-2], size[:, 1:-1], size[:, 2:]
     bend = 2 * top - low - high
-    # the vertex counts only between the two outer samples
+    # The vertex counts only between the two outer samples.
     vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
     peaks = np.maximum(size[:, [0, -1]].max(axis=1), (top + vertex).max(axis=1))
     return np.asarray(
@@ -115,27 +129,29 @@ def span_peak_rates(spline: Spline) -> Array:
 
 @cache
 def _powers(degree: int) -> Array:
-    """The terms (points, degree + 1) x^k / k! of a Taylor series at points x of [-1, 1]."""
-    x = np.linspace(-1.0, 1.0, (RATE_POINTS - 1) * (1 + 3 * max(degree - bspline.DEGREE, 0)) + 1)
+    """Terms x^k / k! (points, degree + 1) of a Taylor series at points x of [-1, 1]."""
+    x = np.linspace(
+        -1.0, 1.0, (SAMPLING.points_per_span - 1) * (1 + 3 * max(degree - bspline.DEGREE, 0)) + 1
+    )
     return np.stack([x**k / math.factorial(k) for k in range(degree + 1)], axis=1)
 
 
 def time_scales(ratios: Array) -> Array:
-    """The factors (...) on the duration that bring all ratios of speed, acceleration and jerk (...,
-    3, nq) to ≤ 1.
+    """Factors (...) on the duration that reduce all ratios of speed, acceleration and jerk (..., 3,
+    nq) to at most 1.
 
-    With time scaled by k, speed falls with k, acceleration with k², jerk with k³.
+    With time scaled by k, speed is divided by k, acceleration by k² and jerk by k³.
     """
     return np.asarray((ratios.max(axis=-1) ** (1 / np.arange(1, 4))).max(axis=-1))
 
 
 def time_scale(ratios: Array) -> float:
-    """The factor of `time_scales` for one motion, ratios (3, nq)."""
+    """Factor of `time_scales` for one motion with ratios (3, nq)."""
     return float(time_scales(ratios))
 
 
 def least_time_scale(spline: Spline, rates: Array) -> float:
-    """The least factor on the duration at which the motion is within the limits `rates` (3, nq) of
+    """Least factor on the duration for a motion within the limits `rates` (3, nq) of
     `Limits.rates`.
     """
     return time_scale(peak_rates(spline) / rates)
@@ -147,7 +163,7 @@ def retimed(spline: Spline, factor: float) -> Spline:
 
 
 def lasting(spline: Spline, duration: float) -> Spline:
-    """The motion along the same path with time scaled so that it takes exactly `duration` [s]."""
+    """The motion along the same path with time scaled to a length of exactly `duration` [s]."""
     return (
         spline
         if duration == spline.duration

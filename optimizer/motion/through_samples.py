@@ -10,12 +10,14 @@ from joulepath.optimizer.motion.spline import Spline
 
 
 def spline_through(t: Array, q: Array, v: Array, a: Array) -> Spline:
-    """The motion whose pieces are the quintics between samples q, v, a (k, nq) at times t (k,) [s],
-    t[0] = 0.
+    """The motion of quintics between samples q, v, a (k, nq) at times t (k,) [s], with t[0] = 0.
 
-    Every inner sample is a knot three times. The three control points around it are values of the
-    blossom of the pieces, with three of the five arguments at the sample: f(h₁, h₂) = q + (h₁ + h₂)
-    v / 5 + h₁ h₂ a / 20, where h₁ and h₂ are the distances [s] of the other two arguments from it.
+    Every inner sample is a knot of multiplicity three. The three control points around it are
+    values of the blossom of the quintics, with three of the five arguments at the sample:
+
+        f(h₁, h₂) = q + (h₁ + h₂) v / 5 + h₁ h₂ a / 20
+
+    for the distances h₁ and h₂ [s] of the other two arguments from the sample.
     """
     before, after = np.diff(t, prepend=t[0])[:, None], np.diff(t, append=t[-1])[:, None]
     pairs = ((-before, -before), (-before, after), (after, after))

@@ -1,5 +1,5 @@
-"""Rest-to-rest motions along the straight line in joint space: quintic, trapezoid, the controller's
-default.
+"""Rest-to-rest motions along the straight line in joint space: quintic, trapezoid, and the default
+motion of the robot's controller.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from joulepath.optimizer.motion.spline import Spline
 
 @dataclass(frozen=True)
 class SampledMotion:
-    """A motion as quadrature samples: t, weights (k,) [s], q, v, a (k, nq), and the exact peaks
-    (nq,) of its rates.
+    """Motion as quadrature samples: t, weights (k,) [s], q, v, a (k, nq), and the exact peaks (nq,)
+    of its rates.
 
     The weights add up to the duration. A motion of zero duration has one sample of weight zero.
     """
@@ -78,29 +78,29 @@ def quintic(q_start: Array, q_goal: Array, duration: float) -> SampledMotion:
 
 
 def trapezoid(limits: Limits, q_start: Array, q_goal: Array, duration: float) -> SampledMotion:
-    """A trapezoid of speed in `duration` [s], all joints in step; they accelerate and decelerate
-    for `blend_time`.
+    """Trapezoidal speed profile in `duration` [s], synchronous in all joints, with ramps of
+    `blend_time`.
     """
     blend = float(blend_time(limits, q_goal - q_start, np.asarray(duration)))
     return _trapezoid(q_start, q_goal, duration, blend)
 
 
 def even_speed(duration: float) -> SampledMotion:
-    """A trapezoid of speed in `duration` [s] of one coordinate from 0 to 1, with ramps of a third
-    each.
+    """Trapezoidal speed profile of one coordinate from 0 to 1 in `duration` [s], with ramps of a
+    third of it.
     """
     return _trapezoid(np.zeros(1), np.ones(1), duration, duration / 3)
 
 
 def blend_time(limits: Limits, displacement: Array, duration: Array) -> Array:
-    """Time (...,) [s] for which a trapezoid of speed accelerates, and decelerates, over
+    """Time (...,) [s] of acceleration and of deceleration of a trapezoidal profile over
     `displacement` (..., nq) [rad].
 
-    T/3 of the duration T (...,) [s]: of all trapezoids this one has the least ∫ a² dt. It is
-    shorter if T/3 exceeds the speed limit, and longer if T/3 exceeds the acceleration limit. If no
-    time satisfies both limits, it is T/3.
+    T/3 of the duration T (...,) [s] minimises ∫ a² dt over all trapezoids. The time is shorter if
+    T/3 exceeds the speed limit, and longer if T/3 exceeds the acceleration limit. If no time
+    satisfies both limits, it is T/3.
     """
-    # speed Δ / (T - b) ≤ v_max, and acceleration Δ / (b (T - b)) ≤ a_max
+    # Speed Δ / (T - b) ≤ v_max, and acceleration Δ / (b (T - b)) ≤ a_max.
     longest = np.minimum(
         duration / 2, duration - (np.abs(displacement) / limits.v_max).max(axis=-1)
     )
@@ -117,10 +117,10 @@ def blend_time(limits: Limits, displacement: Array, duration: Array) -> Array:
 def controller_default(
     limits: Limits, default: DefaultMotion, q_start: Array, q_goal: Array
 ) -> SampledMotion:
-    """The motion of the robot's controller at its default speed and acceleration, or at the limits
-    if tighter.
+    """Motion of the robot's controller at its default speed and acceleration, or at the limits if
+    these are tighter.
 
-    The joint that needs longest moves with a trapezoid of speed; the others keep in step with it
+    The joint that needs longest moves with a trapezoidal profile, and the others move synchronously
     (UR script manual, `movej`).
     """
     duration, blend = default_times(limits, default, q_goal - q_start)
@@ -136,8 +136,7 @@ def default_times(
     (nq,) [rad].
     """
     distance = np.abs(displacement)
-    # 1 / (greatest speed and acceleration of the time scaling s(t) from 0 to 1 that all joints
-    # share)
+    # 1 / (greatest speed and acceleration of the time scaling s(t) from 0 to 1 of all joints).
     slow = float((distance / np.minimum(limits.v_max, default.velocity)).max())
     lazy = float((distance / np.minimum(limits.a_max, default.acceleration)).max())
     if slow == 0:
@@ -153,11 +152,12 @@ def quintic_spline(q_start: Array, q_goal: Array, duration: float) -> Spline:
 
 
 def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> SampledMotion:
-    """Constant acceleration for `blend` [s], constant speed, and the same back to rest."""
+    """Motion with constant acceleration for `blend` [s], constant speed, and the same
+    deceleration.
+    """
     tau, weights = lobatto_nodes(np.unique([0.0, blend / duration, 1 - blend / duration, 1.0]))
     t = tau * duration
-    # by panel, not by node: at a jump of acceleration the nodes of either side belong to their own
-    # phase
+    # By panel, not by node: at a jump of acceleration, a node belongs to the phase of its panel.
     middle = np.repeat(t.reshape(-1, len(LOBATTO)).mean(axis=1), len(LOBATTO))
     speed = 1 / (duration - blend)
     law, peaks = trapezoid_law(t, duration, blend, middle), np.array([speed, speed / blend, np.inf])
@@ -165,10 +165,11 @@ def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> 
 
 
 def trapezoid_law(t: Array, duration: float, blend: float, phase: Array | None = None) -> Array:
-    """s, ds/dt, d²s/dt² (3, k) of a trapezoid of speed from 0 to 1 at times t (k,) [s], with ramps
+    """s, ds/dt, d²s/dt² (3, k) of a trapezoidal profile from 0 to 1 at times t (k,) [s], with ramps
     of `blend` [s].
 
-    `phase` (k,) [s] are times in the phases that the instants count to: by default they themselves.
+    `phase` (k,) [s] are times inside the phases of the instants, by default the instants
+    themselves.
     """
     phase = t if phase is None else phase
     speed, left = 1 / (duration - blend), duration - t
@@ -190,11 +191,11 @@ def trapezoid_law(t: Array, duration: float, blend: float, phase: Array | None =
 def _sampled(
     t: Array, weights: Array, q_start: Array, displacement: Array, law: Array, peaks: Array
 ) -> SampledMotion:
-    """q = q_start + s(t) · displacement; `law` (3, k) holds s, ds/dt, d²s/dt², `peaks` (3,) the
-    greatest rates of s.
+    """Motion q = q_start + s(t) · displacement; `law` (3, k) holds s, ds/dt, d²s/dt², `peaks` (3,)
+    the greatest rates of s.
     """
     s, rate, acceleration = law[:, :, None] * displacement
-    with np.errstate(invalid="ignore"):  # infinite jerk times zero displacement is none
+    with np.errstate(invalid="ignore"):  # Infinite jerk times zero displacement is zero jerk.
         peak_v, peak_a, peak_jerk = np.nan_to_num(
             np.abs(displacement) * peaks[:, None], nan=0.0, posinf=np.inf
         )

@@ -1,1 +1,1 @@
-"""The C library that all arms share, and where the kernels that this machine compiles are kept."""
+"""The C library shared by all arms, and the cache of the kernels compiled on this machine."""

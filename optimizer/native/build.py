@@ -1,8 +1,9 @@
-"""Compiles the C library that all arms share, beside its sources: `python
-optimizer/native/build.py`.
+"""Compiles the C library shared by all arms, beside its sources.
 
-`make` runs it in a clone, and `scripts/build_hook.py` for a wheel. It imports nothing but the
-standard library, so that it runs where no dependency is installed.
+    python optimizer/native/build.py
+
+`make` runs it in a clone, and `scripts/build_hook.py` for a wheel. It imports only the standard
+library, so it needs no installed dependency.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ FOLDER = Path(__file__).resolve().parent
 LIBRARY = FOLDER / "libjoulepath.so.1"
 # Without contraction of products and sums, all processors round alike.
 FLAGS = ["-O3", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
-# The oldest instruction set of an architecture, as gcc and clang name it, and zig. Compilers may
-# default to a newer one.
+# Options of gcc and clang, and of zig, for the oldest instruction set of an architecture. Compilers
+# may default to a newer one.
 BASELINES = {"x86_64": "-march=x86-64", "aarch64": "-march=armv8-a"}
 ZIG_BASELINE = "-mcpu=baseline"
 
 
 class BuildFailed(Exception):
-    """The library cannot be compiled; the message says why, and what to do."""
+    """The library cannot be compiled; the message says why, and how to solve it."""
 
 
 def sources_digest(folder: Path = FOLDER) -> str:
@@ -41,53 +42,55 @@ def sources_digest(folder: Path = FOLDER) -> str:
 
 
 def compiler() -> str | None:
-    """Path of the C compiler: the one that CC names, or the system's; None if there is none."""
+    """Path of the C compiler named by CC, or of the system's; None if there is none."""
     names = os.environ.get("CC", "cc"), "gcc", "clang"
     return next(filter(None, map(shutil.which, names)), None)
 
 
 def build(folder: Path = FOLDER) -> Path:
-    """Compile the C files of a folder into the library beside them.
+    """Compiles the C files of a folder into the library beside them.
 
-    The library runs on every processor of this machine's architecture. Raises BuildFailed, and
-    leaves an earlier library in place.
+    The library runs on every processor of this machine's architecture.
+
+    Raises:
+        BuildFailed: no compiler works; an earlier library stays in place.
     """
     target = folder / LIBRARY.name
     define = f'-DSOURCES_DIGEST="{sources_digest(folder)}"'
-    told: object = "there is neither a C compiler nor the package ziglang"
+    cause: object = "there is neither a C compiler nor the package ziglang"
     try:
         with tempfile.TemporaryDirectory(dir=folder, prefix=".native-") as work:
-            made = Path(work) / target.name
-            given = [*FLAGS, define, str(folder / "library.c"), "-o", str(made), "-lm"]
-            failed = []
+            output = Path(work) / target.name
+            arguments = [*FLAGS, define, str(folder / "library.c"), "-o", str(output), "-lm"]
+            messages = []
             for command in _commands():
-                done = subprocess.run(
-                    [*command, *given], capture_output=True, text=True, encoding="utf-8"
+                process = subprocess.run(
+                    [*command, *arguments], capture_output=True, text=True, encoding="utf-8"
                 )
-                if done.returncode == 0:
-                    # whoever has loaded the one before keeps it
-                    made.replace(target)
+                if process.returncode == 0:
+                    # Processes that have loaded the previous library keep it.
+                    output.replace(target)
                     return target
-                failed.append(done.stderr.strip())
-            told = failed[0] if failed else told
+                messages.append(process.stderr.strip())
+            cause = messages[0] if messages else cause
     except OSError as error:
-        told = error
+        cause = error
     raise BuildFailed(
-        f"The C library of the optimizer cannot be compiled: {told}\n"
+        f"The C library of the optimizer cannot be compiled: {cause}\n"
         "Name a C compiler that works by CC, or install one, such as `ziglang` from PyPI."
     )
 
 
 def _commands() -> list[list[str]]:
-    """The compiler with what makes it compile for every processor of this machine's kind; the first
-    that works counts.
+    """Compiler commands, each with the option for every processor of this architecture; the first
+    command that works is used.
 
-    What CC names may be zig: where there is no C compiler, `make` installs it.
+    CC may name zig: `make` installs it if there is no C compiler.
     """
-    found, machine = compiler(), platform.machine()
-    if found is not None:
-        gcc = [found, BASELINES[machine]] if machine in BASELINES else [found]
-        return [gcc, [found, ZIG_BASELINE]]
+    command, machine = compiler(), platform.machine()
+    if command is not None:
+        gcc = [command, BASELINES[machine]] if machine in BASELINES else [command]
+        return [gcc, [command, ZIG_BASELINE]]
     if find_spec("ziglang") is not None:
         return [[sys.executable, "-m", "ziglang", "cc", ZIG_BASELINE]]
     return []

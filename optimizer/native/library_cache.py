@@ -1,8 +1,7 @@
-"""Compiled kernels on disk: `JOULEPATH_CACHE_DIR` (default `~/.cache/joulepath`) holds their
-libraries.
+"""Cache of compiled kernels on disk, in `JOULEPATH_CACHE_DIR` (default `~/.cache/joulepath`).
 
-The system's C compiler makes each of them once. Beside it lies a seal, the hash of the library, so
-that a damaged file is noticed before it is loaded.
+The system's C compiler makes every library once. A seal beside the library, the hash of its
+content, reveals a damaged file before it is loaded.
 """
 
 from __future__ import annotations
@@ -24,35 +23,37 @@ from typing import IO
 
 from joulepath.optimizer.native.build import compiler
 
-# users may bring any number of arms, each with a library of about a megabyte
-MOST_LIBRARIES = 200
-
 
 @dataclass(frozen=True)
-class Patience:
-    """How long a C compiler is waited for."""
+class CacheSettings:
+    """Time limits of compilations, and size of the cache."""
 
-    compiler: float = 300.0
-    """Time [s] after which a compiler counts as hung and is killed: the largest kernel takes half a
-    minute, and ten times as long on a machine with much else to do."""
-    command: float = 60.0
-    """The same [s], where somebody waits for the command that compiles before it computes."""
-    rest: float = 3600.0
-    """Time [s] for which a compiler that hung is not tried again for the same library, by any
-    process: every command and every new worker would wait for it."""
-    look: float = 0.05
-    """Time [s] between two attempts to get the lock that another process holds while it
-    compiles."""
+    compiler_timeout: float = 300.0
+    """Time [s] after which a compiler is killed: the largest kernel takes half a minute, and ten
+    times as long on a busy machine.
+    """
+    command_timeout: float = 60.0
+    """`compiler_timeout` [s] for commands that compile before they compute while a user waits."""
+    retry_delay: float = 3600.0
+    """Time [s] for which no process tries a compiler again for a library after a timeout: every
+    command and every new worker would wait for it.
+    """
+    poll_interval: float = 0.05
+    """Time [s] between two attempts to get the lock of another process that compiles."""
+    max_libraries: int = 200
+    """Largest number of libraries in the cache: users may bring any number of arms, and the library
+    of an arm takes about a megabyte.
+    """
 
 
-PATIENCE = Patience()
+CACHE = CacheSettings()
 _running: set[subprocess.Popen[bytes]] = set()
 
 
 def cache_directory() -> Path:
     """Folder of the compiled libraries."""
-    given = os.environ.get("JOULEPATH_CACHE_DIR")
-    return Path(given) if given else Path.home() / ".cache" / "joulepath"
+    directory = os.environ.get("JOULEPATH_CACHE_DIR")
+    return Path(directory) if directory else Path.home() / ".cache" / "joulepath"
 
 
 def seal_path(path: Path) -> Path:
@@ -61,7 +62,7 @@ def seal_path(path: Path) -> Path:
 
 
 def is_intact(path: Path) -> bool:
-    """Whether the library exists and has the hash of its seal."""
+    """Whether the library exists and its hash agrees with its seal."""
     try:
         return (
             seal_path(path).read_bytes() == hashlib.sha256(path.read_bytes()).hexdigest().encode()
@@ -71,33 +72,41 @@ def is_intact(path: Path) -> bool:
 
 
 class CompilerHangs(RuntimeError):
-    """The C compiler, or another process that compiles the same, takes longer than anybody
-    waits."""
+    """The C compiler, or another process that compiles the same library, exceeds its time limit."""
 
 
 def compile_library(
-    target: Path, flags: Sequence[str], source: Callable[[], str], patience: Patience = PATIENCE
+    target: Path, flags: Sequence[str], source: Callable[[], str], settings: CacheSettings = CACHE
 ) -> None:
-    """Compile C to the library `target`, once however many threads and processes ask. `source`
-    gives the code.
+    """Compiles C code to the library `target`, once for any number of threads and processes that
+    ask.
 
-    Raises RuntimeError if there is no compiler or it fails, CompilerHangs if it takes longer than
-    `patience` or did so lately, OSError if the cache cannot be written.
+    Args:
+        target: path of the library.
+        flags: compiler flags.
+        source: function that returns the code.
+        settings: time limits.
+
+    Raises:
+        RuntimeError: there is no compiler, or it fails.
+        CompilerHangs: the compiler exceeds its time limit, or did so recently.
+        OSError: the cache cannot be written.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     with target.with_suffix(".lock").open("wb") as lock:
-        _wait_for(lock, patience)
+        _wait_for(lock, settings)
         if is_intact(target):
             return
         command = compiler()
         if command is None:
             raise RuntimeError("no C compiler found")
-        hung = target.with_suffix(".hung")
-        if _hung_lately(hung, command, patience):
+        timeout_note = target.with_suffix(".hung")
+        if _timed_out_recently(timeout_note, command, settings):
             raise CompilerHangs(
-                f"the C compiler {command} hung: it is tried again {patience.rest / 60:g} min later"
+                f"the C compiler {command} hung: it is tried again "
+                f"{settings.retry_delay / 60:g} min later"
             )
-        with workplace(target) as folder:
+        with work_folder(target) as folder:
             library, seal = folder / "library.so", folder / "library.sha256"
             code = folder / "library.c"
             code.write_text(source(), encoding="utf-8")
@@ -106,33 +115,31 @@ def compile_library(
                     [command, *flags, str(code), "-o", str(library), "-lm"],
                     folder / "log",
                     lock,
-                    patience,
+                    settings,
                 )
             except CompilerHangs:
-                hung.write_text(command, encoding="utf-8", errors="surrogateescape")
+                timeout_note.write_text(command, encoding="utf-8", errors="surrogateescape")
                 raise
             seal.write_text(hashlib.sha256(library.read_bytes()).hexdigest(), encoding="ascii")
-            # the seal first: a library without its seal counts as damaged, a seal without its
-            # library as absent
+            # The seal first: a library without its seal counts as damaged, a seal without its
+            # library as absent.
             seal.replace(seal_path(target))
             library.replace(target)
-            hung.unlink(missing_ok=True)
+            timeout_note.unlink(missing_ok=True)
     _prune(target.parent)
 
 
-def _hung_lately(note: Path, command: str, patience: Patience) -> bool:
-    """Whether this compiler was killed for this library; of another one, or long ago, the note says
-    nothing.
-    """
+def _timed_out_recently(note: Path, command: str, settings: CacheSettings) -> bool:
+    """Whether this compiler was killed for this library recently."""
     try:
-        is_recent = time.time() - note.stat().st_mtime < patience.rest
+        is_recent = time.time() - note.stat().st_mtime < settings.retry_delay
         return is_recent and note.read_text(encoding="utf-8", errors="surrogateescape") == command
     except OSError:
         return False
 
 
-def _wait_for(lock: IO[bytes], patience: Patience) -> None:
-    end = time.monotonic() + patience.compiler
+def _wait_for(lock: IO[bytes], settings: CacheSettings) -> None:
+    end = time.monotonic() + settings.compiler_timeout
     while True:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -140,16 +147,16 @@ def _wait_for(lock: IO[bytes], patience: Patience) -> None:
         except BlockingIOError:
             if time.monotonic() > end:
                 raise CompilerHangs(
-                    f"another process has been compiling it for {patience.compiler:g} s"
+                    f"another process has been compiling it for {settings.compiler_timeout:g} s"
                 ) from None
-        time.sleep(patience.look)
+        time.sleep(settings.poll_interval)
 
 
-def _run(command: Sequence[str], log: Path, lock: IO[bytes], patience: Patience) -> None:
-    """Run the compiler, with all processes that it starts in a group of their own.
+def _run(command: Sequence[str], log: Path, lock: IO[bytes], settings: CacheSettings) -> None:
+    """Runs the compiler and all its processes in a process group of their own.
 
-    It inherits the lock: if this process is killed, no other one starts a second compiler beside
-    it.
+    The compiler inherits the lock: if this process is killed, no other process starts a second
+    compiler beside it.
     """
     with log.open("wb") as output:
         process = subprocess.Popen(
@@ -162,10 +169,10 @@ def _run(command: Sequence[str], log: Path, lock: IO[bytes], patience: Patience)
         )
         _running.add(process)
         try:
-            code = process.wait(patience.compiler)
+            code = process.wait(settings.compiler_timeout)
         except subprocess.TimeoutExpired:
             raise CompilerHangs(
-                f"the C compiler {command[0]} does not end within {patience.compiler:g} s"
+                f"the C compiler {command[0]} does not end within {settings.compiler_timeout:g} s"
             ) from None
         finally:
             _kill(process)
@@ -185,19 +192,19 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 
 @atexit.register
 def _kill_all() -> None:
-    # a thread that waits for a compiler does not outlive the program
+    # Threads that wait for a compiler do not outlive the program.
     for process in list(_running):
         _kill(process)
 
 
 @contextmanager
-def workplace(target: Path) -> Iterator[Path]:
-    """An empty folder beside a file of the cache, in which the holder of its lock makes it.
+def work_folder(target: Path) -> Iterator[Path]:
+    """Empty folder beside a file of the cache, for the holder of the file's lock.
 
-    A process that is killed leaves its folder behind: the next one that makes this file deletes it.
+    A process that is killed leaves its folder behind; the next holder of the lock deletes it.
     """
-    for left in target.parent.glob(f"{target.name}-*.part"):
-        shutil.rmtree(left, ignore_errors=True)
+    for stale in target.parent.glob(f"{target.name}-*.part"):
+        shutil.rmtree(stale, ignore_errors=True)
     with tempfile.TemporaryDirectory(
         dir=target.parent, prefix=f"{target.name}-", suffix=".part"
     ) as folder:
@@ -205,17 +212,19 @@ def workplace(target: Path) -> Iterator[Path]:
 
 
 def mark_used(path: Path) -> None:
-    """Note that a library is in use: of many, those that rested longest are deleted."""
-    with suppress(OSError):  # a cache that is read-only is not pruned either
+    """Marks a library as used now: the least recently used libraries of the cache are deleted."""
+    with suppress(OSError):  # A read-only cache is not pruned either.
         os.utime(path)
 
 
 def _prune(folder: Path) -> None:
-    """Delete the libraries that rested longest, so that MOST_LIBRARIES are left. Who has loaded one
-    keeps it.
+    """Deletes the least recently used libraries, so that `CACHE.max_libraries` are left. Processes
+    that have loaded a deleted library keep it.
     """
     with suppress(OSError):
-        libraries = sorted(folder.glob("*.so"), key=lambda each: each.stat().st_mtime, reverse=True)
-        for library in libraries[MOST_LIBRARIES:]:
+        libraries = sorted(
+            folder.glob("*.so"), key=lambda library: library.stat().st_mtime, reverse=True
+        )
+        for library in libraries[CACHE.max_libraries :]:
             for file in (library, seal_path(library), library.with_suffix(".lock")):
                 file.unlink(missing_ok=True)

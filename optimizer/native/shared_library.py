@@ -1,7 +1,7 @@
-"""The C library that all arms share: forward kinematics, distances and the terms of dual bounds, of
-many configurations at once.
+"""The C library shared by all arms: forward kinematics, distances and terms of dual bounds for many
+configurations at once.
 
-`build` compiles it beside this file when a wheel is built, and `make` does in a clone. It runs on
+A wheel build compiles it beside this file by `build`, and `make` does so in a clone. It runs on
 every processor of its architecture.
 """
 
@@ -15,7 +15,9 @@ import numpy as np
 
 from joulepath.optimizer.native.build import FOLDER, LIBRARY, sources_digest
 
-_LONG, _DOUBLE, _ARRAY = ctypes.c_long, ctypes.c_double, ctypes.c_void_p
+_LONG = ctypes.c_long
+_DOUBLE = ctypes.c_double
+_ARRAY = ctypes.c_void_p
 # Arguments and result of every C function.
 _FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "link_frames": ([_LONG, _LONG, *3 * [_ARRAY]], None),
@@ -34,9 +36,8 @@ _FUNCTIONS: dict[str, tuple[list[Any], Any]] = {
     "speed_conjugate": ([*3 * [_ARRAY], *2 * [_DOUBLE], *2 * [_LONG], *5 * [_ARRAY]], None),
 }
 _REMEDY = (
-    f"`make ready` compiles it in a clone, and `python {FOLDER / 'build.py'}` wherever there is a "
-    "C "
-    "compiler. Or install joulepath anew, from a wheel for this platform or the source archive."
+    f"`make ready` compiles it in a clone, and `python {FOLDER / 'build.py'}` wherever there is "
+    "a C compiler. Or install joulepath anew, from a wheel for this platform or the source archive."
 )
 
 
@@ -48,8 +49,10 @@ class LibraryUnusable(ImportError):
 
 
 def load(path: Path) -> ctypes.CDLL:
-    """The library of a file, its functions with the types of their arguments. Raises
-    LibraryUnusable.
+    """Library of a file, with declared argument types of its functions.
+
+    Raises:
+        LibraryUnusable: the file is missing, does not fit this machine or other sources.
     """
     if not path.is_file():
         raise LibraryUnusable(path, "is missing")
@@ -61,7 +64,7 @@ def load(path: Path) -> ctypes.CDLL:
     digest.restype = ctypes.c_char_p
     # A library of other sources would misread the arguments.
     if digest() != sources_digest().encode():
-        raise LibraryUnusable(path, "was compiled from other sources than those beside it")
+        raise LibraryUnusable(path, "was compiled from other sources than the present ones")
     for name, (arguments, result) in _FUNCTIONS.items():
         function = getattr(library, name)
         function.argtypes, function.restype = arguments, result
@@ -72,5 +75,5 @@ library = load(LIBRARY)
 
 
 def address(array: np.ndarray[Any, Any]) -> int:
-    """Address of the numbers of an array, which must lie one after the other."""
+    """Address of the numbers of a contiguous array."""
     return array.ctypes.data

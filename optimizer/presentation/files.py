@@ -125,7 +125,7 @@ def read(hint: Any, data: Any) -> Any:
 
 def _dataclass(hint: Any, data: dict[str, Any]) -> Any:
     name = data.pop(CLASS)
-    kind = next((each for each in _with_subclasses(hint) if each.__name__ == name), None)
+    kind: Any = next((each for each in _with_subclasses(hint) if each.__name__ == name), None)
     if kind is None:
         raise ValueError(f"a {name} stands where a {hint.__name__} belongs")
     hints = hints_of(kind)

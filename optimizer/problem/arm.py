@@ -18,23 +18,32 @@ from joulepath.optimizer.problem.names import first_taken
 from joulepath.optimizer.problem.scene import Attachment, Scene
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
-LEAST_SPEED = 1e-3
-"""Least speed limit of a point [m/s]; below it, motions would exceed the longest duration."""
+
+@dataclass(frozen=True)
+class ArmRanges:
+    """Ranges of the figures of an arm."""
+
+    least_speed: float = 1e-3
+    """Least speed limit of a point [m/s]; below it, motions would exceed the longest duration."""
+    max_tool_parts: int = 16
+    """Most capsules of a tool."""
+    link_mass_scales: tuple[float, float] = (0.1, 10.0)
+    """Least and greatest factor on mass and inertia of a link; beyond, it is no variant of the
+    robot.
+    """
+    max_inverter_coefficient: float = 1e3
+    """Greatest coefficient of an inverter's loss [W, W/A, W/A²], far above any inverter."""
+
+
+ARM_RANGES = ArmRanges()
+
 LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
-MOST_TOOL_PARTS = 16
-"""Most capsules of a tool."""
 TOOL = "tool"
 """Name of the tool among the bodies."""
 PAYLOAD = "payload"
 """Name of the payload among the bodies."""
-LINK_MASS_SCALES = (0.1, 10.0)
-"""Least and greatest factor on mass and inertia of a link; beyond, it is no variant of the
-robot.
-"""
 INVERTER_COEFFICIENTS = ("constant", "linear", "quadratic")
 """Coefficients of the inverters' loss."""
-MOST_INVERTER_COEFFICIENT = 1e3
-"""Greatest coefficient of an inverter's loss [W, W/A, W/A²], far above any inverter."""
 
 
 @dataclass(frozen=True)
@@ -150,16 +159,19 @@ class Arm:
             self, "limits", self.robot.limits if self.limits is None else self.limits
         )
         object.__setattr__(self, "tool", tuple(self.tool))
-        if len(self.tool) > MOST_TOOL_PARTS:
-            raise InvalidProblem("tool.capsules", f"A tool has at most {MOST_TOOL_PARTS} capsules.")
+        if len(self.tool) > ARM_RANGES.max_tool_parts:
+            raise InvalidProblem(
+                "tool.capsules", f"A tool has at most {ARM_RANGES.max_tool_parts} capsules."
+            )
         self._check_touches()
         self._check_names()
         self._check_limits()
         for name in ("tcp_speed", "elbow_speed"):
             speed = getattr(self, name)
-            if speed is not None and not LEAST_SPEED <= speed < np.inf:
+            if speed is not None and not ARM_RANGES.least_speed <= speed < np.inf:
                 raise InvalidProblem(
-                    f"limits.{name}", f"limits.{name} must be at least {LEAST_SPEED:g} m/s."
+                    f"limits.{name}",
+                    f"limits.{name} must be at least {ARM_RANGES.least_speed:g} m/s.",
                 )
         if self.elbow_speed is not None and self.robot.elbow is None:
             raise InvalidProblem(
@@ -171,11 +183,13 @@ class Arm:
                 "friction", f"There is no friction law of that name: use one of {known}."
             )
         nq = self.robot.nq
-        scale = per_joint(self.link_mass_scale, nq, "link_mass_scale", *LINK_MASS_SCALES)
+        scale = per_joint(self.link_mass_scale, nq, "link_mass_scale", *ARM_RANGES.link_mass_scales)
         object.__setattr__(self, "link_mass_scale", scale)
         given = {name: getattr(self.inverter, name) for name in INVERTER_COEFFICIENTS}
         figures = {
-            name: per_joint(value, nq, f"drives.inverter.{name}", 0.0, MOST_INVERTER_COEFFICIENT)
+            name: per_joint(
+                value, nq, f"drives.inverter.{name}", 0.0, ARM_RANGES.max_inverter_coefficient
+            )
             for name, value in given.items()
             if value is not None
         }

@@ -19,12 +19,12 @@ class Label:
     approach in solving inverse kinematics of PUMA robots" (1984).
 
     `shoulder`: side of the first axis on which the plane of the arm lies, seen along the reach. It
-    changes where the origin of the last axis is level with the first axis. If the plane holds the
-    first axis, as with a spherical wrist on an arm without an offset, it is right where the arm
-    reaches forward, and left where it reaches back overhead.
+    changes when the origin of the last axis is level with the first axis. If the plane contains the
+    first axis, as with a spherical wrist on an arm without an offset, it is right for an arm that
+    reaches forward, and left for an arm that reaches back overhead.
 
     `elbow`: up if the elbow is above the line from shoulder to wrist of an arm that reaches
-    forward. It changes where the elbow is stretched or folded; across the singularity of the
+    forward. It changes at a stretched or a folded elbow; across the singularity of the
     shoulder it changes with the shoulder's part.
 
     `wrist`: no_flip if sin(q5) < 0, as with the tool down in the everyday posture of a Universal

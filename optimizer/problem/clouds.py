@@ -17,19 +17,29 @@ from joulepath.models.shape_sizes import SIZES, check_extent
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import check_sizes, frozen, sized
 
-MOST_POINTS = 100_000
-"""Most points of an obstacle: the limits bound memory and time of a request."""
-MOST_VOXELS = 100_000
-"""Most occupied voxels of an obstacle."""
-MOST_TRIANGLES = 100_000
-"""Most triangles of an obstacle."""
-MOST_PARTS_IN_SCENE = 200_000
-"""Most points, voxels and triangles of all obstacles of a scene together."""
-MOST_ALONG_EDGE = 4096
-"""Greatest number of voxels along an edge of a grid."""
-FLAT_TRIANGLE = 1e-9
-"""Least height of a triangle relative to its longest edge; flatter triangles are left out, as their
-edges belong to their neighbours."""
+
+@dataclass(frozen=True)
+class CloudRanges:
+    """Ranges of obstacles of many parts."""
+
+    max_points: int = 100_000
+    """Most points of an obstacle: the limits bound memory and time of a request."""
+    max_voxels: int = 100_000
+    """Most occupied voxels of an obstacle."""
+    max_triangles: int = 100_000
+    """Most triangles of an obstacle."""
+    max_parts_in_scene: int = 200_000
+    """Most points, voxels and triangles of all obstacles of a scene together."""
+    max_along_edge: int = 4096
+    """Greatest number of voxels along an edge of a grid."""
+    flat_triangle: float = 1e-9
+    """Least height of a triangle relative to its longest edge [1]; flatter triangles are left out,
+    since their edges belong to their neighbours.
+    """
+
+
+CLOUD_RANGES = CloudRanges()
+
 
 Whole = npt.NDArray[np.int64]
 
@@ -54,7 +64,7 @@ class Points:
         _count(
             "points",
             len(points),
-            MOST_POINTS,
+            CLOUD_RANGES.max_points,
             "points: thin the cloud out, for example to one point per voxel",
         )
         _within_reach("points", points)
@@ -81,10 +91,10 @@ class Voxels:
     def __post_init__(self) -> None:
         check_sizes("size", self.size)
         cells = np.unique(np.array(self.cells, dtype=np.int64).reshape(-1, 3), axis=0)
-        _count("cells", len(cells), MOST_VOXELS, "occupied cells: use larger voxels")
-        if np.abs(cells).max() > MOST_ALONG_EDGE:
+        _count("cells", len(cells), CLOUD_RANGES.max_voxels, "occupied cells: use larger voxels")
+        if np.abs(cells).max() > CLOUD_RANGES.max_along_edge:
             raise InvalidProblem(
-                "cells", f"cells must lie within {MOST_ALONG_EDGE} cells of the origin."
+                "cells", f"cells must lie within {CLOUD_RANGES.max_along_edge} cells of the origin."
             )
         _within_reach("cells", np.asarray(cells * self.size, dtype=float))
         cells.flags.writeable = False
@@ -110,14 +120,14 @@ class TriangleMesh:
 
     def __post_init__(self) -> None:
         corners = frozen(self.corners, (-1, 3, 3), "data")
-        _count("data", len(corners), MOST_TRIANGLES, "triangles: simplify the mesh")
+        _count("data", len(corners), CLOUD_RANGES.max_triangles, "triangles: simplify the mesh")
         _within_reach("data", corners)
         sized("data", lambda: check_extent("data", corners.reshape(-1, 3)))
         edges = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
         double_area = np.linalg.norm(
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
         )
-        kept = double_area > FLAT_TRIANGLE * edges**2
+        kept = double_area > CLOUD_RANGES.flat_triangle * edges**2
         if not kept.any():
             raise InvalidProblem(
                 "data", "data has no triangle with an area: give a mesh with a surface."

@@ -1,4 +1,4 @@
-"""A cycle: stops that the arm visits one after another, again and again. Validated on
+"""A cycle: stops visited by the arm one after another, again and again. Validated on
 construction.
 """
 
@@ -10,14 +10,13 @@ from functools import cached_property
 
 import numpy as np
 
-from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell, Hold
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
 from joulepath.optimizer.problem.names import check_name, first_repeated
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, MethodName
+from joulepath.optimizer.problem.problem import DURATIONS, MethodName
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import (
     APPROACH,
@@ -28,16 +27,25 @@ from joulepath.optimizer.problem.stops import (
     moves_over,
     passing,
 )
-from joulepath.optimizer.problem.targets import AnyOf, Target, validated
+from joulepath.optimizer.problem.targets import Target, validated_in_cycle
 from joulepath.optimizer.result.energy import Objective
 
-MOST_STOPS = 256
-"""Most stops of a cycle."""
-MOST_PASSES = 12
-"""Most stops passed by one motion; the effort of its nonlinear program grows more than
-quadratically with their number."""
-LONGEST_CYCLE = 36_000.0
-"""Longest duration of a cycle [s]."""
+
+@dataclass(frozen=True)
+class CycleRanges:
+    """Ranges of cycles."""
+
+    max_stops: int = 256
+    """Most stops of a cycle."""
+    max_passes: int = 12
+    """Most stops passed by one motion; the effort of its nonlinear program grows more than
+    quadratically with their number."""
+    longest: float = 36_000.0
+    """Longest duration of a cycle [s]."""
+
+
+CYCLE_RANGES = CycleRanges()
+
 START = "start"
 """Name of the first configuration of a cycle, and of the last one of a closed cycle."""
 
@@ -102,19 +110,19 @@ class Cycle:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stops", tuple(self.stops))
-        if not 1 <= len(self.stops) <= MOST_STOPS:
-            raise InvalidProblem("stops", f"A cycle must have 1 to {MOST_STOPS} stops.")
+        if not 1 <= len(self.stops) <= CYCLE_RANGES.max_stops:
+            raise InvalidProblem("stops", f"A cycle must have 1 to {CYCLE_RANGES.max_stops} stops.")
         self._check_names()
-        object.__setattr__(self, "start", _checked_target(self.arm, "start", self.start))
+        object.__setattr__(self, "start", validated_in_cycle(self.arm, "start", self.start))
         checked = tuple(
-            replace(stop, target=_checked_target(self.arm, f"stops.{k}.target", stop.target))
+            replace(stop, target=validated_in_cycle(self.arm, f"stops.{k}.target", stop.target))
             for k, stop in enumerate(self.stops)
         )
         object.__setattr__(self, "stops", checked)
         for k, stop in enumerate(self.stops):
-            if not 0 <= stop.dwell <= LONGEST_DURATION:
+            if not 0 <= stop.dwell <= DURATIONS.longest:
                 raise InvalidProblem(
-                    f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s."
+                    f"stops.{k}.dwell", f"dwell must be from 0 to {DURATIONS.longest:g} s."
                 )
             self._check_limits(k, stop)
             if stop.path is not None:
@@ -206,10 +214,11 @@ class Cycle:
         passed = 0
         for k, stop in enumerate(self.stops):
             passed = passed + 1 if stop.via else 0
-            if passed > MOST_PASSES:
+            if passed > CYCLE_RANGES.max_passes:
                 raise InvalidProblem(
                     f"stops.{k}.via",
-                    f"The arm passes through at most {MOST_PASSES} stops between two rests: set "
+                    f"The arm passes through at most {CYCLE_RANGES.max_passes} stops between two "
+                    "rests: set "
                     "via to false here.",
                 )
 
@@ -236,9 +245,9 @@ class Cycle:
 
     def _check_duration(self) -> None:
         for value in (self.duration_min, self.duration_max):
-            if value is not None and not 0 < value <= LONGEST_CYCLE:
+            if value is not None and not 0 < value <= CYCLE_RANGES.longest:
                 raise InvalidProblem(
-                    "time", f"time must be above 0 and at most {LONGEST_CYCLE:g} s."
+                    "time", f"time must be above 0 and at most {CYCLE_RANGES.longest:g} s."
                 )
         if (
             self.duration_min is not None
@@ -262,7 +271,7 @@ class Cycle:
     def longest_move(self) -> float:
         """Longest duration of a move [s]."""
         most = np.inf if self.duration_max is None else self.duration_max - self.dwell_time
-        return float(np.clip(most, LEAST_DURATION, LONGEST_DURATION))
+        return float(np.clip(most, DURATIONS.least, DURATIONS.longest))
 
     def dwell_of(self, length: float) -> Dwell:
         """A dwell of `length` [s] after a motion of zero duration."""
@@ -314,35 +323,3 @@ class Cycle:
         """The allowed duration [s] nearest to the given one."""
         most = np.inf if self.duration_max is None else self.duration_max
         return min(max(duration, self.duration_min or 0.0), most)
-
-
-def _checked_target(arm: Arm, field: str, target: Target) -> Target:
-    """A target with its joint positions as read-only arrays.
-
-    Raises:
-        InvalidProblem: the target is malformed, or a start or a member of several targets has a
-            free orientation.
-        OutsideLimits: joint positions are out of range.
-    """
-    if field == START and isinstance(target, ConeOrientedPose):
-        raise InvalidProblem(
-            field,
-            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or "
-            "joint positions.",
-        )
-    if isinstance(target, AnyOf) and any(
-        isinstance(member, ConeOrientedPose) for member in target.targets
-    ):
-        raise InvalidProblem(
-            field,
-            "Of several targets, each has its orientation in full: give a quaternion, rpy or "
-            "rotvec.",
-        )
-    try:
-        return validated(arm, "goal", target)
-    except OutsideLimits as error:
-        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
-    except InvalidProblem as error:
-        raise InvalidProblem(
-            error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)
-        ) from None

@@ -29,7 +29,7 @@ class FreeOrder:
 
 
 def groups_of(order: FreeOrder, stops: Sequence[Stop]) -> list[list[Stop]]:
-    """Stops in groups that stay together, in the given order of their first stops."""
+    """Groups of stops to be visited together, in the given order of their first stops."""
     by_name = {stop.name: stop for stop in stops}
     listed = {name: list(names) for names in order.together for name in names}
     groups = list[list[Stop]]()

@@ -12,10 +12,19 @@ from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import frozen
 
 LineFrame = Literal["tcp", "base"]
-LEAST_DISTANCE = 1e-4
-"""Least length of a line [m]."""
-MOST_DISTANCE = 2.0
-"""Greatest length of a line [m]."""
+
+
+@dataclass(frozen=True)
+class LineRanges:
+    """Ranges of lines of the TCP."""
+
+    least_distance: float = 1e-4
+    """Least length of a line [m]."""
+    greatest_distance: float = 2.0
+    """Greatest length of a line [m]."""
+
+
+LINE_RANGES = LineRanges()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,10 +54,11 @@ class Line:
                 "direction",
                 "direction must not be zero: give the vector along which the TCP moves.",
             )
-        if not LEAST_DISTANCE <= self.distance <= MOST_DISTANCE:
+        if not LINE_RANGES.least_distance <= self.distance <= LINE_RANGES.greatest_distance:
             raise InvalidProblem(
                 "distance",
-                f"distance must be from {LEAST_DISTANCE:g} to {MOST_DISTANCE:g} m: "
+                f"distance must be from {LINE_RANGES.least_distance:g} to "
+                f"{LINE_RANGES.greatest_distance:g} m: "
                 f"{self.distance!r}.",
             )
         if self.frame not in ("tcp", "base"):

@@ -33,7 +33,7 @@ def check_name(field: str, name: object) -> None:
     """Check that a name is plain text of 1 to LONGEST_NAME characters.
 
     Raises:
-        InvalidProblem: it is not; names `field`.
+        InvalidProblem: the name is invalid; names `field`.
     """
     if not isinstance(name, str) or not 1 <= len(name) <= LONGEST_NAME:
         raise InvalidProblem(field, f"{field} must be a text of 1 to {LONGEST_NAME} characters.")

@@ -22,10 +22,18 @@ MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "
 # effort for the lower bound
 BoundEffort = Literal["normal", "tight"]
 
-LEAST_DURATION = 0.01
-"""Least duration of a motion [s], also if start and goal are the same."""
-LONGEST_DURATION = 600.0
-"""Greatest duration of a motion [s]."""
+
+@dataclass(frozen=True)
+class DurationRanges:
+    """Ranges of durations."""
+
+    least: float = 0.01
+    """Least duration of a motion [s], also if start and goal are the same."""
+    longest: float = 600.0
+    """Greatest duration of a motion [s]."""
+
+
+DURATIONS = DurationRanges()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,15 +11,23 @@ from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import SIZES, hull_of_body
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arrays import check_sizes, frozen, placement, sized
-from joulepath.optimizer.problem.clouds import MOST_PARTS_IN_SCENE, Cloud, parts_of
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Cloud, parts_of
 from joulepath.optimizer.problem.names import check_name, first_repeated
 
-MOST_OBSTACLES = 64
-"""Most obstacles of a scene; the limits bound the work of a request."""
-MOST_VERTICES = 256
-"""Most vertices of a mesh."""
-DEFAULT_MARGIN = 5e-3
-"""Default clearance of an obstacle [m]: the accuracy of the placement of bodies in a cell."""
+
+@dataclass(frozen=True)
+class SceneRanges:
+    """Ranges of obstacles and of their shapes."""
+
+    max_obstacles: int = 64
+    """Most obstacles of a scene; the limits bound the work of a request."""
+    max_vertices: int = 256
+    """Most vertices of a mesh."""
+    default_margin: float = 5e-3
+    """Default clearance of an obstacle [m]: the accuracy of the placement of bodies in a cell."""
+
+
+SCENE_RANGES = SceneRanges()
 
 
 @dataclass(frozen=True)
@@ -83,8 +91,10 @@ class Mesh:
 
     def __post_init__(self) -> None:
         vertices = frozen(self.vertices, (-1, 3), "vertices")
-        if not 4 <= len(vertices) <= MOST_VERTICES:
-            raise InvalidProblem("vertices", f"vertices must be 4 to {MOST_VERTICES} points.")
+        if not 4 <= len(vertices) <= SCENE_RANGES.max_vertices:
+            raise InvalidProblem(
+                "vertices", f"vertices must be 4 to {SCENE_RANGES.max_vertices} points."
+            )
         if np.abs(vertices).max() > SIZES.largest:
             raise InvalidProblem(
                 "vertices", f"vertices must lie within {SIZES.largest:g} m of the origin."
@@ -113,7 +123,7 @@ class Obstacle:
     name: str
     shape: Shape
     T_base_shape: Array = field(default_factory=lambda: np.eye(4))
-    margin: float = DEFAULT_MARGIN
+    margin: float = SCENE_RANGES.default_margin
 
     def __post_init__(self) -> None:
         check_name("name", self.name)
@@ -164,16 +174,16 @@ class Scene:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
-        if len(self.obstacles) > MOST_OBSTACLES:
+        if len(self.obstacles) > SCENE_RANGES.max_obstacles:
             raise InvalidProblem(
-                "scene.obstacles", f"A scene has at most {MOST_OBSTACLES} obstacles."
+                "scene.obstacles", f"A scene has at most {SCENE_RANGES.max_obstacles} obstacles."
             )
         parts = sum(parts_of(o.shape) for o in self.obstacles if isinstance(o.shape, Cloud))
-        if parts > MOST_PARTS_IN_SCENE:
+        if parts > CLOUD_RANGES.max_parts_in_scene:
             raise InvalidProblem(
                 "scene.obstacles",
                 f"The points, voxels and triangles of a scene are {parts}: give at most "
-                f"{MOST_PARTS_IN_SCENE} in all.",
+                f"{CLOUD_RANGES.max_parts_in_scene} in all.",
             )
         repeated = first_repeated(self.names)
         if repeated is not None:

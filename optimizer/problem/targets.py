@@ -1,4 +1,4 @@
-"""Targets at which a motion may start or end: joint positions, a pose, or one of several
+"""Targets for the start or the end of a motion: joint positions, a pose, or one of several
 targets.
 """
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -42,10 +42,10 @@ class AnyOf:
 
 @dataclass(frozen=True)
 class SampledPoses(AnyOf):
-    """Samples of the poses that `free_pose` allows.
+    """Samples of the poses allowed by `free_pose`.
 
-    The lower bound of a cycle then holds for all configurations of all poses that `free_pose`
-    allows. Without it, the poses are samples of infinitely many, which are not bounded together.
+    The lower bound of a cycle then holds for all configurations of all poses allowed by
+    `free_pose`. Without it, the poses are samples of infinitely many poses without a common bound.
     """
 
     free_pose: ConeOrientedPose | None = None
@@ -63,7 +63,7 @@ def single(target: Target) -> Single:
     """The target itself.
 
     Raises:
-        ValueError: the target is an AnyOf, which must be narrowed to one target first.
+        ValueError: the target is an AnyOf, and must be narrowed to one target first.
     """
     if isinstance(target, AnyOf):
         raise ValueError("narrow the problem to one of its targets first")
@@ -79,7 +79,7 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
         arm: arm of the problem.
         name: `start`, `goal`, or another field.
         target: the target.
-        on_path: whether the target is an end of a tool path, where a start may be free in part.
+        on_path: whether the target is an end of a tool path; a start may then be free in part.
 
     Raises:
         InvalidProblem: the target is malformed, or a start with an orientation tolerance.
@@ -110,3 +110,40 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
     q = frozen(target, (arm.robot.nq,), f"{name}.q")
     arm.check_inside(name, q)
     return q
+
+
+def validated_in_cycle(arm: Arm, field: str, target: Target) -> Target:
+    """A target of a cycle, with its joint positions as read-only arrays.
+
+    Args:
+        arm: arm of the cycle.
+        field: `start`, or the field of a stop's target.
+        target: the target.
+
+    Raises:
+        InvalidProblem: the target is malformed, or a start or a member of several targets has a
+            free orientation.
+        OutsideLimits: joint positions are out of range.
+    """
+    if field == "start" and isinstance(target, ConeOrientedPose):
+        raise InvalidProblem(
+            field,
+            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or "
+            "joint positions.",
+        )
+    if isinstance(target, AnyOf) and any(
+        isinstance(member, ConeOrientedPose) for member in target.targets
+    ):
+        raise InvalidProblem(
+            field,
+            "Of several targets, each has its orientation in full: give a quaternion, rpy or "
+            "rotvec.",
+        )
+    try:
+        return validated(arm, "goal", target)
+    except OutsideLimits as error:
+        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
+    except InvalidProblem as error:
+        raise InvalidProblem(
+            error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)
+        ) from None

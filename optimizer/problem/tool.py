@@ -1,4 +1,4 @@
-"""A tool that comes with the library: its shape, its mass and its TCP in the flange frame."""
+"""A tool of the library: its shape, its mass and its TCP in the flange frame."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Tool:
     title: str
     """Manufacturer and model."""
     shape: tuple[Attachment, ...]
-    """Capsules that stand for the tool in the collision model."""
+    """Capsules that represent the tool in the collision model."""
     body: Payload
     """Mass, centre of mass and inertia of the tool itself."""
     T_flange_tcp: Array
@@ -36,13 +36,13 @@ class Tool:
     """The figures with their sources and trust letters."""
 
     def carrying(self, part: Payload | None = None) -> Payload:
-        """The tool and a part that it holds, as one rigid body.
+        """The tool and a held part, as one rigid body.
 
         Args:
             part: the part, in the flange frame; None for the empty tool.
 
         Returns:
-            The body with the sum of the masses; its shape for collisions is that of the part.
+            The body with the sum of the masses; its shape for collisions is the shape of the part.
         """
         if part is None or part.mass == 0:
             shape = None if part is None else part.shape
@@ -63,7 +63,7 @@ def _about(mass: float, offset: Array) -> Array:
 
 @cache
 def load_tool(name: str) -> Tool:
-    """Load a gripper that comes with the library.
+    """Load a gripper of the library.
 
     Args:
         name: one of `tool_names()`.

@@ -36,15 +36,15 @@ class ToolPathSettings:
     """Least ratio of the greatest speed to the least one; a motion needs some freedom."""
     same_axis: float = 1e-12
     """Deviation of |cos| from 1 below which two axes are parallel."""
+    meters_per_radian: float = 0.25
+    """Length of path per radian of rotation [m/rad], so that a rotation in place is a path too."""
+    speed_tolerance: float = 1e-3
+    """Relative tolerance of a fixed speed [1]."""
+    same_pose: float = 1e-6
+    """Distance along the path below which two poses count as one [m]."""
 
 
 TOOL_PATH = ToolPathSettings()
-TURNING = 0.25
-"""Length of path for a radian of rotation [m], so that a rotation in place is a path too."""
-SPEED_TOLERANCE = 1e-3
-"""Relative tolerance of a fixed speed."""
-SAME_POSE = 1e-6
-"""Distance along the path below which two poses are one [m]."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class ToolPath:
         about: axis in the TCP frame about which the tool may turn freely between the ends, shape
             (3,); the rotation tolerance is then for the direction of the axis. None without one.
         least_speed: least speed of the TCP except on the ramps [m/s]; None without one.
-        fixed_speed: speed of the TCP between the ramps, within SPEED_TOLERANCE and not exceeded by
-            more on the ramps [m/s]; None without one.
+        fixed_speed: speed of the TCP between the ramps, within `speed_tolerance`, and an upper
+            bound with the same tolerance on the ramps [m/s]; None without one.
         ramp: length of the ramps at both ends [m].
         section: part of the path to be followed; None for the whole path.
 
@@ -128,7 +128,9 @@ class ToolPath:
                 raise InvalidProblem(
                     "path.speed", "path.speed must be a positive number of metres per second."
                 )
-            object.__setattr__(self, "least_speed", self.fixed_speed * (1 - SPEED_TOLERANCE))
+            object.__setattr__(
+                self, "least_speed", self.fixed_speed * (1 - TOOL_PATH.speed_tolerance)
+            )
         if self.least_speed is not None and not (
             np.isfinite(self.least_speed) and self.least_speed > 0
         ):
@@ -182,12 +184,12 @@ class ToolPath:
             InvalidProblem: it does not.
         """
         if self.fixed_speed is not None:
-            if most is not None and most < self.fixed_speed * (1 + SPEED_TOLERANCE):
+            if most is not None and most < self.fixed_speed * (1 + TOOL_PATH.speed_tolerance):
                 raise InvalidProblem(
                     "path.speed",
                     f"On the path the TCP may be no faster than {most:.4g} m/s: give a fixed "
                     "path.speed of at most "
-                    f"{most / (1 + SPEED_TOLERANCE):.4g} m/s.",
+                    f"{most / (1 + TOOL_PATH.speed_tolerance):.4g} m/s.",
                 )
             return
         if (

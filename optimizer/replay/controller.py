@@ -109,5 +109,5 @@ def _between_motor_and_limit(plant: Plant, motion: Reference) -> Array:
     if arm.robot.torque_side == "motor":
         return np.zeros_like(motion.v)
     tau = plant.torques(motion.q, motion.v, motion.a)
-    lost = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
-    return np.asarray(arm.drives.rotor_inertia * motion.a + lost)
+    tau_friction = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
+    return np.asarray(arm.drives.rotor_inertia * motion.a + tau_friction)

@@ -1,1 +1,1 @@
-"""What a search answers, as frozen data; every field declares its unit and meaning."""
+"""Results of searches as frozen data; every field declares its unit and meaning."""

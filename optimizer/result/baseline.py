@@ -12,8 +12,8 @@ from joulepath.optimizer.result.energy import SavingInterval, Sensitivity
 
 @dataclass(frozen=True, eq=False)
 class Standing(Comparable):
-    """An arm at rest at q (nq,) [rad], whose motors hold torques tau (nq,) [N·m] and that draws
-    `power` [W].
+    """Arm at rest at q (nq,) [rad] with motor torques tau (nq,) [N·m] and a total power of `power`
+    [W].
     """
 
     q: Annotated[PerJoint, Unit("rad")]
@@ -49,18 +49,20 @@ class Baseline:
     within_limits: bool = field(init=False)
     """Whether this motion is within every limit; collisions are checked at sample points."""
     reason: str | None
-    """What keeps this motion from being within every limit, in words: limits that it breaks, and
-    two bodies that come closer than allowed, by how much. Null if nothing does."""
+    """Limits that this motion breaks, and the two bodies closer than allowed, with the amount. Null
+    if it is within every limit.
+    """
     saving: Ratio | None
     """1 - energy of the answer / energy of this motion, of the objective, in the same cycle time:
-    the shorter one also waits at its goal, held by the motors, until the longer one ends. Null
-    where this motion is not within every limit: it is no way to compare with."""
+    the shorter motion also waits at its goal, held by the motors, until the longer one ends. Null
+    if this motion is not within every limit, since it is then no valid comparison.
+    """
     sensitivity: Annotated[Sensitivity, Internal] = field(repr=False)
     """Sensitivity of the electrical energy."""
     at_goal: Annotated[Standing, Internal] = field(repr=False)
-    """How it stands at its goal."""
+    """Arm at rest at the goal of this motion."""
     saving_interval: SavingInterval | None = None
-    """How well the saving is known. Null without a saving, and for the objective `mechanical`."""
+    """Uncertainty of the saving. Null without a saving, and for the objective `mechanical`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "within_limits", self.reason is None)

@@ -21,11 +21,10 @@ from joulepath.optimizer.declared import (
 
 @dataclass(frozen=True)
 class UnreachableTarget:
-    """A target of an `any_of` that the arm cannot reach. It has no candidates."""
+    """A target of an `any_of` out of the arm's reach. It has no candidates."""
 
     end: str
-    """What the target belongs to: `start` or `goal`; of `POST /cycle` `start`, or `stops/` and a
-    name."""
+    """Owner of the target: `start` or `goal`; of `POST /cycle` `start`, or `stops/` and a name."""
     target: int
     """Index in `any_of`, from 0."""
     reason: str
@@ -43,7 +42,7 @@ class CandidateStatus(StrEnum):
 
 
 class CandidateCounts(TypedDict):
-    """How many candidates have each status; all of them, listed or not."""
+    """Number of candidates by status, listed or not."""
 
     solved: Count
     """A motion was found."""
@@ -60,7 +59,7 @@ class CandidateCounts(TypedDict):
 class CandidateReport(NamedTuple):
     """One pair of a start and a goal configuration, and the result of the search for it."""
 
-    # an answer has thousands of candidates: a frozen dataclass takes four times as long to create
+    # An answer has thousands of candidates; a frozen dataclass takes four times as long to create.
     start: str
     """Branch at the start."""
     start_target: int
@@ -87,8 +86,9 @@ class CandidateReport(NamedTuple):
     duration: Seconds | None = None
     """Duration of the motion found; null if not solved."""
     refined: bool | None = None
-    """Whether the motion was optimised to the end. If not, its energy is that of a first, coarse
-    motion: asked for alone, this pair may need a few percent less. Null if not solved."""
+    """Whether the motion was optimised to the end. Otherwise its energy is that of a first, coarse
+    motion: a request for this pair alone may find a few percent less. Null if not solved.
+    """
     tried: Annotated[bool, Internal] = False
     """Whether a motion was computed, found or not."""
 

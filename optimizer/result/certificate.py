@@ -33,8 +33,9 @@ class Clearance:
 
 
 class WorstRatio(TypedDict):
-    """Largest value / limit over all joints and instants: at most 1 + 1e-6. What follows `torque`
-    is there only if the request limits it."""
+    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The fields after
+    `torque` are present only if the request limits their quantity.
+    """
 
     position: Ratio
     """Joint position: distance from the middle of the range / half of the range."""

@@ -26,7 +26,7 @@ class StopConfiguration(Configuration):
 
 @dataclass(frozen=True, kw_only=True)
 class Pass(StopConfiguration):
-    """A stop that a move passes through, and in which arm configuration."""
+    """A stop passed by a move, with the arm configuration there."""
 
     t: Seconds
     """When it passes, from the start of the move."""

@@ -9,7 +9,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
 from joulepath.optimizer.presentation.equality import Comparable
 
-# what is minimised: energy drawn from the supply, or mechanical work
+# minimised quantity: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
 
 ENERGY_PARTS = (
@@ -47,7 +47,7 @@ class Sensitivity(Comparable):
 
 @dataclass(frozen=True)
 class EnergyInterval:
-    """How well the energy is known, from the errors that the figures of the arm may have."""
+    """Uncertainty of the energy from the errors of the arm's figures."""
 
     p5: Joules
     """The energy is above this with 95 % probability."""

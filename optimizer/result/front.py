@@ -17,7 +17,7 @@ from joulepath.optimizer.result.solution import Solution
 
 @dataclass(frozen=True)
 class Dropped:
-    """A duration that was solved and is not a point of the front."""
+    """A solved duration without a point on the front."""
 
     duration: Seconds
     """The duration."""

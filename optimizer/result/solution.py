@@ -83,13 +83,14 @@ class Configuration(Comparable):
     q: Annotated[PerJoint, Unit("rad")]
     """Joint positions."""
     target: int = 0
-    """Index in `any_of` of the target that it reaches, from 0; 0 for a single target."""
+    """Index in `any_of` of the reached target, from 0; 0 for a single target."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitsInForce(Comparable):
-    """The limits that the motion was held to: those of the robot, or the tighter ones of the
-    request. Lists are per joint, from base to flange; null: no limit."""
+    """Limits of the motion: the robot's, or the tighter limits of the request. Lists are per joint,
+    from base to flange; null: no limit.
+    """
 
     position_min: Annotated[PerJoint, Unit("rad")]
     """Least joint position."""

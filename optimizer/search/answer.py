@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from joulepath.optimizer.bounds.missed_branches import all_branches_known
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.dynamics.interval import Known, with_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.progress import Improved
 from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.solution import Configuration, LimitsInForce, Solution, SolverReport
@@ -66,7 +66,7 @@ def answer(state: SearchState, best: Candidate, baselines: list[Baseline]) -> So
         baselines=with_savings(
             baselines,
             problem,
-            Known(energy.electrical.total, sensitivity, spline.duration),
+            MotionEnergy(energy.electrical.total, sensitivity, spline.duration),
             standing(arm, best.q_goal, prepared.torques),
         ),
         candidates=[each.report() for each in state.candidates],

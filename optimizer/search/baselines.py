@@ -25,9 +25,9 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, waits
+from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, holding_times
 from joulepath.optimizer.dynamics.interval import (
-    Known,
+    MotionEnergy,
     arm_spread,
     saving_interval,
     saving_intervals,
@@ -35,7 +35,7 @@ from joulepath.optimizer.dynamics.interval import (
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
 from joulepath.optimizer.dynamics.losses import breakdown, friction_torque
 from joulepath.optimizer.dynamics.sensitivity import energy_sensitivity, waiting_sensitivity
-from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
+from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE, excess_text, limit_ratios
 from joulepath.optimizer.motion.ruckig_motion import straight, time_optimal
 from joulepath.optimizer.motion.time_scalings import (
     SampledMotion,
@@ -118,15 +118,15 @@ def compared(
         broken: limits along the path that the motion breaks, and collisions, in words.
     """
     arm = problem.arm
-    lost = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
-    energy = motion_energy(problem, motion, tau, potential, lost)
+    tau_friction = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
+    energy = motion_energy(problem, motion, tau, potential, tau_friction)
     spread = arm_spread(arm)
     sensitivity = energy_sensitivity(
-        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, lost
+        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, tau_friction
     )
     if problem.dwell is not None:
         energy = energy.with_dwell(dwell_energy(problem.dwell, arm, held.power, motion.duration))
-        times = waits(problem.dwell, motion.duration)
+        times = holding_times(problem.dwell, motion.duration)
         sensitivity += waiting_sensitivity(arm, held.q, held.tau, *times, problem.dwell, spread)
     return Baseline(
         name=name,
@@ -134,7 +134,7 @@ def compared(
         electrical=energy.electrical.total,
         mechanical=energy.mechanical.total,
         saving=saving(ours, energy.of(problem.objective)),
-        reason="; ".join([*broken_limits(problem, motion, tau, lost), *broken]) or None,
+        reason="; ".join([*broken_limits(problem, motion, tau, tau_friction), *broken]) or None,
         sensitivity=sensitivity,
         at_goal=held,
     )
@@ -148,7 +148,7 @@ def standing(arm: Arm, q: Array, torques: Torques) -> Standing:
 
 
 def with_savings(
-    table: list[Baseline], problem: Problem, ours: Known, at_goal: Standing
+    table: list[Baseline], problem: Problem, ours: MotionEnergy, at_goal: Standing
 ) -> list[Baseline]:
     """The baselines with savings in the same cycle time and their intervals.
 
@@ -164,9 +164,9 @@ def with_savings(
     savings: dict[str, SavingInterval | None] = dict.fromkeys(each.name for each in usable)
     values = {each.name: each.saving for each in usable}
     if problem.objective == "electrical":
-        together = list[tuple[str, Known]]()
+        together = list[tuple[str, MotionEnergy]]()
         for each in usable:
-            theirs = Known(each.electrical, each.sensitivity, each.duration)
+            theirs = MotionEnergy(each.electrical, each.sensitivity, each.duration)
             wait = 0.0 if problem.dwell is not None else each.duration - ours.duration
             if abs(wait) <= RATIO_TOLERANCE * ours.duration:
                 together.append((each.name, theirs))
@@ -183,7 +183,7 @@ def with_savings(
     ]
 
 
-def waited(known: Known, at: Standing, time: float, arm: Arm) -> Known:
+def waited(known: MotionEnergy, at: Standing, time: float, arm: Arm) -> MotionEnergy:
     """A motion with a wait of `time` [s] after it, while the motors hold the arm."""
     more = waiting_sensitivity(arm, at.q, at.tau, time, 0.0, Dwell(time), arm_spread(arm))
     return replace(
@@ -234,7 +234,7 @@ def motion_energy(
     motion: SampledMotion,
     tau: Array,
     potential: Callable[[Array], float],
-    lost: Array | None = None,
+    tau_friction: Array | None = None,
 ) -> Energy:
     """Energy of a motion from rest to rest, without waiting.
 
@@ -243,14 +243,16 @@ def motion_energy(
         motion: the motion.
         tau: its torques, shape (k, nq) [N·m].
         potential: potential energy [J] of joint positions (nq,).
-        lost: friction torques, shape (k, nq) [N·m], if they are known.
+        tau_friction: friction torques, shape (k, nq) [N·m], if they are known.
     """
     gain = potential(motion.q[-1]) - potential(motion.q[0])
-    return breakdown(motion.weights, motion.v, motion.a, tau, gain, problem.arm, lost=lost)
+    return breakdown(
+        motion.weights, motion.v, motion.a, tau, gain, problem.arm, tau_friction=tau_friction
+    )
 
 
 def broken_limits(
-    problem: Problem, motion: SampledMotion, tau: Array, lost: Array | None = None
+    problem: Problem, motion: SampledMotion, tau: Array, tau_friction: Array | None = None
 ) -> list[str]:
     """The limits that a motion breaks, in words; a motion longer than the dwell breaks it too.
 
@@ -261,11 +263,15 @@ def broken_limits(
         1 + RATIO_TOLERANCE
     )
     limits = problem.arm.active_limits
-    tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a, lost)
+    tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a, tau_friction)
     # without a limit, unbounded jerk is allowed
     jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)
     ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_limited)
     return [
         *(["longer than the dwell"] if late else []),
-        *(too_much(name, ratio) for name, ratio in ratios.items() if ratio > 1 + RATIO_TOLERANCE),
+        *(
+            excess_text(name, ratio)
+            for name, ratio in ratios.items()
+            if ratio > 1 + RATIO_TOLERANCE
+        ),
     ]

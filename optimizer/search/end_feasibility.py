@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import ClosestPair
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
@@ -32,7 +32,7 @@ class InvalidReason:
     cause: float | ClosestPair | TorqueInfeasible
     """Angle beyond the tool cone [rad], closest pair of bodies, or overloaded joint."""
     possible: bool = False
-    """Whether the margins hold, and only RESERVE beyond them is missing.
+    """Whether the margins hold, and only the reserve beyond them is missing.
 
     Then no motion is searched for, although there may be one.
     """
@@ -43,14 +43,15 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
     result: list[InvalidReason | None] = [*_overloads(prepared, q)]
     # a collision or the cone replaces an overload as reason, because it does not depend on the load
     for k, contact in enumerate(
-        prepared.surroundings.model.closest_pairs(q, within=RESERVE)
+        prepared.surroundings.model.closest_pairs(q, within=CLEARANCE_CONSTRAINT.reserve)
         if prepared.problem.arm.collisions
         else ()
     ):
-        if contact.distance < RESERVE:
+        if contact.distance < CLEARANCE_CONSTRAINT.reserve:
             first, second = contact.pair
             message = (
-                f"{first} and {second}: clearance {RESERVE - contact.distance:.5f} m too small"
+                f"{first} and {second}: clearance "
+                f"{CLEARANCE_CONSTRAINT.reserve - contact.distance:.5f} m too small"
             )
             result[k] = InvalidReason(message, contact, contact.distance >= 0 and result[k] is None)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
@@ -89,7 +90,7 @@ def raise_if_none_is_left(
     if overloads:
         raise min(overloads, key=lambda error: error.needed / error.available)
     colliding = [
-        CollidingBranch(label, target, q, cause.pair, RESERVE - cause.distance)
+        CollidingBranch(label, target, q, cause.pair, CLEARANCE_CONSTRAINT.reserve - cause.distance)
         for (label, target, q), cause in zip(branches, causes, strict=True)
         if isinstance(cause, ClosestPair)
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from joulepath.optimizer.motion.quadrature import GRID_PERIOD
+from joulepath.optimizer.motion.quadrature import QUADRATURE
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
 
@@ -48,7 +48,7 @@ def finishing_time(problem: Problem, duration: float, candidates: int) -> float:
         arm.tool_cone is not None or arm.tcp_speed is not None or arm.elbow_speed is not None
     )
     per_instant = FINISHING.per_instant + FINISHING.per_constrained_instant * constrained
-    certificate = duration / GRID_PERIOD * per_instant
+    certificate = duration / QUADRATURE.grid_period * per_instant
     least = min(FINISHING.least_share * problem.deadline, FINISHING.least)
     needed = least + certificate + _report_time(problem, duration, candidates)
     return min(needed, FINISHING.most_share * problem.deadline)

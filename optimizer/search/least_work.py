@@ -20,7 +20,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import DeadlinePassed, watch
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.attempts import in_time, solver_of
@@ -134,7 +134,9 @@ class _LeastWorkSearch:
         self, guesses: Sequence[CoarseMotion], count: int, progress: float
     ) -> list[CoarseMotion]:
         """Coarse motions from guesses on `count` control points."""
-        return self.solver.solved(guesses, count, WIDTH, progress, LEAST_WORK.behind_ratio)
+        return self.solver.solved(
+            guesses, count, SMOOTHING.power_width, progress, LEAST_WORK.behind_ratio
+        )
 
     def _solve_in_middle_space(self, guesses: Sequence[CoarseMotion]) -> list[CoarseMotion]:
         """Coarse motions from guesses on more control points, which candidates keep."""
@@ -232,7 +234,7 @@ class _LeastWorkSearch:
 
         result = in_time(state, sharpen)
         if result.spline is None and result.status is not SolveStatus.PRUNED and found:
-            width, progress = SHARPER_WIDTHS[-1], SHARPENING.last_progress
+            width, progress = SMOOTHING.sharper_power_widths[-1], SHARPENING.last_progress
             return self._solved(motion, found[0], width, progress)
         if result.spline is not None:
             energy = state.prepared.energy(result.spline)
@@ -252,7 +254,9 @@ class _LeastWorkSearch:
                 self.tried.add(candidate)
                 points = motion.on(SHARPENING.middle_points)
                 below = above(least, LEAST_WORK.colliding_ratio)
-                result = self._solved(motion, points, WIDTH, SHARPENING.progress, below)
+                result = self._solved(
+                    motion, points, SMOOTHING.power_width, SHARPENING.progress, below
+                )
                 worth = above(least, LEAST_WORK.sharpening_ratio)
                 if result.spline is not None and (candidate.energy or np.inf) < worth:
                     follow_in_time(self.state, candidate, least)

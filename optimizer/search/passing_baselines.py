@@ -12,7 +12,7 @@ import numpy as np
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.search.baselines import baselines, saving
 
@@ -35,7 +35,7 @@ def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -
         {
             each.name: each
             for each in baselines(
-                problem, a, b[None], max(end - begin, LEAST_DURATION), ours, *oracle
+                problem, a, b[None], max(end - begin, DURATIONS.least), ours, *oracle
             )
         }
         for (a, b), (begin, end) in zip(pairwise(q), pairwise(times), strict=True)

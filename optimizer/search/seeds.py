@@ -15,12 +15,12 @@ from itertools import pairwise
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.dynamics.dwell import brake_power, waits
+from joulepath.optimizer.dynamics.dwell import brake_power, holding_times
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.solve.methods.method import above
@@ -144,7 +144,7 @@ def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Arra
     problem = prepared.problem
     if problem.dwell is None or _is_work(problem):
         return np.zeros(len(durations))
-    by_motors, by_brakes = np.array([waits(problem.dwell, T) for T in durations.tolist()]).T
+    by_motors, by_brakes = np.array([holding_times(problem.dwell, T) for T in durations.tolist()]).T
     return np.asarray(
         prepared.holding_power(q_goal) * by_motors
         + brake_power(problem.dwell, prepared.arm) * by_brakes
@@ -162,8 +162,8 @@ def _durations(problem: Problem, shortest: Array, scales: Sequence[float]) -> li
         shortest: shortest durations, shape (n,) [s].
         scales: multiples of the shortest durations.
     """
-    least = LEAST_DURATION if problem.duration_min is None else problem.duration_min
-    most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    least = DURATIONS.least if problem.duration_min is None else problem.duration_min
+    most = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     if problem.dwell is not None:
         most = min(most, problem.dwell.time)
     if least == most:

@@ -1,11 +1,12 @@
 """Refinement of motions whose cost has a corner in every joint's power.
 
 The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j,
-0). The NLP smooths these corners over `WIDTH`. Because every joint has one, the optimum of the
-smoothed cost lies some percent above the least energy. Sharp corners from the start would leave the
-SQP in poor local optima. So the optimum is followed from one width to the next, in a space fine
-enough for the short pushes of such motions. On an isolated bus, it is followed back to the first
-width in between: sharp corners hold a motion in an optimum that smooth corners lead out of.
+0). The NLP smooths these corners over `SMOOTHING.power_width`. Because every joint has one, the
+optimum of the smoothed cost lies some percent above the least energy. Sharp corners from the start
+would leave the SQP in poor local optima. So the optimum is followed from one width to the next, in
+a space fine enough for the short pushes of such motions. On an isolated bus, it is followed back to
+the first width in between: sharp corners hold a motion in an optimum that smooth corners lead out
+of.
 
 The mechanical work of a motion has many local optima. As rest costs nothing, the best of them
 swing, push and rest, which few control points hardly represent. Coarse solves from random motions
@@ -21,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS, WIDTH, has_corners
+from joulepath.optimizer.dynamics.plant import SMOOTHING, has_corners
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.motion.time_scalings import quintic_spline
@@ -93,8 +94,8 @@ class SharpeningSettings:
     def steps(self) -> tuple[CornerStep, ...]:
         """Solves that follow a motion of least mechanical work."""
         return (
-            CornerStep(SHARPER_WIDTHS[0], self.progress),
-            CornerStep(SHARPER_WIDTHS[1], self.last_progress),
+            CornerStep(SMOOTHING.sharper_power_widths[0], self.progress),
+            CornerStep(SMOOTHING.sharper_power_widths[1], self.last_progress),
         )
 
     @property
@@ -104,9 +105,9 @@ class SharpeningSettings:
         With corners that only become sharper, two of 20 motions ended 0.5 and 0.6 % too high.
         """
         return (
-            CornerStep(SHARPER_WIDTHS[0], self.progress),
-            CornerStep(WIDTH, self.last_progress),
-            CornerStep(SHARPER_WIDTHS[0], self.last_progress),
+            CornerStep(SMOOTHING.sharper_power_widths[0], self.progress),
+            CornerStep(SMOOTHING.power_width, self.last_progress),
+            CornerStep(SMOOTHING.sharper_power_widths[0], self.last_progress),
         )
 
 
@@ -207,7 +208,9 @@ class _Follower:
         cost_of = self.state.prepared.cost_of
         coarse = sorted(self._restarted(restarts), key=cost_of)[: SHARPENING.followed]
         middle = [
-            self.solved(motion, WIDTH, SHARPENING.middle_points, SHARPENING.progress)
+            self.solved(
+                motion, SMOOTHING.power_width, SHARPENING.middle_points, SHARPENING.progress
+            )
             for motion in coarse
         ]
         best: Spline | None = min(
@@ -226,7 +229,7 @@ class _Follower:
     def solve_in_middle_space(self) -> None:
         """Solve from the candidate's motion in the middle space, with wide corners."""
         motion = self.candidate.spline
-        self.solved(motion, WIDTH, SHARPENING.middle_points, SHARPENING.progress)
+        self.solved(motion, SMOOTHING.power_width, SHARPENING.middle_points, SHARPENING.progress)
 
     def solve_around(self, coarse: Spline) -> None:
         """Solve from a coarse motion in fixed durations around the duration of the candidate's
@@ -238,7 +241,7 @@ class _Follower:
             if interval.t_min < duration < interval.t_max:
                 q, t = sampled(lasting(coarse, duration))
                 count, progress = SHARPENING.middle_points, SHARPENING.progress
-                self._from_samples(q, t, WIDTH, count, progress, fixed=True)
+                self._from_samples(q, t, SMOOTHING.power_width, count, progress, fixed=True)
 
     def _restarted(self, count: int) -> list[Spline]:
         """Coarse motions from random displacements of the rest-to-rest quintic."""
@@ -250,7 +253,7 @@ class _Follower:
         for each in random_displacements(limits, line.duration, t / line.duration, count):
             guess = np.clip(q + each, limits.q_min, limits.q_max)
             motion = self._from_samples(
-                guess, t, WIDTH, SHARPENING.coarse_points, SHARPENING.progress
+                guess, t, SMOOTHING.power_width, SHARPENING.coarse_points, SHARPENING.progress
             )
             if motion is not None:
                 found.append(motion)
@@ -295,7 +298,7 @@ class _Follower:
             state.accept_if_better(candidate, result, state.prepared.energy(result.spline))
         return result.spline
 
-    def _interval(self, duration: float, width: float = WIDTH) -> DurationInterval:
+    def _interval(self, duration: float, width: float = SMOOTHING.power_width) -> DurationInterval:
         """The interval of durations around a duration [s]; for mechanical work, the longest
         duration.
 

@@ -14,7 +14,7 @@ from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.motion.spline import Spline, lasting
 from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
+from joulepath.optimizer.problem.problem import DURATIONS, Problem, narrowed
 from joulepath.optimizer.progress import (
     CandidatesFound,
     CandidateTried,
@@ -224,7 +224,7 @@ class SearchState:
     @property
     def _durations(self) -> tuple[float, float]:
         """Least and greatest duration that the problem allows [s]."""
-        return self.problem.duration_min or LEAST_DURATION, self.problem.duration_max or np.inf
+        return self.problem.duration_min or DURATIONS.least, self.problem.duration_max or np.inf
 
     def allows(self, duration: float) -> bool:
         """Whether the problem allows a duration [s], up to rounding.

@@ -22,7 +22,7 @@ from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import LEAST_DURATION, MethodName, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, MethodName, Problem
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.solve.methods.fastest_motion import FastestSettings
@@ -218,10 +218,10 @@ def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_equal_ends_take_the_least_duration() -> None:
-    error = refused(problem(goal=START), LEAST_DURATION / 2)
+    error = refused(problem(goal=START), DURATIONS.least / 2)
     # the time of a motion that stands still is divided and multiplied again
-    assert named(error) == pytest.approx(LEAST_DURATION, rel=1e-12)
-    assert error.bound == LEAST_DURATION and error.proven
+    assert named(error) == pytest.approx(DURATIONS.least, rel=1e-12)
+    assert error.bound == DURATIONS.least and error.proven
 
 
 @pytest.mark.long

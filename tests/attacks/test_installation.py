@@ -28,7 +28,7 @@ import pytest
 from joulepath.app.cli.answer import compile_kernel_of
 from joulepath.app.exceptions.queue import ClusterUnavailable
 from joulepath.optimizer.native import library_cache
-from joulepath.optimizer.native.library_cache import Patience
+from joulepath.optimizer.native.library_cache import CacheSettings
 from tests.app.cluster.test_link import scheduler_process
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import ROOT, WARM_UP, serving, until
@@ -88,11 +88,7 @@ def post(
 
 def loaded_files(get: Callable[[str], str]) -> set[str]:
     """The paths of all files that the studio page loads; `get` gives the text of each, or fails."""
-    page = get("studio")
-    names = json.loads(re.findall(r'<script type="importmap">(.*?)</script>', page, re.S)[0])[
-        "imports"
-    ]
-    waiting = re.findall(r'(?:href|src)="(studio/[^"]+)"', page)
+    waiting = re.findall(r'(?:href|src)="(studio/[^"]+)"', get("studio"))
     found = set[str]()
     while waiting:
         path = waiting.pop()
@@ -101,22 +97,8 @@ def loaded_files(get: Callable[[str], str]) -> set[str]:
         found.add(path)
         text = get(path)
         if path.endswith(".js"):
-            imports = re.findall(
-                r"""^\s*(?:import|export)\s*(?:[\w$*{}\s,]+?\bfrom\s*)?['"]([^'"]+)['"]""",
-                text,
-                re.M,
-            )
-            imports += re.findall(r"""\bimport\(\s*['"]([^'"]+)['"]\s*\)""", text)
-            for name in imports:
-                known = next(
-                    (key for key in sorted(names, key=len, reverse=True) if name.startswith(key)),
-                    None,
-                )
-                waiting.append(
-                    urljoin(path, name)
-                    if known is None
-                    else names[known].removeprefix("./") + name[len(known) :]
-                )
+            names = re.findall(r"""(?:\bfrom|\bimport)\s*\(?\s*["'`](\./[\w.-]+)["'`]""", text)
+            waiting += [urljoin(path, name) for name in names]
     return found
 
 
@@ -128,10 +110,9 @@ def check_studio(url: str) -> None:
             assert answer.status == 200
             return str(answer.read().decode())
 
-    found = loaded_files(get)
-    # the style sheet and the script of one library, and what the script of the other one imports
-    assert sum("/vendor/" in path for path in found) >= 7
-    get("studio/vendor/three/examples/jsm/loaders/GLTFLoader.js")
+    assert loaded_files(get) >= {
+        f"studio/{name}" for name in ("main.js", "style.css", "GLTFLoader.js", "STLLoader.js")
+    }
 
 
 @pytest.fixture(scope="module")
@@ -235,15 +216,17 @@ def test_the_source_archive_has_what_its_wheel_needs(clone: Path, tmp_path: Path
 def test_a_wheel_that_would_have_no_studio_is_not_built(clone: Path, tmp_path: Path) -> None:
     """What is left of an interrupted attempt, or is of other versions, counts as missing."""
     source = copy_of(clone, tmp_path)
-    vendor = source / "app" / "static" / "studio" / "vendor"
-    (vendor / "three").mkdir(parents=True)
+    page = source / "app" / "static" / "studio"
+    page.mkdir(parents=True)
+    (page / "main.js").touch()
     unreachable = {"NPM_CONFIG_REGISTRY": "http://127.0.0.1:9", "NPM_CONFIG_FETCH_RETRIES": "0"}
     done = build(source, tmp_path / "wheels", **unreachable)
     assert done.returncode != 0 and not list(tmp_path.glob("wheels/*.whl"))
     said = done.stdout + done.stderr
-    assert "The libraries of the studio page cannot be fetched" in said and "ECONNREFUSED" in said
+    assert "The studio page cannot be built" in said and "ECONNREFUSED" in said
     assert "NPM_CONFIG_REGISTRY" in said
-    assert sorted(path.name for path in vendor.parent.glob("*vendor*")) == ["vendor"]
+    assert [path.name for path in page.iterdir()] == ["main.js"]
+    assert not list(page.parent.glob(".studio-*"))
 
 
 def deployment_steps() -> str:
@@ -405,7 +388,7 @@ def test_a_command_gives_a_hung_compiler_up(
     monkeypatch.setenv("CC", str(compiler))
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("JOULEPATH_DATABASE_URL", f"sqlite:///{tmp_path}/joulepath.db")
-    monkeypatch.setattr(library_cache, "PATIENCE", replace(Patience(), command=0.3))
+    monkeypatch.setattr(library_cache, "CACHE", replace(CacheSettings(), command_timeout=0.3))
     for reason in ("does not end within 0.3 s", "hung"):
         compile_kernel_of("ur5e")
         said = capsys.readouterr().err

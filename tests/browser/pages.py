@@ -5,6 +5,7 @@ to elsewhere.
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,12 +19,16 @@ FIRST = json.loads((ROOT / "examples" / "optimize" / "bin_to_shelf.json").read_t
 """The request of the first visit."""
 PATIENCE = 1000 * ANSWER  # [ms]
 expect.set_options(timeout=PATIENCE)
-SHOWN = "() => Boolean(window.studio?.state.answer && (window.studio.view?.frames ?? 1))"
+SHOWN = (
+    "() => Boolean(window.studio?.state.answered && !studio.state.run && "
+    "(window.studio.view?.frames ?? 1))"
+)
 # what is drawn from figures has texture coordinates, the meshes have none
 MESHES = (
-    "() => Boolean(window.studio?.view?.arms) && "
+    "() => Boolean(window.studio?.view?.arms.length) && "
     "!studio.view.arms[0].drawn[0].geometry.hasAttribute('uv')"
 )
+AXE = (ROOT / "app" / "studio" / "node_modules" / "axe-core" / "axe.min.js").read_text("utf-8")
 
 
 def until(page: Page, condition: str, patience: float = ANSWER) -> None:
@@ -32,12 +37,8 @@ def until(page: Page, condition: str, patience: float = ANSWER) -> None:
     """
     end = time.monotonic() + patience
     while not page.evaluate(condition):
-        told = (
-            [page.locator(box).inner_text() for box in ("#problem", "#status")]
-            if time.monotonic() > end
-            else None
-        )
-        assert told is None, (condition, *told)
+        told = page.evaluate("() => window.studio?.state.trouble")
+        assert time.monotonic() < end, (condition, told)
         page.wait_for_timeout(20)
 
 
@@ -45,24 +46,58 @@ def state(page: Page, what: str) -> Any:
     return page.evaluate(f"() => studio.state.{what}")
 
 
-def show(page: Page, tab: str) -> None:
-    page.locator(f"#tab-{tab}").click()
+def show_json(page: Page, shown: bool = True) -> None:
+    """Shows the request as JSON, or as the task panel."""
+    if (page.locator("#json-toggle").get_attribute("aria-pressed") == "true") != shown:
+        page.locator("#json-toggle").click()
+
+
+def fill_json(page: Page, body: dict[str, Any] | str) -> None:
+    """Puts a request, or any text, into the JSON editor."""
+    show_json(page)
+    page.locator("#json").fill(body if isinstance(body, str) else json.dumps(body))
+    page.locator("#json").blur()
 
 
 def ask(page: Page, body: dict[str, Any]) -> None:
     """Sends a body from the page, and waits for the answer."""
-    before = state(page, "answer.id")
-    show(page, "json")
-    page.locator("#json").fill(json.dumps(body))
-    page.locator("#json").blur()
+    before = state(page, "answered?.solution.id")
+    fill_json(page, body)
     page.locator("#optimise").click()
-    until(page, f"() => studio.state.answer.id !== '{before}'")
+    until(
+        page,
+        f"() => !studio.state.run && studio.state.answered?.solution.id !== '{before}'",
+    )
+    show_json(page, False)
+
+
+def type_into(page: Page, pointer: str, text: str) -> None:
+    """Types a number into the cell of a field of the request."""
+    cell = page.locator(f"[data-pointer='{pointer}']")
+    cell.fill(text)
+    cell.press("Enter")
+
+
+def go(page: Page, name: str) -> None:
+    """Opens a page of the studio by its name in the bar."""
+    page.locator("nav.pages").get_by_role("button", name=name, exact=True).click()
+
+
+def findings(page: Page) -> list[str]:
+    """Serious findings of axe on what is seen."""
+    page.evaluate(AXE)
+    found = page.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    return [
+        f"{each['id']}: {[node['html'][:160] for node in each['nodes'][:3]]}"
+        for each in found["violations"]
+        if each["impact"] in ("serious", "critical")
+    ]
 
 
 @contextmanager
 def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
-    """A page of a fresh context, at 1024 x 640, whose errors and foreign requests fail the test."""
-    options = {"viewport": {"width": 1024, "height": 640}, "reduced_motion": "reduce", **options}
+    """A page of a fresh context, at 1280 x 800, whose errors and foreign requests fail the test."""
+    options = {"viewport": {"width": 1280, "height": 800}, "reduced_motion": "reduce", **options}
     context = browser.new_context(accept_downloads=True, **options)
     page = context.new_page()
     page.set_default_timeout(PATIENCE)
@@ -81,6 +116,7 @@ def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
     page.goto(url)
     yield page
     context.close()
-    # Chromium itself says of a refused request that it failed: that is what these tests provoke
-    left = [fault for fault in faults if "status of 4" not in fault]
+    # Chromium itself says of a refused request that it failed: that is what these tests provoke.
+    # On a busy machine, a posture may pass the deadline of its motion.
+    left = [fault for fault in faults if not re.search("status of (4|504)", fault)]
     assert not left, left

@@ -1,5 +1,5 @@
-"""The studio page in a real browser: how one asks, by form, by JSON and by hand, and what is said
-of errors.
+"""The studio page in a real browser: how one asks, by the task panel, by JSON and by hand, and what
+is said of errors.
 """
 
 from __future__ import annotations
@@ -14,7 +14,19 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.app.live import ROOT, Server
 from tests.app.requests import EXAMPLES, NEAR, long_search, move
-from tests.browser.pages import FIRST, MESHES, SHOWN, ask, opened, show, state, until
+from tests.browser.pages import (
+    FIRST,
+    MESHES,
+    SHOWN,
+    ask,
+    fill_json,
+    go,
+    opened,
+    show_json,
+    state,
+    type_into,
+    until,
+)
 from tests.browsers import BROWSER, MISSING
 
 ROUNDING = 1e-9  # s; sums of times in double precision
@@ -26,7 +38,8 @@ GHOSTS = "() => studio.view.parts.ghosts.children.length"
 BEST = """() => {
     const { parts, chain } = studio.view;
     const flange = parts.ghosts.children.at(-1).children.at(-1).matrix.clone().transpose();
-    return [flange.elements, chain.frames(studio.state.best.q_goal).at(-1)];
+    const best = studio.state.run?.incumbents.at(-1)?.q_goal ?? studio.reached();
+    return [flange.elements, chain.frames(best).at(-1)];
 }"""
 
 
@@ -39,26 +52,18 @@ CARRIED = """() => {
 }"""
 
 
-def edit(page: Page, text: str) -> None:
-    """Puts a text into the field of the request, whether it is seen or not."""
-    page.locator("#json").evaluate(
-        "(it, text) => { it.value = text; it.dispatchEvent(new Event('change')); }", text
-    )
-
-
 def test_a_wrong_request_is_explained(page: Page) -> None:
-    show(page, "json")
-    page.locator("#json").fill(json.dumps({**FIRST, "sample_period": -1}))
-    page.locator("#json").blur()
+    fill_json(page, {**FIRST, "sample_period": -1})
     page.locator("#optimise").click()
     expect(page.locator("#problem")).to_contain_text("sample_period")
     assert page.locator("#problem a").get_attribute("href") == "problems/invalid-request"
     for text in ("{", "3", '"x"', "null", "[]"):
-        edit(page, text)
-        expect(page.locator("#problem")).to_contain_text("no request")
+        fill_json(page, text)
+        expect(page.locator("#json-error")).to_contain_text("no request")
         expect(page.locator("#optimise")).to_be_disabled()
-    edit(page, json.dumps(FIRST))
-    expect(page.locator("#problem")).to_be_hidden()
+    fill_json(page, FIRST)
+    expect(page.locator("#json-error")).to_have_count(0)
+    expect(page.locator("#problem")).to_have_count(0)
     expect(page.locator("#optimise")).to_be_enabled()
 
 
@@ -82,64 +87,67 @@ WRONG: list[dict[str, Any]] = [
 
 
 def test_values_of_wrong_types_are_shown(page: Page) -> None:
-    """Until the service says what is wrong with them, in the form as it is sent from JSON."""
-    show(page, "form")
+    """Until the service says what is wrong with them, in the panel as it is sent from JSON."""
     for wrong in WRONG:
-        edit(page, json.dumps({**FIRST, **wrong}))
-        (name,) = wrong
-        expect(page.locator(f"#form [data-path='{name}']")).to_be_attached()
-        assert state(page, "request") == {**FIRST, **wrong}
-        expect(page.locator("#problem")).to_be_hidden()
-    show(page, "json")
-    edit(page, json.dumps({**FIRST, "payload": "x"}))
+        body = {**FIRST, **wrong}
+        fill_json(page, body)
+        show_json(page, False)
+        expect(page.locator("#targets")).to_be_attached()
+        assert state(page, "request") == body
+        expect(page.locator("#problem")).to_have_count(0)
+    fill_json(page, {**FIRST, "payload": "x"})
     page.locator("#optimise").click()
     expect(page.locator("#problem")).to_contain_text("payload")
-    show(page, "form")
-    expect(page.locator("[data-path='payload'] .error")).to_be_visible()
-    edit(page, json.dumps(FIRST))
+    show_json(page, False)
+    expect(page.get_by_label("Tool and payload").locator(".error").first).to_be_visible()
+    fill_json(page, FIRST)
+    show_json(page, False)
 
 
-def test_the_form_keeps_every_example(page: Page) -> None:
-    """What the form shows, it does not change; what is changed in it comes back."""
-    show(page, "form")
+def test_the_panel_keeps_every_example(page: Page) -> None:
+    """What the panel shows, it does not change; what is changed in it comes back."""
     for name, body in EXAMPLES.items():
-        edit(page, json.dumps(body))
-        until(page, "() => document.querySelectorAll('#form > .fields > *').length > 2")
+        fill_json(page, body)
+        show_json(page, False)
         assert state(page, "request") == body, name
-        field = page.get_by_label("deadline in s", exact=True)
-        field.fill("77")
-        field.blur()
+        page.locator("#more > summary").click()
+        type_into(page, "/deadline", "77")
         assert state(page, "request") == body | {"deadline": 77}, name
-    field.fill(str(body["deadline"]))
-    field.blur()
-    assert state(page, "request") == body
-    angle = page.locator("#form [data-path^='start.q'] input").nth(1)
-    angle.fill("-90")
-    angle.blur()
+        page.locator("#undo").click()
+        assert state(page, "request") == body, name
+    fill_json(page, move())
+    show_json(page, False)
+    type_into(page, "/start/q/1", "-90")
     assert state(page, "request")["start"]["q"][1] == pytest.approx(-np.pi / 2)
-    page.get_by_label("Remove deadline").click()
-    assert "deadline" not in state(page, "request")
-    page.get_by_label("Add a field", exact=True).select_option("payload")
-    assert state(page, "request")["payload"]["mass"] > 0
+    assert page.locator("[data-pointer='/start/q/1']").input_value() == "-90"
+    type_into(page, "/payload/mass", "1,5")
+    assert state(page, "request")["payload"]["mass"] == 1.5
+    type_into(page, "/payload/mass", "many")
+    expect(page.get_by_label("Tool and payload")).to_contain_text("No number")
+    assert state(page, "request")["payload"]["mass"] == 1.5
+    type_into(page, "/payload/mass", "0")
+    assert "payload" not in state(page, "request")
 
 
-def test_an_error_stands_beside_its_field(page: Page) -> None:
-    show(page, "form")
-    page.get_by_label("Add a field to payload").select_option("shape")
-    page.get_by_label("mass in kg").fill("-1")
-    page.get_by_label("mass in kg").blur()
+def test_an_error_stands_at_its_field(page: Page) -> None:
+    fill_json(page, FIRST)
+    show_json(page, False)
+    type_into(page, "/payload/mass", "-1")
     page.locator("#optimise").click()
-    expect(page.locator("[data-path='payload.mass'] .error")).to_be_visible()
-    expect(page.locator("#form .error")).to_have_count(1)
+    cell = page.locator("[data-pointer='/payload/mass']")
+    expect(cell).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_label("Tool and payload").locator(".error")).to_have_count(1)
+    page.locator("#undo").click()
 
 
 def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server) -> None:
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
-        page.locator("#drag").select_option("goal")
-        until(page, "() => studio.view.handle.position.length() > 0")
+        page.get_by_role("toolbar", name="By hand").get_by_role("button", name="Drag").click()
+        page.locator("#drag").select_option("/goal")
+        until(page, "() => studio.view.drag.handle.position.length() > 0")
         x, y = page.evaluate("""() => {
-            const at = studio.view.handle.position.clone().project(studio.view.camera);
+            const at = studio.view.drag.handle.position.clone().project(studio.view.camera);
             const box = studio.view.renderer.domElement.getBoundingClientRect();
             return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
         }""")
@@ -151,9 +159,9 @@ def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server)
         until(page, f"() => ({GHOSTS})() === 3")
         drawn, chain = page.evaluate(BEST)
         assert drawn == pytest.approx(chain)
-        page.mouse.move(x, y - 600, steps=3)
+        page.mouse.move(x, y - 700, steps=3)
         expect(page.locator("#drag-note")).to_contain_text("out of reach")
-        until(page, "() => studio.state.best === null")
+        until(page, "() => studio.reached() === null")
         page.mouse.move(x - 8, y - 8, steps=3)
         page.mouse.up()
         expect(page.locator("#drag-note")).to_contain_text("Reached by")
@@ -174,49 +182,56 @@ def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server)
 
 
 def test_an_export_of_the_service_is_offered(page: Page) -> None:
-    page.locator("#downloads > summary").click()
+    """Slow at first, and with an output that the gripper is on."""
+    fill_json(page, FIRST)
+    show_json(page, False)
+    page.locator("#export").click()
+    expect(page.locator("#preview")).to_contain_text("0.1 of its speed")
+    page.get_by_label("Gripper output").select_option("0")
+    page.locator("[data-format=movej]").click()
+    expect(page.locator("#preview")).to_contain_text("movej([")
+    page.locator("[data-format=urscript]").click()
+    expect(page.locator("[data-format=krl]")).to_be_disabled()
+    expect(page.locator("#download")).to_contain_text("speed-0.1")
     with page.expect_download() as download:
-        page.get_by_role("button", name="urscript").click()
+        page.locator("#download").click()
     assert "servoj" in Path(download.value.path()).read_text()
     expect(page.locator("#status")).to_contain_text("safety limits")
+    page.get_by_role("button", name="Close").click()
 
 
 def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
     """The search of minutes tells its best energy; after a cancel its worker is free."""
-    show(page, "json")
-    page.locator("#json").fill(json.dumps(long_search(100.0)))
-    page.locator("#json").blur()
+    fill_json(page, long_search(100.0))
     page.locator("#optimise").click()
-    expect(page.locator("#progress-text")).to_contain_text("best")
-    # start, goal, and the best goal so far, where the service says
-    until(page, "() => Boolean(studio.state.best)")
+    expect(page.locator("#progress-text")).to_contain_text("Best so far")
+    # the goal, and the best goal so far, where the service says
+    until(page, "() => Boolean(studio.state.run?.incumbents.length)")
     drawn, chain = page.evaluate(BEST)
-    assert page.evaluate(GHOSTS) == 3 and drawn == pytest.approx(chain)
+    assert drawn == pytest.approx(chain)
     page.locator("#cancel").click()
     expect(page.locator("#status")).to_have_text("Cancelled.")
-    assert page.evaluate(GHOSTS) == 2
+    assert state(page, "run") is None
     assert service.post("/optimize", move()).status_code == 200
 
 
 def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page) -> None:
-    show(page, "json")
-    page.locator("#json").fill((ROOT / "examples" / "cycle" / "press_tending.json").read_text())
-    page.locator("#json").blur()
-    page.locator("#optimise").click()
+    body = json.loads((ROOT / "examples" / "cycle" / "press_tending.json").read_text())
+    ask(page, body)
     expect(page.locator("#timeline .leg").first).to_be_visible()
-    legs = state(page, "cycle.legs")
+    legs = state(page, "answered.cycle.legs")
     assert page.locator("#timeline .leg").count() == len(legs)
     t, q = (
-        np.array(state(page, "answer.trajectory.t")),
-        np.array(state(page, "answer.trajectory.q")),
+        np.array(state(page, "answered.solution.trajectory.t")),
+        np.array(state(page, "answered.solution.trajectory.q")),
     )
     assert (
         t[0] == 0
-        and t[-1] == pytest.approx(state(page, "cycle.duration"))
+        and t[-1] == pytest.approx(state(page, "answered.cycle.duration"))
         and (np.diff(t) > -ROUNDING).all()
     )
     assert np.abs(np.diff(q, axis=0)).max() < 0.1
-    assert page.locator("#timeline tbody tr").count() == len(legs)
+    assert page.locator("#legs tbody tr").count() == len(legs)
     for k, leg in enumerate(legs):
         page.locator("#timeline .leg").nth(k).click()
         assert state(page, "time") == pytest.approx(leg["t0"])
@@ -224,14 +239,16 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
             "what it carries on this leg is drawn"
         )
     expect(page.locator(".label.stop", has_text="finished")).to_be_visible()
-    kept = state(page, "cycle.answer").removeprefix("/answers/")
+    kept = state(page, "answered.cycle.id")
     with opened(browser, f"{service.url}/studio#answer={kept}") as other:
         until(other, SHOWN)
         assert other.locator("#timeline .leg").count() == len(legs)
-        expect(other.locator("#optimise")).to_be_disabled()
-        other.locator("#share").click()
-        expect(other.locator("#status")).not_to_be_empty()
-        assert other.url.endswith(f"#answer={kept}"), "its request is not known"
+        expect(other.locator("#status")).to_contain_text("joints of the answer")
+    # this browser knows what was asked for
+    page.goto("about:blank")
+    page.goto(f"{service.url}/studio#answer={kept}")
+    until(page, f"() => window.studio?.state.answered?.cycle?.id === '{kept}'")
+    assert state(page, "request") == body and not state(page, "stale")
 
 
 def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
@@ -242,7 +259,7 @@ def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
     )
     part = f"studio.view.parts.obstacles.children[{names.index('part')}]"
     faint = []
-    for k, leg in enumerate(legs := state(page, "cycle.legs")):
+    for k, leg in enumerate(legs := state(page, "answered.cycle.legs")):
         page.locator("#timeline .leg").nth(k).click()
         assert state(page, "time") == pytest.approx(leg["t0"])
         page.evaluate("() => studio.view.render()")
@@ -257,28 +274,33 @@ def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
     """An answer of a study, and one that this browser has seen."""
     created = service.post("/studies", {"name": "press", "robot": "ur5e", "threshold": 60.0}).json()
     service.post(f"/studies/{created['id']}/iterations", {"optimize": move()})
-    show(page, "kept")
-    page.locator("#pane-kept li button", has_text="press").click()
-    expect(page.get_by_role("button", name="← all")).to_be_visible()
-    page.locator("#pane-kept li button").first.click()
-    until(page, "() => studio.state.cycle === null")
-    assert state(page, "answer.branch.goal.q") == pytest.approx(NEAR)
-    page.get_by_role("button", name="← all").click()
-    page.locator("#pane-kept li button", has_text=" J, ").nth(1).click()
-    until(page, f"() => Math.abs(studio.state.answer.branch.goal.q[0] - {NEAR[0]}) > 0.01")
+    go(page, "Library")
+    page.locator("#studies button", has_text="press").click()
+    page.locator("#iterations button").first.click()
+    until(page, "() => studio.state.page === 'cell' && studio.state.answered?.cycle === null")
+    assert state(page, "answered.solution.branch.goal.q") == pytest.approx(NEAR)
+    assert not state(page, "stale")
+    go(page, "Library")
+    page.get_by_label("Search answers").fill("round")
+    page.locator("#answers button.choice").first.click()
+    until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.answered?.cycle)")
 
 
-def test_a_page_stands_alone(browser: Browser, page: Page, tmp_path: Path) -> None:
+def test_a_page_stands_alone(browser: Browser, service: Server, tmp_path: Path) -> None:
     """Opened from a file, with no service and no network."""
-    page.locator("#downloads > summary").click()
-    with page.expect_download() as download:
-        page.get_by_role("button", name="Page that stands alone").click()
-    file = tmp_path / "motion.html"
-    download.value.save_as(file)
-    energy = page.locator("#joules").inner_text()
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        page.locator("#export").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Page that stands alone").click()
+        file = tmp_path / "motion.html"
+        download.value.save_as(file)
+        energy = page.locator("#joules").inner_text()
     with opened(browser, f"file://{file}", offline=True) as alone:
         until(alone, SHOWN)
         until(alone, MESHES)
         assert alone.locator("#joules").inner_text() == energy
+        alone.get_by_role("tab", name="Use of limits").click()
         alone.locator("#limits button").first.click()
         assert np.isfinite(alone.evaluate("() => studio.tcp()")).all()
+        expect(alone.locator("#task")).to_have_count(0)

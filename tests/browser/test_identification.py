@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from joulepath.models.registry import load_robot
 from tests.app.live import ANSWER, CLIENT, Server
-from tests.browser.pages import SHOWN, ask, opened, show, state, until
+from tests.browser.pages import SHOWN, ask, go, opened, state, until
 from tests.browser.test_reading import CONTRASTS, LEAST
 from tests.browsers import BROWSER, MISSING
 from tests.identification_logs import csv_of, recorded, truth_of
@@ -25,17 +25,14 @@ ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
 # relative; the page shows three digits
 DIGITS = 0.006
-OPENED = "() => !document.getElementById('identification').hidden"
+OPENED = "() => Boolean(document.getElementById('identification'))"
 
 
-def send(page: Page) -> None:
-    page.locator("#optimise").click()
-
-
-def choose_log(page: Page, file: Path) -> None:
-    show(page, "kept")
-    page.get_by_label("Add a log").set_input_files(file)
-    until(page, f"() => studio.state.request.log === '{file.name}'")
+def add_log(page: Page, file: Path) -> None:
+    """Chooses a file, and adds it as it is."""
+    go(page, "Logs")
+    page.locator("#log-file").set_input_files(file)
+    page.locator("#add-log").click()
 
 
 def last(service: Server) -> dict[str, Any]:
@@ -47,7 +44,7 @@ def last(service: Server) -> dict[str, Any]:
 
 def shown_rms(page: Page, name: str) -> float:
     """What the page says of the residuals of one curve."""
-    title = page.locator("#identification h3", has_text=re.compile(rf"^{name}")).inner_text()
+    title = page.locator("#identification h4", has_text=re.compile(rf"^{name}")).inner_text()
     found = re.search(r"residual ([\d.]+)", title)
     assert found is not None, title
     return float(found[1])
@@ -76,14 +73,12 @@ def test_a_log_becomes_figures_that_the_next_motion_has(
 ) -> None:
     file = tmp_path / "monday.csv"
     file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=6)))
-    choose_log(page, file)
-    send(page)
-    until(page, "() => Boolean(studio.state.request.logs)")
-    expect(page.locator("#status")).to_contain_text("No payload is given")
-    send(page)
+    add_log(page, file)
+    expect(page.locator("#logs .content")).to_contain_text("No payload is given")
+    page.locator("#identify").click()
     until(page, OPENED)
     found = last(service)
-    assert found["state"] == "done" and state(page, "request.logs") == [found["moves"][0]["log"]]
+    assert found["state"] == "done"
     box = page.locator("#identification")
     expect(box.locator(".u-wrap")).to_have_count(ROBOT.nq + 1)
     assert shown_rms(page, "shoulder lift") == pytest.approx(rms(found["moves"], 1), rel=DIGITS)
@@ -108,7 +103,7 @@ def test_a_log_becomes_figures_that_the_next_motion_has(
     # on a busy machine, the usual deadline may pass without an answer: these figures need a kernel
     # of their own
     ask(page, state(page, "request") | {"deadline": ANSWER})
-    assert state(page, "asked.figures") == found["figures"]
+    assert state(page, "answered.asked.figures") == found["figures"]
 
 
 def test_moves_are_chosen_and_those_held_out_are_named(browser: Browser, service: Server) -> None:
@@ -124,13 +119,13 @@ def test_moves_are_chosen_and_those_held_out_are_named(browser: Browser, service
         made = service.post(
             "/identifications", {"logs": [log], "validate": {"fraction": 0.5}}
         ).json()
-        show(page, "kept")
-        page.locator("#pane-kept h2:text('Jobs') + ul button").first.click()
-        page.locator("#pane-kept li button", has_text="1: identify").click()
+        go(page, "Logs")
+        newest = page.locator("#logs .side h2 ~ ul button").first
+        newest.click()
         until(page, OPENED)
         assert CLIENT.delete(f"{service.url}/logs/{log}").status_code == 204
-        page.evaluate("() => document.getElementById('tab-kept').click()")
-        page.locator("#pane-kept h2:text('Identifications') + ul button").first.click()
+        page.get_by_role("button", name="Back to the logs").click()
+        newest.click()
         expect(page.locator("#identification")).to_contain_text("This log was deleted.")
         found = last(service)
         assert found["id"] == made["id"]
@@ -147,27 +142,45 @@ def test_moves_are_chosen_and_those_held_out_are_named(browser: Browser, service
         assert page.locator("#identification .u-wrap").count() == ROBOT.nq, "no power was logged"
         width = page.evaluate("() => document.documentElement.scrollWidth")
         assert width <= 390, "the page is one column"
-        page.get_by_role("button", name="Back to the motion").click()
+        go(page, "Cell")
         expect(page.locator("#view")).to_be_visible()
 
 
 def test_what_a_log_does_not_tell_is_explained(page: Page, tmp_path: Path) -> None:
     file = tmp_path / "short.csv"
     file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=1)))
-    choose_log(page, file)
-    page.get_by_label("Add a field", exact=True).select_option("units")
-    page.get_by_label("units", exact=True).select_option("deg")
-    assert state(page, "request.units") == "deg"
-    page.get_by_label("Remove units").click()
-    send(page)
-    until(page, "() => Boolean(studio.state.request.logs)")
-    send(page)
-    expect(page.locator("#problem")).to_be_visible()
+    add_log(page, file)
+    expect(page.locator("#measured")).to_be_visible()
+    while (ticked := page.locator("#logs .side input:checked")).count() > 1:
+        ticked.last.uncheck()
+    page.locator("#identify").click()
     expect(page.locator("#problem a")).to_have_attribute("href", "problems/nothing-held-out")
     assert not page.evaluate(OPENED)
     file.write_text("t,q1\n0,1\n")
-    choose_log(page, file)
-    send(page)
-    expect(page.locator("#problem a")).to_have_attribute(
+    add_log(page, file)
+    expect(page.locator("#log-error a")).to_have_attribute(
         "href", re.compile("problems/(validation|invalid-table)")
     )
+    page.get_by_role("button", name="Close").click()
+
+
+def test_measured_joules_stand_beside_those_that_are_predicted(
+    page: Page, service: Server, tmp_path: Path
+) -> None:
+    """Of each move of a log with power and currents, and of the whole of it."""
+    file = tmp_path / "tuesday.csv"
+    file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=3, seed=5)))
+    add_log(page, file)
+    expect(page.locator("#logs .content h2")).to_have_text("tuesday.csv")
+    rows = page.locator("#measured tbody tr")
+    expect(rows.first).to_contain_text("whole log")
+    log = service.get("/logs").json()["logs"][0]["id"]
+    found = service.post("/evaluate", {"log": log}).json()
+    assert rows.count() == len(found["segments"]) + 1
+    for part, row in zip([found["total"], *found["segments"]], rows.all(), strict=True):
+        cells = [cell.replace(",", "") for cell in row.locator("td").all_inner_texts()]
+        measured, predicted = part["measured"]["electrical"], part["energy"]["electrical"]["total"]
+        assert float(cells[2]) == pytest.approx(measured, rel=DIGITS)
+        assert float(cells[4]) == pytest.approx(predicted, rel=DIGITS)
+        difference = float(cells[6].strip(" %").replace("−", "-"))
+        assert difference == pytest.approx(100 * (predicted / measured - 1), rel=0.06, abs=0.01)

@@ -1,18 +1,29 @@
-"""Whether the page can be read: contrast in light and dark, letters of twice the size, names of
-what is seen.
+"""Whether the page can be read: contrast in light and dark, letters of twice the size, what axe
+finds.
 """
 
 from __future__ import annotations
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 from tests.app.live import Server
-from tests.browser.pages import MESHES, SHOWN, opened, show, until
+from tests.browser.pages import (
+    MESHES,
+    SHOWN,
+    findings,
+    go,
+    opened,
+    show_json,
+    type_into,
+    until,
+)
 from tests.browsers import BROWSER, MISSING
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
+CONTROLS = {"#optimise": "Task", "#play": "Picture", "#scrub": "Picture", "#joules": "Answer"}
+"""Controls, and the tab of a narrow page that has them."""
 LEAST = 4.5  # contrast of text, WCAG 2.2, 1.4.3
 # texts that are shown, and their contrast with what is behind them: the nearest grounds, laid over
 # each other
@@ -52,9 +63,9 @@ CROWDED = """() => {
     const wide = document.documentElement.clientWidth;
     const name = (each) => `${each.tagName} ${each.id} ${each.textContent.trim().slice(0, 30)}`;
     const beyond = all.filter((each) => each.getBoundingClientRect().right > wide + 1);
-    const out = beyond.filter((each) => !each.closest(".scroll, [role=tabpanel]"));
+    const out = beyond.filter((each) => !each.closest(".scroll, [role=tabpanel], .drop"));
     const over = [];
-    const header = all.filter((each) => each.closest("header, #player"));
+    const header = all.filter((each) => each.closest("header.top, #player"));
     for (const a of header) for (const b of header) {
         if (a === b || a.contains(b) || b.contains(a) || a.compareDocumentPosition(b) & 2) continue;
         const [p, q] = [a.getBoundingClientRect(), b.getBoundingClientRect()];
@@ -70,23 +81,60 @@ CROWDED = """() => {
 def test_every_text_stands_out(browser: Browser, service: Server, scheme: str) -> None:
     with opened(browser, f"{service.url}/studio", color_scheme=scheme) as page:
         until(page, SHOWN)
-        for tab in ("form", "json", "kept"):
-            show(page, tab)
-            found = page.evaluate(CONTRASTS)
-            assert len(found) > 60
-            assert not [(text, round(ratio, 2)) for text, ratio in found if ratio < LEAST]
+        until(page, "() => studio.state.postures?.length > 0")
+        texts(page, 100)
+        type_into(page, "/payload/mass", "1")
+        texts(page, 100)
+        show_json(page)
+        texts(page, 60)
+        for name in ("Jobs", "Logs", "Library"):
+            go(page, name)
+            texts(page, 8)
+
+
+def texts(page: Page, least: int) -> None:
+    """So many texts are shown, and each stands out."""
+    found = page.evaluate(CONTRASTS)
+    assert len(found) >= least
+    assert not [(text, round(ratio, 2)) for text, ratio in found if ratio < LEAST]
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1440), ("dark", 1440), ("light", 390)])
+def test_axe_finds_nothing_serious(
+    browser: Browser, service: Server, scheme: str, width: int
+) -> None:
+    size = {"width": width, "height": 900}
+    with opened(browser, f"{service.url}/studio", color_scheme=scheme, viewport=size) as page:
+        until(page, SHOWN)
+        until(page, "() => studio.state.postures?.length > 0")
+        tabs = ("Task", "Picture", "Answer") if width < 1000 else ()
+        for tab in tabs or ("",):
+            if tab:
+                page.get_by_role("tab", name=tab, exact=True).click()
+            assert findings(page) == []
+        page.locator("#export").click()
+        expect(page.locator("#preview")).to_be_visible()
+        assert findings(page) == []
+        page.get_by_role("button", name="Close").click()
+        for name in ("Jobs", "Logs", "Library"):
+            go(page, name)
+            page.wait_for_timeout(300)
+            assert findings(page) == []
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= width
 
 
 @pytest.mark.parametrize("width", [1280, 390])
 def test_letters_of_twice_the_size(browser: Browser, service: Server, width: int) -> None:
     with opened(browser, f"{service.url}/studio", viewport={"width": width, "height": 900}) as page:
         until(page, SHOWN)
-        page.evaluate(
-            "() => { document.documentElement.style.fontSize = '32px'; "
-            "document.body.style.fontSize = '28px'; }"
+        page.context.new_cdp_session(page).send(
+            "Page.setFontSizes", {"fontSizes": {"standard": 32, "fixed": 26}}
         )
+        page.wait_for_timeout(300)
         assert not page.evaluate(CROWDED)
-        for control in ("#optimise", "#play", "#scrub", "#joules"):
+        for control, tab in CONTROLS.items():
+            if page.locator(".bottom").is_visible():
+                page.get_by_role("tab", name=tab, exact=True).click()
             page.locator(control).scroll_into_view_if_needed()
             expect(page.locator(control)).to_be_in_viewport(ratio=0.9)
 

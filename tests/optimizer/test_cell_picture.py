@@ -8,10 +8,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from joulepath.optimizer.cell_picture import PictureSettings, cell_picture, stops_of
 from joulepath.optimizer.export.program import Move, Program, Rest
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.time_scalings import quintic_spline
+from joulepath.optimizer.picture.cell_picture import cell_picture, stops_of
+from joulepath.optimizer.picture.view import PictureSettings
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.scene import Attachment, Box, Cylinder, HalfSpace, Obstacle, Scene
 from tests.optimizer.moves import GOAL, ROBOT, START

@@ -17,7 +17,7 @@ from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
+from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
 from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import AMPLE
 from tests.optimizer.test_tool_path import ARM, HOME, poses_of
@@ -77,11 +77,11 @@ def test_the_speed_is_held(name: str) -> None:
     between, above = deviations(task, found)
     assert (
         found.certificate.valid
-        and between < SPEED_TOLERANCE + DIFFERENCE
-        and above < SPEED_TOLERANCE + DIFFERENCE
+        and between < TOOL_PATH.speed_tolerance + DIFFERENCE
+        and above < TOOL_PATH.speed_tolerance + DIFFERENCE
     )
-    told = found.certificate.worst_ratio["path_speed"] * SPEED_TOLERANCE
-    assert between - DIFFERENCE <= told <= SPEED_TOLERANCE
+    told = found.certificate.worst_ratio["path_speed"] * TOOL_PATH.speed_tolerance
+    assert between - DIFFERENCE <= told <= TOOL_PATH.speed_tolerance
 
 
 def test_the_certificate_finds_a_speed_that_is_not_held() -> None:
@@ -90,8 +90,8 @@ def test_the_certificate_finds_a_speed_that_is_not_held() -> None:
     spline, ends = found.trajectory.spline, (found.start.q, found.goal.q)
     for factor, valid in (
         (1.0, True),
-        (1 + 2 * SPEED_TOLERANCE, False),
-        (1 - 2 * SPEED_TOLERANCE, False),
+        (1 + 2 * TOOL_PATH.speed_tolerance, False),
+        (1 - 2 * TOOL_PATH.speed_tolerance, False),
     ):
         other = replace(LINE, tool_path=replace(path_of(LINE), fixed_speed=0.1 * factor))
         assert certify(other, spline, *ends, found.energy).valid == valid

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.clearance_proof import GAP, proven_clearance
+from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.planner.path_planner import Effort, PlanningEnd
+from joulepath.optimizer.collision.planner.path_planner import Effort
+from joulepath.optimizer.collision.planner.planning_result import PlanningEnd
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.motion.time_scalings import quintic_spline
@@ -62,9 +63,9 @@ def test_a_motion_that_passes_closely_needs_its_proof() -> None:
     assert proof is not None and 0 < proof.min_clearance < proof.sampled
     assert near.worst_violation(MOTION) is None
     (post,) = near.arm.scene.obstacles
-    # the proof ends when its bound is at most GAP below the least sample: here that leaves it below
-    # zero
-    margin = post.margin + proof.sampled - GAP / 4
+    # the proof ends when its bound is at most the gap below the least sample: here that leaves it
+    # below zero
+    margin = post.margin + proof.sampled - CLEARANCE_PROOF.gap / 4
     closer = Surroundings(replace(near.arm, scene=Scene([replace(post, margin=margin)])))
     assert closer.is_collision_free(sample(MOTION, np.linspace(0, 1, 500))[0])
     found = closer.worst_violation(MOTION)
@@ -147,7 +148,7 @@ def test_a_path_to_another_goal_is_kept_for_that_goal() -> None:
         q for q in np.linspace(START, GOAL, 50) if not surroundings.is_collision_free(q[None])
     )
     planned = surroundings.planned_paths(START, within, Deadline.after(AMPLE), [GOAL])
-    assert planned.paths and not planned.leading_to(within)
+    assert planned.paths and not planned.ending_at(within)
     assert all((path[-1] == GOAL).all() for path in planned.paths)
     assert surroundings.has_planned_paths(START, GOAL) and not surroundings.has_planned_paths(
         START, within

@@ -21,7 +21,7 @@ from joulepath.app.schemas.request import (
     which_candidates,
 )
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.optimizer.problem.cycle import LONGEST_CYCLE, MOST_STOPS
+from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 from joulepath.optimizer.problem.free_order import MOST_FREE_STOPS
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
@@ -41,7 +41,7 @@ class LongCycle:
 
 LONG_CYCLE = LongCycle()
 
-LongTime = Annotated[float, Field(gt=0, le=LONGEST_CYCLE)]
+LongTime = Annotated[float, Field(gt=0, le=CYCLE_RANGES.longest)]
 
 
 class TimeRange(DurationRange):
@@ -65,25 +65,27 @@ class CycleRequest(ArmRequest):
         None,
         {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
     )
-    stops: Annotated[list[StopRequest], Field(min_length=1, max_length=MOST_STOPS)] = described(
-        "The stops; in the order in which they are visited, unless `order` is free.",
-        None,
-        [
-            {
-                "name": "pick",
-                "target": {
-                    "pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+    stops: Annotated[list[StopRequest], Field(min_length=1, max_length=CYCLE_RANGES.max_stops)] = (
+        described(
+            "The stops; in the order in which they are visited, unless `order` is free.",
+            None,
+            [
+                {
+                    "name": "pick",
+                    "target": {
+                        "pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                    },
+                    "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
                 },
-                "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
-            },
-            {
-                "name": "place",
-                "target": {
-                    "pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                {
+                    "name": "place",
+                    "target": {
+                        "pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+                    },
+                    "payload": None,
                 },
-                "payload": None,
-            },
-        ],
+            ],
+        )
     )
     order: Literal["given", "free"] = described(
         "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs "

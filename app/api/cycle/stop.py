@@ -12,8 +12,8 @@ from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.path import Line, StopPath
 from joulepath.app.schemas.request import Branch, Target
 from joulepath.optimizer.problem.names import LONGEST_NAME
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
-from joulepath.optimizer.problem.scene import MOST_OBSTACLES
+from joulepath.optimizer.problem.problem import DURATIONS
+from joulepath.optimizer.problem.scene import SCENE_RANGES
 
 PlainName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
 
@@ -63,7 +63,7 @@ class StopRequest(Request):
         0.4,
         default=0.0,
         ge=0,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
     payload: Payload | None = described(
         "What the arm carries from here on, the dwell included; with a path, from its end on. "
@@ -99,12 +99,14 @@ class StopRequest(Request):
         {"direction": [0.0, 0.0, -1.0], "distance": 0.08},
         default=None,
     )
-    obstacles_ignored: Annotated[list[PlainName], Field(max_length=MOST_OBSTACLES)] = described(
-        "Names of obstacles that do not count at the stop, on its lines and its path, like the "
-        "part that is grasped.",
-        None,
-        ["part"],
-        default=[],
+    obstacles_ignored: Annotated[list[PlainName], Field(max_length=SCENE_RANGES.max_obstacles)] = (
+        described(
+            "Names of obstacles that do not count at the stop, on its lines and its path, like the "
+            "part that is grasped.",
+            None,
+            ["part"],
+            default=[],
+        )
     )
 
     @model_validator(mode="after")

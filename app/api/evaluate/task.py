@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import reduce
 from io import StringIO
 from pathlib import Path
@@ -31,6 +31,7 @@ from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.csv_table import FIRST_ROW
 from joulepath.optimizer.deadline import Deadline
+from joulepath.optimizer.declared import Ratio
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.evaluation import EvaluatedMotion, Evaluation
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
@@ -48,6 +49,16 @@ class EvaluatedInterval(IntervalEnergy):
 
     measured: MeasuredEnergy | None
     """Measured energies; null without a log of power or efforts."""
+    difference: Ratio | None = field(init=False)
+    """Measured / predicted - 1 of the electrical energy, by the logged power, or else by the
+    efforts. Null without a measurement."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known, ours = self.measured, self.energy.electrical.total
+        drawn = None if known is None else known.best
+        share = None if drawn is None or ours == 0 else drawn / ours - 1
+        object.__setattr__(self, "difference", share)
 
     @classmethod
     def of(cls, interval: IntervalEnergy, known: MeasuredEnergy | None) -> Self:
@@ -91,7 +102,8 @@ class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
     """The whole motion."""
     segments: list[EvaluatedInterval]
     """Segments between configurations. A trajectory is one segment, and a log has one per move and
-    rest. Empty if there are more than 10,000."""
+    rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
+    electrical energies."""
     warnings: list[str]
     """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
     mm, one names them, their distance without margins, and the time. Others report possibly missed
@@ -236,10 +248,13 @@ def _csv_table(found: Evaluated) -> str:
     rows = [(str(k), each) for k, each in enumerate(found.segments, 1)]
     for name, interval in [*rows, ("total", found.total)]:
         row = {"segment": name, **dict(_flat("", interval))}
-        # only the whole motion has one
+        # many segments have none
         row = {
             key: value for key, value in row.items() if not key.startswith("electrical.interval")
         }
+        known = interval.energy.electrical.interval
+        for end in ("p5", "p95"):
+            row[f"electrical.interval.{end}"] = None if known is None else getattr(known, end)
         if writer is None:
             writer = csv.DictWriter(text, row.keys(), lineterminator="\n")
             writer.writeheader()

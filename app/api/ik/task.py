@@ -21,7 +21,7 @@ from joulepath.models.robot import Robot
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 
 class IKRequest(CellRequest):
@@ -51,7 +51,7 @@ class IKRequest(CellRequest):
         10.0,
         default=10.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
 
 

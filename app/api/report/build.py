@@ -9,10 +9,10 @@ from joulepath.app.api.report.assumptions import assumptions, interval_note
 from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.costs import Money, cost_table, costs_note, cycle_time, facts
 from joulepath.app.api.report.drawings import Course, Leg, Stop, drawn
-from joulepath.app.api.report.numbers import digits, down, percent, up
+from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
 from joulepath.app.api.report.report import Part, Report, Rival
-from joulepath.optimizer.cell_picture import cell_picture, stops_of
 from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.picture.cell_picture import cell_picture, stops_of
 
 _PARTS = {
     "friction": ("Friction in the joints", "#e08e2b"),
@@ -62,14 +62,10 @@ def report_of(bundle: Bundle, program: Program) -> Report:
     return Report(
         title=bundle.title or ("A cycle of stops" if bundle.kind == "cycle" else "A motion"),
         subtitle=f"Energy report · {made:%-d %B %Y} · {robot.figures['title']}",
-        lead=_lead(bundle),
+        lead=tuple(map(unbroken, _lead(bundle))),
         facts=facts(bundle, money),
         picture=cell_picture(program),
-        caption="The cell as its collisions are checked: the arm where the first part is put down, "
-        "and pale at the start. Way of the TCP: in full with a part, dashed without."
-        if several
-        else "The cell as its collisions are checked: the arm at the goal, and pale at the start, "
-        "with the way of the TCP.",
+        caption=_caption(program),
         rivals=_rivals(bundle),
         rivals_note=_rivals_note(bundle),
         parts=_parts(answer["energy"]["electrical"]),
@@ -82,12 +78,22 @@ def report_of(bundle: Bundle, program: Program) -> Report:
         costs=cost_table(bundle, money),
         currency=money.currency,
         costs_note=costs_note(money),
-        proven=_proven(answer),
+        proven=unbroken(_proven(answer)),
         check=_check(answer),
         assumptions=assumptions(bundle, program),
-        assumptions_note=interval_note(answer["energy"]["electrical"].get("interval")),
+        assumptions_note=unbroken(interval_note(answer["energy"]["electrical"].get("interval"))),
         foot=f"Computed, not measured. Never run on hardware by us. joulepath {bundle.version}",
     )
+
+
+def _caption(program: Program) -> str:
+    shown = "The cell as its collisions are checked: the arm "
+    if len(program.moves) == 1:
+        return shown + "at the goal, and pale at the start, with the way of the TCP."
+    if any(move.arm.payload.mass > 0 for move in program.moves):
+        shown += "where the first part is put down, and pale at the start. "
+        return shown + "Way of the TCP: in full with a part, dashed without."
+    return shown + "at the end of the first move, and pale at the start, with the way of the TCP."
 
 
 def what(bundle: Bundle) -> str:

@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 
 JOULES_PER_KWH = 3.6e6
+SPACE = "\u00a0"
+"""A space at which no line ends."""
+_UNIT = re.compile(r"(?<=\d) (?=(?:J|s|h|W|mm|kg|kWh|%)(?!\w))")
+_ROUNDINGS: dict[str, Callable[[float], int]] = {
+    "nearest": round,
+    "up": math.ceil,
+    "down": math.floor,
+}
 
 
 def digits(value: float, count: int = 3) -> str:
@@ -27,14 +36,13 @@ def up(value: float, count: int = 3) -> str:
 
 def percent(share: float, rounding: str = "nearest") -> str:
     """A share with one digit after the point."""
-    scaled = 1000 * share
-    by_name: dict[str, Callable[[float], int]] = {
-        "nearest": round,
-        "up": math.ceil,
-        "down": math.floor,
-    }
-    whole = by_name[rounding](scaled)
-    return f"{whole / 10:.1f} %".replace("-", "−")
+    whole = _ROUNDINGS[rounding](1000 * share)
+    return f"{whole / 10:.1f}{SPACE}%".replace("-", "−")
+
+
+def unbroken(text: str) -> str:
+    """The text, in which no line ends between a number and its unit."""
+    return _UNIT.sub(SPACE, text)
 
 
 def _written(value: float, count: int, rounding: Callable[[float], int]) -> str:

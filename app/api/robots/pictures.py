@@ -16,7 +16,7 @@ import joulepath.models.meshes
 import joulepath.models.pictures
 from joulepath.app.engine.result import TaskResult
 from joulepath.models.pictures import picture, picture_sources
-from joulepath.optimizer.native.library_cache import cache_directory, workplace
+from joulepath.optimizer.native.library_cache import cache_directory, work_folder
 
 logger = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ class PictureTask:
 
 def _written(path: Path, content: bytes) -> bytes:
     """Puts the whole file in its place at once: who reads it never sees a part."""
-    with workplace(path) as folder:
+    with work_folder(path) as folder:
         part = folder / path.name
         part.write_bytes(content)
         part.replace(path)

@@ -1,5 +1,5 @@
-"""One search for a collision-free joint path by OMPL, which can be continued: RRT-Connect in a box
-of configurations.
+"""One resumable search for a collision-free joint path by OMPL: RRT-Connect in a box of
+configurations.
 
 J. J. Kuffner, S. M. LaValle, "RRT-Connect: an efficient approach to single-query path planning",
 IEEE ICRA 2000, in the implementation of OMPL; OMPL's path simplifier shortens the path.
@@ -21,50 +21,60 @@ from joulepath.optimizer.collision.planner.state_validity import StateValidityCh
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.problem.arm import Arm
 
-# OMPL's range: maximum length [rad] of an edge of the trees, in weighted joints
-RANGE = 0.4
-# shortcuts tried on a path, and distance [rad], in weighted joints, between the states at which it
-# is checked last
-SHORTCUTS, LAST_STEP = 40, 0.02
-# least weight of a joint
-LEAST_WEIGHT = 0.1
+
+@dataclass(frozen=True)
+class PathSearchSettings:
+    """Settings of RRT-Connect and of the simplification of its paths."""
+
+    range: float = 0.4
+    """OMPL's range: largest length [rad] of an edge of the trees, in weighted joints."""
+    shortcuts: int = 40
+    """Shortcuts tried on a path."""
+    last_step: float = 0.02
+    """Distance [rad], in weighted joints, between the states of the final check of a path."""
+    least_weight: float = 0.1
+    """Smallest weight of a joint [1]."""
+
+
+PATH_SEARCH = PathSearchSettings()
 
 
 @dataclass(frozen=True)
 class Box:
-    """The configurations (nq,) [rad] that a search samples, and the distance `step` [rad] between
-    checked states of an edge, in weighted joints."""
+    """Configurations (nq,) [rad] that a search samples, and the distance `step` [rad] between
+    checked states of an edge, in weighted joints.
+    """
 
     lower: Array
     upper: Array
     step: float
 
     def inside(self, q: Array) -> Array:
-        """Those of the configurations (k, nq) [rad] that lie in the box."""
+        """Configurations among (k, nq) [rad] that lie in the box."""
         return q[((q >= self.lower) & (q <= self.upper)).all(axis=1)]
 
 
 def joint_weights(arm: Arm, model: CollisionModel) -> Array:
-    """Weights (nq,) of the joints in the distances between configurations: at most 1, at least
-    LEAST_WEIGHT.
+    """Weights (nq,) of the joints in the distances between configurations: between `least_weight`
+    and 1.
 
-    The weight is the square root of a joint's longest lever over the longest of all joints: a lever
-    itself would make wrists turn at will, equal weights would check a turn of the wrist as densely
-    as one of the base. If a tool's axis has to stay within a cone, wrists count as much as any
-    joint.
+    The weight is the square root of a joint's longest lever over the longest of all joints. With
+    the lever itself as the weight, wrists would turn at will; with equal weights, a turn of the
+    wrist would be checked as densely as a turn of the base. With a cone for the tool axis, wrists
+    count as much as any joint.
     """
     levers = model.levers().max(axis=0, initial=0.0)
     if arm.tool_cone is not None or not levers.any():
         return np.ones(arm.robot.nq)
-    return np.asarray(np.maximum(np.sqrt(levers / levers.max()), LEAST_WEIGHT))
+    return np.asarray(np.maximum(np.sqrt(levers / levers.max()), PATH_SEARCH.least_weight))
 
 
-class _Effort:
+class _ValidityBudget:
     """State validity checks of one search, which pauses when its allowance is used up or at the
     deadline.
 
-    It holds no reference to OMPL's objects, which hold one to it: a cycle through them would never
-    be freed.
+    It holds no reference to OMPL's objects, since these hold a reference to it: a cycle through
+    them would never be freed.
     """
 
     def __init__(self, checker: StateValidityChecker, weights: Array, deadline: Deadline) -> None:
@@ -85,12 +95,12 @@ class _Effort:
 
 
 class PathSearch:
-    """A search in a box. `advance` goes on where it paused.
+    """Search in a box. `advance` resumes it.
 
-    The path sought begins at the first point of `begin` (k, nq) [rad], which is a collision-free
-    path, and leaves it at any of its points. It ends at the last point of one of `ends`, and meets
-    this path, (m, nq) each, at any of its points. `last_checker` checks the path at short steps,
-    with less reserve: what long steps cut must not be more than that.
+    The path begins at the first point of `begin` (k, nq) [rad], a collision-free path, and leaves
+    it at any of its points. It ends at the last point of one of the paths `ends`, (m, nq) each, and
+    joins this path at any of its points. `last_checker` checks the path at short steps with a
+    smaller reserve, which limits the corners cut by long steps.
     """
 
     def __init__(
@@ -104,7 +114,7 @@ class PathSearch:
         deadline: Deadline,
     ) -> None:
         self._weights, self._begin, self._ends = weights, begin, ends
-        self._effort = _Effort(checker, weights, deadline)
+        self._budget = _ValidityBudget(checker, weights, deadline)
         space = ob.RealVectorStateSpace(len(weights))
         bounds = ob.RealVectorBounds(len(weights))
         for joint, (low, high) in enumerate(
@@ -114,7 +124,7 @@ class PathSearch:
             bounds.setHigh(joint, float(high))
         space.setBounds(bounds)
         self._information = ob.SpaceInformation(space)
-        self._information.setStateValidityChecker(self._effort.is_valid)
+        self._information.setStateValidityChecker(self._budget.is_valid)
         self._information.setStateValidityCheckingResolution(box.step / space.getMaximumExtent())
         self._information.setup()
         self._problem = ob.ProblemDefinition(self._information)
@@ -127,51 +137,49 @@ class PathSearch:
         self._problem.setGoal(goals)
         self._last_checker = last_checker
         self._planner = og.RRTConnect(self._information)
-        self._planner.setRange(RANGE)
+        self._planner.setRange(PATH_SEARCH.range)
         self._planner.setProblemDefinition(self._problem)
         self._planner.setup()
 
     @property
     def checked_states(self) -> int:
         """States checked so far."""
-        return self._effort.checked_states
+        return self._budget.checked_states
 
     @property
     def is_solved(self) -> bool:
-        """Whether there is a path."""
+        """Whether a path is found."""
         return bool(self._problem.hasExactSolution())
 
     def advance(self, states: int) -> bool:
-        """Search on, for about `states` more checked states; whether there is a path now."""
-        self._effort.allowed = self._effort.checked_states + states
-        self._planner.solve(ob.PlannerTerminationCondition(self._effort.is_spent))
+        """Resumes the search for about `states` more checked states; returns whether a path is
+        found.
+        """
+        self._budget.allowed = self._budget.checked_states + states
+        self._planner.solve(ob.PlannerTerminationCondition(self._budget.is_spent))
         return self.is_solved
 
     def path(self) -> Array | None:
-        """The path found (k, nq) [rad], shortened; None if a state of it is in collision when it is
-        checked densely.
-        """
+        """Shortened path (k, nq) [rad]; None if a dense check finds a state of it in collision."""
         path = self._whole(self._problem.getSolutionPath())
-        # limited by counts, not by the clock, so that the same seed gives the same path
+        # Limited by counts, not by the clock, so that the same seed gives the same path.
         simplifier = og.PathSimplifier(self._information)
-        simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
-        simplifier.partialShortcutPath(path, SHORTCUTS, SHORTCUTS)
-        simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
+        simplifier.reduceVertices(path, PATH_SEARCH.shortcuts, PATH_SEARCH.shortcuts)
+        simplifier.partialShortcutPath(path, PATH_SEARCH.shortcuts, PATH_SEARCH.shortcuts)
+        simplifier.reduceVertices(path, PATH_SEARCH.shortcuts, PATH_SEARCH.shortcuts)
         joints = range(len(self._weights))
         points = (
             np.array([[state[joint] for joint in joints] for state in path.getStates()])
             / self._weights
         )
         points = points[np.append(True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0)]
-        # without the rounding of the weights
+        # Without the rounding of the weights.
         chosen, _ = _nearest([end[-1:] for end in self._ends], points[-1])
         points[0], points[-1] = self._begin[0], self._ends[chosen][-1]
         return points if self._is_valid(points) else None
 
     def _whole(self, path: og.PathGeometric) -> og.PathGeometric:
-        """The path found, with the part of `begin` before it and the part of one of `ends` after
-        it.
-        """
+        """The path found, extended by its known parts before and after."""
         states = path.getStates()
         first, last = (
             np.array([state[j] for j in range(len(self._weights))]) / self._weights
@@ -186,9 +194,11 @@ class PathSearch:
         return path
 
     def _is_valid(self, points: Array) -> bool:
-        """Whether states LAST_STEP apart along a path (k, nq) are valid."""
+        """Whether states `last_step` apart along a path (k, nq) are valid."""
         for first, second in pairwise(points):
-            count = int(np.linalg.norm((second - first) * self._weights) / LAST_STEP) + 1
+            count = (
+                int(np.linalg.norm((second - first) * self._weights) / PATH_SEARCH.last_step) + 1
+            )
             if not all(
                 self._last_checker.is_valid(q)
                 for q in np.linspace(first, second, count, endpoint=False)
@@ -204,7 +214,7 @@ class PathSearch:
 
 
 def _nearest(paths: Sequence[Array], q: Array) -> tuple[int, int]:
-    """Which of the paths (k, nq), and which of its points, is nearest to q (nq,)."""
-    apart = [np.abs(path - q).max(axis=1) for path in paths]
-    chosen = min(range(len(paths)), key=lambda k: float(apart[k].min()))
-    return chosen, int(apart[chosen].argmin())
+    """Indices of the path (k, nq), and of its point, nearest to q (nq,)."""
+    distances = [np.abs(path - q).max(axis=1) for path in paths]
+    chosen = min(range(len(paths)), key=lambda k: float(distances[k].min()))
+    return chosen, int(distances[chosen].argmin())

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.planner.path_planner import PlannedPaths, PlanningEnd
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 
 
 class PlannedPathMemo:
@@ -20,7 +20,7 @@ class PlannedPathMemo:
 
     def __init__(self) -> None:
         self._by_goal: dict[bytes, PlannedPaths] = {}
-        # the first planning with a path, otherwise the last one, of all goals equal up to turns
+        # First planning with a path, otherwise the last planning, of all goals equal up to turns.
         self._up_to_turns: dict[bytes, PlannedPaths] = {}
 
     def recall(self, q_start: Array, q_goal: Array, most_states: int) -> PlannedPaths | None:
@@ -48,7 +48,7 @@ class PlannedPathMemo:
     def keep(self, q_start: Array, goals: Array, planned: PlannedPaths) -> None:
         """Store the result of a planning from q_start (nq,) to `goals` (n, nq) [rad]."""
         for goal in {path[-1].tobytes(): path[-1] for path in planned.paths}.values():
-            self._keep(q_start, goal, replace(planned, paths=planned.leading_to(goal)))
+            self._keep(q_start, goal, replace(planned, paths=planned.ending_at(goal)))
         if planned.end is PlanningEnd.EXHAUSTED:
             for goal in goals:
                 self._keep(q_start, goal, planned)

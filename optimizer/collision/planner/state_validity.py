@@ -1,8 +1,7 @@
-"""State validity checking for the path planner: one configuration at a time, by Pinocchio and Coal.
+"""State validity checks for the path planner: one configuration at a time, by Pinocchio and Coal.
 
 `CollisionModel` computes distances at many configurations at once. A planner checks one
-configuration after the other, and only needs to know whether it is valid: that takes tens of
-microseconds here.
+configuration after the other and only needs its validity: this takes tens of microseconds here.
 """
 
 from __future__ import annotations
@@ -16,15 +15,15 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Body
-from joulepath.optimizer.collision.coal_distance import SKIN, coal_shape
+from joulepath.optimizer.collision.coal_distance import COAL, coal_shape
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.problem.arm import Arm
 
 
 class StateValidityChecker:
-    """Checks that all bodies keep their margins and `reserve` [m] more, and that the tool axis is
-    within its cone.
+    """Checks that all bodies keep their margins and an additional `reserve` [m], and that the tool
+    axis is within its cone.
 
     `model` is the collision model of the arm.
     """
@@ -33,7 +32,7 @@ class StateValidityChecker:
         self._robot = arm.robot.model
         self._data = self._robot.createData()
         self._cone = arm.tool_cone
-        # the tool axis in the frame of the last link
+        # Tool axis in the frame of the last link.
         self._axis = None if self._cone is None else T_last_tcp(arm)[:3, :3] @ self._cone.axis
         self._geometry = pin.GeometryModel()
         skins = [self._add(number, body) for number, body in enumerate(model.bodies)]
@@ -50,8 +49,8 @@ class StateValidityChecker:
             growth = [model.bodies[k].core.radius + model.bodies[k].margin - skins[k] for k in pair]
             request.security_margin = sum(growth) + reserve
             request.enable_contact = False
-        # of hundreds of pairs a few are near: a tree of the bodies' bounding boxes leaves out the
-        # others. It takes the security margins as they are when it is made
+        # Of hundreds of pairs a few are near, and a tree of the bodies' bounding boxes leaves out
+        # the others. It reads the security margins when it is built.
         self._manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
             self._robot, self._geometry, self._geometry_data
         )
@@ -64,32 +63,31 @@ class StateValidityChecker:
             return False
         if self._cone is None:
             return True
-        # computeCollisions has updated the joint placements
+        # computeCollisions has updated the joint placements.
         tool_axis = self._data.oMi[self._robot.nq].rotation @ self._axis
         return bool(tool_axis @ self._cone.direction >= math.cos(self._cone.half_angle))
 
     def _hits_cloud(self, q: Array) -> bool:
-        """Whether a body comes nearer to a part of a cloud than allowed: by the cloud's own
-        tree."""
+        """Whether a body is nearer to a part of a cloud than allowed, by the cloud's own tree."""
         frames = self._model.frames(q[None])
         least = self._model.pair_distances(frames, self._clouds, self._reserve).distance.min()
         return bool(least < self._reserve)
 
     def _add(self, number: int, body: Body) -> float:
-        """Add a body to the geometry. Returns the radius [m] by which Coal's shape is grown beyond
-        the core.
+        """Adds a body to the geometry, and returns the growth [m] of Coal's shape beyond the
+        core.
         """
         T, skin = np.eye(4), 0.0
         shape: coal.CollisionGeometry
         if body.cloud is not None:
-            # its own tree checks it; here it keeps the number of the body
-            shape = coal.Sphere(SKIN)
+            # The cloud's own tree checks it; this placeholder keeps the number of the body.
+            shape = coal.Sphere(COAL.skin)
         elif body.core.is_half_space:
             shape = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         else:
             shape, skin, transform = coal_shape(body.core)
             T[:3, :3], T[:3, 3] = transform.getRotation(), transform.getTranslation()
-        # Pinocchio needs distinct names; those of bodies may repeat
+        # Pinocchio needs distinct names, but names of bodies may repeat.
         placement = pin.SE3(body.T_link_core @ T)
         self._geometry.addGeometryObject(
             pin.GeometryObject(str(number), body.link, placement, shape)
@@ -99,7 +97,7 @@ class StateValidityChecker:
 
 @dataclass(frozen=True)
 class ValidityCheckers:
-    """The checkers of an arm by their reserves, each made when it is first asked for: that takes
+    """Checkers of an arm by their reserves, each built on first use, since this takes
     milliseconds.
     """
 

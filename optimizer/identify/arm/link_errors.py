@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ LINK_ERRORS = LinkErrorSettings()
 def link_deviations(robot: Robot, settings: LinkErrorSettings = LINK_ERRORS) -> Array:
     """Standard deviations (10 nq,) of the parameters of the moving bodies, in Pinocchio's order."""
     deviations = list[Array]()
-    for body in body_parameters(robot.model).reshape(-1, BODY):
+    for body in body_parameters(robot.model).reshape(-1, PARAMETERS_PER_BODY):
         mass = body[0]
         inertia = (body[4] + body[6] + body[9]) / 2 + settings.center_of_mass**2 * mass
         of_body = np.concatenate(

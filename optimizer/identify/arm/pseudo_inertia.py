@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.link_regressor import BODY
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ CONSISTENCY = ConsistencySettings()
 
 def _basis() -> Array:
     """Pseudo-inertias (10, 4, 4) of unit parameters m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz."""
-    units = np.zeros((BODY, 4, 4))
+    units = np.zeros((PARAMETERS_PER_BODY, 4, 4))
     units[0, 3, 3] = 1.0
     for axis in range(3):
         units[1 + axis, axis, 3] = units[1 + axis, 3, axis] = 1.0
@@ -46,7 +46,7 @@ BASIS = _basis()
 
 def pseudo_inertias(parameters: Array) -> Array:
     """Pseudo-inertias (bodies, 4, 4) of bodies with parameters (10 bodies,)."""
-    return np.asarray(np.einsum("bk,kij->bij", parameters.reshape(-1, BODY), BASIS))
+    return np.asarray(np.einsum("bk,kij->bij", parameters.reshape(-1, PARAMETERS_PER_BODY), BASIS))
 
 
 def distance_metric(parameters: Array) -> Array:
@@ -65,7 +65,7 @@ def distance_metric(parameters: Array) -> Array:
     for body, matrix in enumerate(matrices):
         inverse = np.linalg.inv(_nearest_consistent(matrix))
         turned = np.einsum("ij,kjl->kil", inverse, BASIS)
-        at = slice(BODY * body, BODY * (body + 1))
+        at = slice(PARAMETERS_PER_BODY * body, PARAMETERS_PER_BODY * (body + 1))
         total[at, at] = np.einsum("kij,lji->kl", turned, turned) / 2
     return total
 

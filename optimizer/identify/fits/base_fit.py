@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, base_parameters
 from joulepath.optimizer.identify.arm.friction_columns import lower_bounds
 from joulepath.optimizer.identify.choices import Estimator
@@ -160,7 +160,13 @@ def base_regression(
     """Regression of motor torques (n, nq) [N·m] on all bodies, friction and rotors."""
     assert rows.regressor is not None
     return whole_arm_regression(
-        robot, rows, torque, clusters, options, rows.regressor, np.zeros(BODY * robot.nq)
+        robot,
+        rows,
+        torque,
+        clusters,
+        options,
+        rows.regressor,
+        np.zeros(PARAMETERS_PER_BODY * robot.nq),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, leave_one_out
@@ -64,7 +64,9 @@ def fit_wrench(
         grouped = GroupedEquations.of(columns, values, weight, cluster, clusters.count)
         gram = grouped.gram.sum(axis=0) + precision
         moment = grouped.moment.sum(axis=0) + precision @ own
-        value = solve_consistent(gram, moment, len(own) // BODY, np.full(len(own), -np.inf))
+        value = solve_consistent(
+            gram, moment, len(own) // PARAMETERS_PER_BODY, np.full(len(own), -np.inf)
+        )
     spread = np.linalg.solve(gram, precision)
     return Estimate(
         names=tuple((LINK + part, joint) for joint in range(robot.nq) for part in LINKS),

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.link_regressor import BODY
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY
 from joulepath.optimizer.identify.arm.pseudo_inertia import BASIS
 
 # entries of a symmetric matrix in Clarabel's order, and their factors
@@ -55,10 +55,10 @@ def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> A
     scaled = gram * np.outer(scale, scale)
     entries = (BASIS[:, _ENTRIES[0], _ENTRIES[1]] * _FACTORS).T
     bounded = np.flatnonzero(np.isfinite(lower))
-    matrix = np.zeros((len(bounded) + BODY * bodies, p))
+    matrix = np.zeros((len(bounded) + PARAMETERS_PER_BODY * bodies, p))
     matrix[np.arange(len(bounded)), bounded] = -scale[bounded]
-    matrix[len(bounded) :, : BODY * bodies] = (
-        -np.kron(np.eye(bodies), entries) * scale[: BODY * bodies]
+    matrix[len(bounded) :, : PARAMETERS_PER_BODY * bodies] = (
+        -np.kron(np.eye(bodies), entries) * scale[: PARAMETERS_PER_BODY * bodies]
     )
     settings = clarabel.DefaultSettings()
     settings.verbose = False

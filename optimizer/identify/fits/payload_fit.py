@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.dynamics.link_regressor import BODY, rigid_torques
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, rigid_torques
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.friction_columns import columns
 from joulepath.optimizer.identify.arm.link_errors import link_deviations
@@ -98,7 +98,9 @@ def with_payload(rows: Rows, payload: IdentifiedPayload) -> Rows:
     """Rows with the payload in the rigid-body torques of its log, and without regressors."""
     assert rows.regressor is not None
     rigid = rows.rigid + np.where(
-        (rows.log == payload.log)[:, None], rows.regressor[:, :, -BODY:] @ payload.body, 0.0
+        (rows.log == payload.log)[:, None],
+        rows.regressor[:, :, -PARAMETERS_PER_BODY:] @ payload.body,
+        0.0,
     )
     return replace(rows, rigid=rigid, regressor=None)
 
@@ -133,8 +135,8 @@ def fit_payload(
         InvalidProblem: the log carries less than the others.
     """
     clusters, prior = clusters_of(rows), np.diag(_prior_precision(robot))
-    body, variance = np.zeros(BODY), np.ones(robot.nq)
-    links = BODY * robot.nq
+    body, variance = np.zeros(PARAMETERS_PER_BODY), np.ones(robot.nq)
+    links = PARAMETERS_PER_BODY * robot.nq
     for _ in range(PAYLOAD_FIT.passes):
         grouped, parts = _equations(robot, rows, torque, clusters, log, threshold, body, variance)
         gram, moment = grouped.gram.sum(axis=0) + prior, grouped.moment.sum(axis=0)
@@ -145,14 +147,14 @@ def fit_payload(
                 variance[joint] = effective_variance(
                     error, np.ones_like(error), Clusters(of_row, clusters.count)
                 )
-        body = value[links : links + BODY]
+        body = value[links : links + PARAMETERS_PER_BODY]
     replicates = leave_one_out(grouped, value, np.ones(len(value), dtype=bool), prior)
     inverse = np.linalg.inv(gram)
     return _payload_of_body(
         robot,
         log,
         body,
-        replicates[:, links : links + BODY],
+        replicates[:, links : links + PARAMETERS_PER_BODY],
         (inverse @ prior @ inverse)[links:, links:],
     )
 
@@ -186,13 +188,16 @@ def _equations(
     assert rows.regressor is not None
     nq = robot.nq
     speed = np.maximum(robot.friction.speed, PAYLOAD_FIT.min_curve_speed)
-    count, shared = (BODY + len(TERMS)) * nq + BODY, [*range(BODY * nq + BODY)]
+    count, shared = (
+        (PARAMETERS_PER_BODY + len(TERMS)) * nq + PARAMETERS_PER_BODY,
+        [*range(PARAMETERS_PER_BODY * nq + PARAMETERS_PER_BODY)],
+    )
     gram, moment = np.zeros((clusters.count, count, count)), np.zeros((clusters.count, count))
     parts = list[tuple[list[int], Array, Array, IntArray]]()
     for joint in range(nq):
         use = moving_rows(rows, torque, joint, threshold, ())
         links = rows.regressor[use, joint]
-        carried = np.where((rows.log[use] == log)[:, None], links[:, -BODY:], 0.0)
+        carried = np.where((rows.log[use] == log)[:, None], links[:, -PARAMETERS_PER_BODY:], 0.0)
         rigid = rows.rigid[use, joint]
         friction = columns(
             TERMS,
@@ -253,7 +258,9 @@ def _payload_of_body(
         )
     if not max(sd, min_mass) <= TORQUE_FIT.max_relative_sd * mass:
         unknown = np.diag([sd**2, 0.0, 0.0, 0.0])
-        return IdentifiedPayload(log, 0.0, np.zeros(3), unknown, np.zeros(BODY), NO_DIFFERENCE)
+        return IdentifiedPayload(
+            log, 0.0, np.zeros(3), unknown, np.zeros(PARAMETERS_PER_BODY), NO_DIFFERENCE
+        )
     com = flange.rotation.T @ (body[1:4] / mass - flange.translation)
     slope = np.zeros((4, 4))
     slope[0, 0] = 1.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
@@ -135,7 +135,7 @@ def _solve(
 ) -> tuple[Array, GroupedEquations]:
     """Solution (p,) under the prior, and the weighted normal equations."""
     block = arm.block
-    lower = np.concatenate([np.full(BODY * links, -np.inf), block.lower])
+    lower = np.concatenate([np.full(PARAMETERS_PER_BODY * links, -np.inf), block.lower])
     value, weight = mean, _weights(arm, arm.values - arm.torque(mean), clusters, False)
     for _ in range(WHOLE_FIT.weight_passes):
         grouped = GroupedEquations.of(

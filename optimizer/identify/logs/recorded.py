@@ -27,6 +27,11 @@ class MeasuredEnergy:
     """Integral of the power that the motors take by their logged currents or torques, with the
     losses of the robot's drives and its idle power. Null if the log has none."""
 
+    @property
+    def best(self) -> float | None:
+        """The energy by the logged power, or else by the efforts [J]."""
+        return self.by_efforts if self.electrical is None else self.electrical
+
     def joined(self, other: MeasuredEnergy) -> MeasuredEnergy:
         """The energies of two parts together."""
         return MeasuredEnergy(
@@ -67,7 +72,7 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
     q, v, a = (channel[rows].astype(float) for channel in (log.q, log.v, log.a))
     tau = plant.torques(q, v, a)
     # the measured torque beyond that of the motion is lost
-    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, lost=torque[rows] - tau)
+    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, tau_friction=torque[rows] - tau)
     return MeasuredEnergy(drawn, energy.electrical.total)
 
 

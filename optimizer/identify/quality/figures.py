@@ -8,7 +8,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, FitResult
 from joulepath.optimizer.identify.fits.whole_fit import LINK, LINK_NAMES
@@ -87,7 +87,7 @@ def _covariance_rows(robot: Robot, fitted: FitResult) -> Iterator[tuple[Name, Ar
         if name[0] != LINK_MASS_SCALE:
             yield name, row
             continue
-        bodies = body_parameters(robot.model).reshape(-1, BODY).tolist()
+        bodies = body_parameters(robot.model).reshape(-1, PARAMETERS_PER_BODY).tolist()
         for joint, body in enumerate(bodies):
             for part, own in zip(LINKS, body, strict=True):
                 yield (LINK + part, joint), own * row

@@ -6,7 +6,7 @@ import numpy as np
 
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.parameters import LINKS
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms
 from joulepath.optimizer.identify.fits.block import own_value
@@ -47,7 +47,7 @@ def _own_value(robot: Robot, name: Name) -> float:
     if figure.startswith(LINK):
         assert joint is not None
         part = LINKS.index(figure.removeprefix(LINK))
-        return float(body_parameters(robot.model).reshape(-1, BODY)[joint, part])
+        return float(body_parameters(robot.model).reshape(-1, PARAMETERS_PER_BODY)[joint, part])
     if figure == LINK_MASS_SCALE:
         return 1.0
     if figure == "idle_power":

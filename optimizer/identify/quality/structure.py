@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.dynamics.link_regressor import BODY, body_parameters
+from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.arm.pseudo_inertia import pseudo_inertias
@@ -49,7 +49,9 @@ def structure_of(robot: Robot, rows: Rows, options: IdentificationOptions) -> St
         values = np.sqrt(np.maximum(np.linalg.eigvalsh(gram / np.outer(scale, scale)), 0.0))
         excited = int((values > STRUCTURE.min_excitation * values[-1]).sum())
         condition = float(values[-1] / values[0]) if values[0] > 0 else np.inf
-    return Structure((BODY + rotors) * robot.nq, base.count, base.expressions, condition, excited)
+    return Structure(
+        (PARAMETERS_PER_BODY + rotors) * robot.nq, base.count, base.expressions, condition, excited
+    )
 
 
 def physical_of(robot: Robot, arm: FittedArm) -> Physical | None:
@@ -73,7 +75,7 @@ def inertials_of(robot: Robot, change: Array) -> dict[str, Array]:
         `mass` (nq,) [kg], `center_of_mass` (nq, 3) [m], and `inertia` (nq, 6) [kg·m²] about it as
         ixx, ixy, ixz, iyy, iyz, izz; all in the link frames.
     """
-    parameters = (body_parameters(robot.model) + change).reshape(-1, BODY)
+    parameters = (body_parameters(robot.model) + change).reshape(-1, PARAMETERS_PER_BODY)
     bodies = [pin.Inertia.FromDynamicParameters(each) for each in parameters]
     rows, columns = (0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2)
     return {

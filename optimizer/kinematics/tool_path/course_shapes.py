@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
+from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ SETTINGS = ShapeSettings()
 
 
 class Shape(Protocol):
-    """TCP pose over the distance [m] from the start, with TURNING metres per radian of rotation."""
+    """TCP pose over the distance [m] from the start, with `meters_per_radian` of rotation."""
 
     @property
     def pieces(self) -> Array:
@@ -54,7 +54,9 @@ def shape_of(path: ToolPath, T: Array) -> Shape:
     """
     rotation = Rotation.from_matrix(T[:, :3, :3])
     shift, turn = np.diff(T[:, :3, 3], axis=0), (rotation[1:] * rotation[:-1].inv()).as_rotvec()
-    distance = np.hypot(np.linalg.norm(shift, axis=1), TURNING * np.linalg.norm(turn, axis=1))
+    distance = np.hypot(
+        np.linalg.norm(shift, axis=1), TOOL_PATH.meters_per_radian * np.linalg.norm(turn, axis=1)
+    )
     _check(path, distance)
     ends = np.concatenate([[0.0], np.cumsum(distance)])
     if path.shape == "arc":
@@ -70,7 +72,7 @@ def _check(path: ToolPath, distance: Array) -> None:
     for k, length in enumerate(distance):
         last = k + 1 == len(distance)
         blended = path.blend * ((k > 0) + (not last))
-        if length < max(SAME_POSE, blended * (1 - 1e-9)):
+        if length < max(TOOL_PATH.same_pose, blended * (1 - 1e-9)):
             which = "The last two poses of this path are" if last else "This pose is"
             apart = f"{length:.4g} m apart" if last else f"{length:.4g} m from the one before"
             raise InvalidProblem(
@@ -81,7 +83,7 @@ def _check(path: ToolPath, distance: Array) -> None:
 
 
 def _bends(shift: Array) -> int:
-    chords = shift / np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), SAME_POSE)
+    chords = shift / np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), TOOL_PATH.same_pose)
     angles = np.arccos(np.clip((chords[1:] * chords[:-1]).sum(axis=1), -1.0, 1.0))
     return min(int(np.ceil(angles.sum() / (np.pi / 2))), SETTINGS.most_bends)
 
@@ -225,7 +227,9 @@ class Arc:
             float(np.arctan2(each @ second, each @ first) % (2 * np.pi))
             for each in (a - offset, b - offset)
         ]
-        turning = TURNING * (rotation[1:] * rotation[:-1].inv()).magnitude().sum()
+        turning = (
+            TOOL_PATH.meters_per_radian * (rotation[1:] * rotation[:-1].inv()).magnitude().sum()
+        )
         spline = RotationSpline(np.array([0.0, *angles]), rotation)
         return cls(
             position[0] + offset,

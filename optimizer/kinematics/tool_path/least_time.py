@@ -17,7 +17,7 @@ import numpy as np
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE
+from joulepath.optimizer.problem.tool_path import TOOL_PATH
 
 DIVISIONS = (1, 2, 4, 8, 16, 32)
 """Numbers of parts of each piece of the course for which the bound is computed."""
@@ -43,5 +43,5 @@ def least_time(arm: Arm, course: ToolCourse) -> float:
     fixed = course.path.fixed_speed
     most = np.inf if arm.tcp_speed is None else arm.tcp_speed
     if fixed is not None:
-        most = min(most, fixed * (1 + SPEED_TOLERANCE))
+        most = min(most, fixed * (1 + TOOL_PATH.speed_tolerance))
     return least_tcp_distance(course) / (most * (1 + RATIO_TOLERANCE)) if np.isfinite(most) else 0.0

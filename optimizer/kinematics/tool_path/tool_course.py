@@ -18,7 +18,7 @@ from joulepath.optimizer.kinematics.tool_path.course_matching import matched
 from joulepath.optimizer.kinematics.tool_path.course_shapes import Shape, shape_of
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.targets import Side
-from joulepath.optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
+from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class ToolCourse:
 
     @property
     def length(self) -> float:
-        """Length [m], with TURNING metres per radian of rotation."""
+        """Length [m], with `meters_per_radian` of rotation."""
         return abs(self.last - self.first) * float(self.shape.pieces[-1])
 
     def measured(self, count: int, step: float) -> tuple[Array, Array]:
@@ -194,10 +194,13 @@ class ToolCourse:
         """
         at = self.grid(SETTINGS.compared_poses, SETTINGS.compared_distance)
         known = self._embedded(self.poses(at))
-        reach = self.path.position_tolerance + TURNING * self.path.rotation_tolerance
+        reach = (
+            self.path.position_tolerance
+            + TOOL_PATH.meters_per_radian * self.path.rotation_tolerance
+        )
         best, left_out, rest = matched(at, known, self._embedded(T), reach)
         position, rotation = self._apart(T, self.poses(best))
-        position, rotation = position + left_out, rotation + left_out / TURNING
+        position, rotation = position + left_out, rotation + left_out / TOOL_PATH.meters_per_radian
         if rest > reach:
             return np.full_like(position, np.inf), np.full_like(rotation, np.inf)
         return position, rotation
@@ -219,7 +222,7 @@ class ToolCourse:
             step: largest length of a part [m].
         """
         knots = self.shape.pieces
-        knots = knots[np.append(True, np.diff(knots) > SAME_POSE)]
+        knots = knots[np.append(True, np.diff(knots) > TOOL_PATH.same_pose)]
         at = knots / knots[-1] if self.by_distance is None else np.interp(knots, *self.by_distance)
         inside = np.sort((at - self.first) / (self.last - self.first))
         inside = inside[(inside > SETTINGS.same_fraction) & (inside < 1 - SETTINGS.same_fraction)]
@@ -245,15 +248,25 @@ class ToolCourse:
         )
 
     def _embedded(self, T: Array) -> Array:
-        """Poses as points (k, d), with distances close to those of the positions plus TURNING times
-        those of the rotations.
+        """Poses as points (k, d), with distances close to those of the positions plus
+        `meters_per_radian` times those of the rotations.
 
         If the tool may turn about an axis, the direction of the axis takes the place of the
         rotation.
         """
         if self.path.about is not None:
-            return np.hstack([T[:, :3, 3], TURNING * T[:, :3, :3] @ np.array(self.path.about)])
-        return np.hstack([T[:, :3, 3], TURNING / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9)])
+            return np.hstack(
+                [
+                    T[:, :3, 3],
+                    TOOL_PATH.meters_per_radian * T[:, :3, :3] @ np.array(self.path.about),
+                ]
+            )
+        return np.hstack(
+            [
+                T[:, :3, 3],
+                TOOL_PATH.meters_per_radian / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9),
+            ]
+        )
 
 
 def _turned_least(end: ConeOrientedPose, R: Array) -> Array:

@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.dwell import LinearDwell, linear_dwells, waits
-from joulepath.optimizer.dynamics.plant import WIDTH
+from joulepath.optimizer.dynamics.dwell import LinearDwell, holding_times, linear_dwells
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.nlp.goal_holding import GoalHolding
 
 
@@ -50,7 +50,7 @@ def duration_intervals(
     prepared: PreparedProblem,
     q_goal: Array,
     surplus_value: float | None = None,
-    width: float = WIDTH,
+    width: float = SMOOTHING.power_width,
 ) -> list[DurationInterval]:
     """Intervals of a problem, in order of duration.
 
@@ -62,8 +62,8 @@ def duration_intervals(
         width: width over which corners of the cost are smoothed [W].
     """
     problem = prepared.problem
-    t_min = LEAST_DURATION if problem.duration_min is None else problem.duration_min
-    t_max = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    t_min = DURATIONS.least if problem.duration_min is None else problem.duration_min
+    t_max = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     if surplus_value is None and problem.arm.bus.mode == "storage":
         surplus_value = max(problem.arm.bus.efficiency, problem.arm.regeneration)
     if problem.dwell is None or problem.objective == "mechanical":
@@ -94,7 +94,7 @@ def duration_intervals(
 def _goal_holding(
     prepared: PreparedProblem, dwell: Dwell, hold: float, piece: LinearDwell
 ) -> GoalHolding:
-    first, last = (waits(dwell, T)[0] for T in (piece.t_min, piece.t_max))
+    first, last = (holding_times(dwell, T)[0] for T in (piece.t_min, piece.t_max))
     rate = (first - last) / (piece.t_max - piece.t_min)
     return GoalHolding(prepared.holding_power, hold, first + rate * piece.t_min, rate)
 
@@ -102,5 +102,5 @@ def _goal_holding(
 def fastest(prepared: PreparedProblem) -> DurationInterval:
     """The interval of all durations, with the duration as cost."""
     return DurationInterval(
-        prepared.fastest_parameters, LEAST_DURATION, LONGEST_DURATION, minimum_time=True
+        prepared.fastest_parameters, DURATIONS.least, DURATIONS.longest, minimum_time=True
     )

@@ -22,7 +22,7 @@ from joulepath.optimizer.kinematics.tool_path.least_speed import LeastSpeed
 from joulepath.optimizer.motion.bspline import DEGREE, clamped, fit
 from joulepath.optimizer.motion.spline import Spline, sample
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.tool_path import SPEED_TOLERANCE
+from joulepath.optimizer.problem.tool_path import TOOL_PATH
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval
 from joulepath.optimizer.solve.methods.limit_repair import path_excess, repair_factors
 from joulepath.optimizer.solve.methods.retimed_path import instants_in_spans
@@ -257,7 +257,7 @@ class EvenSpeed:
         q, v, _ = sample(motion, t)
         off = self._speeds(q, v) / self.speed - 1
         even = (t >= first) & (t <= motion.duration - last)
-        return float(np.where(even, np.abs(off), off).max()) / SPEED_TOLERANCE
+        return float(np.where(even, np.abs(off), off).max()) / TOOL_PATH.speed_tolerance
 
     def _is_within_limits(self, motion: Spline) -> bool:
         none, path = np.zeros(len(motion.control_points[0])), self.prepared.path

@@ -23,7 +23,7 @@ from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, least_time_scale, sampled
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
@@ -97,7 +97,7 @@ class FastestMotion(ABC):
         self.settings = settings or FastestSettings()
         limits = prepared.problem.arm.active_limits
         self.bound = max(
-            float(shortest_duration(q_goal - q_start, limits)), prepared.least_time, LEAST_DURATION
+            float(shortest_duration(q_goal - q_start, limits)), prepared.least_time, DURATIONS.least
         )
         self.best: Spline | None = None
         self.cut_short = False
@@ -255,7 +255,9 @@ class FastestMotion(ABC):
         spline: Spline | None = None
         for price in self.settings.prices:
             p = self.prepared.parameters(electrical=1.0, time=price)
-            solver = self.solver(DurationInterval(p, LEAST_DURATION, LONGEST_DURATION, price=price))
+            solver = self.solver(
+                DurationInterval(p, DURATIONS.least, DURATIONS.longest, price=price)
+            )
             result = (
                 solver.solve()
                 if spline is None

@@ -16,7 +16,7 @@ from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.ruckig_motion import time_optimal
 from joulepath.optimizer.motion.spline import Spline, spline_of
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.method import above
@@ -236,7 +236,7 @@ class FreeSpline(SplineMethod):
         """The time-optimal motion under limits on rates, with knots at its jumps of jerk."""
         line = self.coordinates
         fastest = time_optimal(line.limits, line.start, line.goal)
-        duration = max(fastest.duration, LEAST_DURATION)
+        duration = max(fastest.duration, DURATIONS.least)
         space = self.spaces.at_switches(duration, SPLINE_SPACES.exact_multiplicity)
         return Guess(
             space, space.fit(fastest.q, fastest.t / duration), duration, progress=self._progress

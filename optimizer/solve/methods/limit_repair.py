@@ -12,9 +12,9 @@ import numpy as np
 
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.collision.bodies import Indices
-from joulepath.optimizer.collision.clearance_constraint import CLEARANCE, RESERVE, SCALE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE, CLEARANCE_CONSTRAINT
 from joulepath.optimizer.dynamics.limited_torque import limited_parts
-from joulepath.optimizer.dynamics.torque_bound import SHARPNESS, TorqueSamples, torque_bounds
+from joulepath.optimizer.dynamics.torque_bound import TORQUE_BOUND, TorqueSamples, torque_bounds
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints
 from joulepath.optimizer.motion.bspline import in_all_spans
 from joulepath.optimizer.motion.quadrature import grid
@@ -99,10 +99,10 @@ def torque_peaks(prepared: PreparedProblem, spline: Spline) -> Array:
     torques at the quadrature points are taken.
     """
     # the energy of the motion is needed next, from the same samples
-    _, _, v, a, tau, lost = prepared.report_samples(spline)
-    smooth, friction = limited_parts(prepared.arm, tau, v, a, lost)
+    _, _, v, a, tau, tau_friction = prepared.report_samples(spline)
+    smooth, friction = limited_parts(prepared.arm, tau, v, a, tau_friction)
     most = np.abs(smooth).max(axis=0) + np.abs(friction).max(axis=0)
-    if (most <= SHARPNESS.far_below * prepared.problem.arm.active_limits.tau_max).all():
+    if (most <= TORQUE_BOUND.far_below * prepared.problem.arm.active_limits.tau_max).all():
         return np.asarray(np.abs(smooth + friction).max(axis=0))
     samples = TorqueSamples.of(spline.curve, prepared.torques, grid(spline.duration)[None])
     return torque_bounds(prepared.arm, spline.curve, prepared.torques, samples)
@@ -244,5 +244,9 @@ def with_repaired_path(
         return replace(program, path=path, path_bounds=widened)
     if check.collision is not None and program.path is not None and not check.path_excess.any():
         # no sample collides, but the clearance is not proven: more of it at the path points
-        bounds -= np.where(np.array(program.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
+        bounds -= np.where(
+            np.array(program.path.names) == CLEARANCE,
+            CLEARANCE_CONSTRAINT.reserve / CLEARANCE_CONSTRAINT.ratio_range,
+            0.0,
+        )
     return replace(program, path_bounds=bounds)

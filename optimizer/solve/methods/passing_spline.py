@@ -21,10 +21,10 @@ from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.joined import joined
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.motion.spline import FIT_SAMPLES, Spline, lasting, sampled
+from joulepath.optimizer.motion.spline import SAMPLING, Spline, lasting, sampled
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
@@ -152,19 +152,19 @@ class PassingSpline(SqpMethod):
         turns back.
         """
         q, limits = self._configurations, self.coordinates.limits
-        lengths = np.maximum(shortest_duration(np.diff(q, axis=0), limits), LEAST_DURATION)
+        lengths = np.maximum(shortest_duration(np.diff(q, axis=0), limits), DURATIONS.least)
         t = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
         width = np.diff(t)[:, None]
         slopes, v = np.diff(q, axis=0) / width, np.zeros_like(q)
         mean = (slopes[:-1] * width[1:] + slopes[1:] * width[:-1]) / (width[1:] + width[:-1])
         v[1:-1] = np.where(slopes[:-1] * slopes[1:] > 0, mean, 0.0)
-        at = np.linspace(0.0, 1.0, FIT_SAMPLES)
+        at = np.linspace(0.0, 1.0, SAMPLING.fit_samples)
         return space.fit(spline_through(t, q, v, np.zeros_like(q)).curve(at), at)
 
     def _between_rests(self) -> list[SolveResult]:
         """Motions of any duration from rest to rest, up to the first solve without a motion."""
         problem = replace(self.prepared.problem, passes=(), duration_min=None, duration_max=None)
-        interval = replace(self.interval, t_min=LEAST_DURATION, t_max=LONGEST_DURATION)
+        interval = replace(self.interval, t_min=DURATIONS.least, t_max=DURATIONS.longest)
         results = list[SolveResult]()
         for a, b in pairwise(self._configurations):
             part = PreparedProblem.of(replace(problem, start=a, goal=b))

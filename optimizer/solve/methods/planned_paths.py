@@ -7,15 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.planner.path_planner import (
-    MOST_STATES,
-    USUAL,
-    Effort,
-    PlannedPaths,
-    PlanningEnd,
-    length,
-    lengths,
-)
+from joulepath.optimizer.collision.planner.joint_path import path_length, path_lengths
+from joulepath.optimizer.collision.planner.path_planner import PLANNER, USUAL_EFFORT, Effort
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PREPARED, PreparedProblem
@@ -34,7 +28,7 @@ class PlannedPathSettings:
     """States that the first planning to a goal may check, and all of them once a motion is
     known."""
 
-    most_states: int = MOST_STATES
+    most_states: int = PLANNER.max_states
     """States that a thorough planning may check."""
 
     effort_of_sole: Effort = field(
@@ -81,7 +75,7 @@ def plan(method: Method) -> PlannedPaths:
     effort = (
         settings.effort_of_sole
         if context.is_sole
-        else USUAL
+        else USUAL_EFFORT
         if unknown
         else settings.effort_of_another
     )
@@ -97,9 +91,11 @@ def plan(method: Method) -> PlannedPaths:
 def to_goal(method: Method, planned: PlannedPaths) -> list[Array]:
     """Planned paths (k, nq) [rad] to the method's goal without long detours, the shortest first."""
     v_max = method.prepared.problem.arm.active_limits.v_max
-    paths = planned.leading_to(method.q_goal)
+    paths = planned.ending_at(method.q_goal)
     longest = PLANNED_PATHS.detour
-    return [path for path in paths if length(path, v_max) <= longest * length(paths[0], v_max)]
+    return [
+        path for path in paths if path_length(path, v_max) <= longest * path_length(paths[0], v_max)
+    ]
 
 
 def without_path(method: Method, failed: SolveResult, planned: PlannedPaths) -> SolveResult:
@@ -142,7 +138,7 @@ def smooth_path(prepared: PreparedProblem, path: Array) -> Spline | None:
     Returns:
         The spline; None if no clearance is proven, or if the tool leaves its cone.
     """
-    reached = lengths(path, prepared.problem.arm.active_limits.v_max)
+    reached = path_lengths(path, prepared.problem.arm.active_limits.v_max)
     fraction = reached / reached[-1]
     for count in PLANNED_PATHS.control_points:
         knots = bspline.uniform(count).knots

@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.planner.path_planner import along
+from joulepath.optimizer.collision.planner.joint_path import path_samples
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.polynomial import PolynomialBasis, polynomials
@@ -157,7 +157,7 @@ class PolynomialGA(Method):
         if not paths:
             return without_path(self, first, planned)
         self._planned = self.space.fit(
-            *along(paths[0], 1.0, self.prepared.problem.arm.active_limits.v_max)
+            *path_samples(paths[0], 1.0, self.prepared.problem.arm.active_limits.v_max)
         )[1:-1]
         second = self._evolved()
         if second.spline is not None:

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import Spline, span_peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -68,7 +68,7 @@ def refine_work(
         prepared.kernel, basis, limits, duration, parameters, prepared.frictionless_parameters
     )
     ends, bounds = points[[0, -1]], program.unbounded()
-    width, within = SHARPER_WIDTHS[-1], LIMIT_REPAIR.within
+    width, within = SMOOTHING.sharper_power_widths[-1], LIMIT_REPAIR.within
     free = np.clip(points[basis.free], limits.q_min, limits.q_max)
     at = program.first(ends, free, first_width, bounds)
     most = incumbent_cost + settings.smoothing_share * width * duration * nq

@@ -65,7 +65,9 @@ class SplineMethod(SqpMethod):
     @staticmethod
     def may_refine(found: Spline) -> bool:
         """Whether the knots are those of a first solve: `refined` adds knots at jerk switches."""
-        return len(found.control_points) == SPLINE_SPACES.coarse_points or RAMPS.are_in(found)
+        return len(found.control_points) == SPLINE_SPACES.coarse_points or RAMPS.has_ramp_knots(
+            found
+        )
 
     def refined(self, spline: Spline, fine: bool) -> SolveResult:
         """Solve from a motion of a first solve, with knots at the switches of jerk.
@@ -75,7 +77,7 @@ class SplineMethod(SqpMethod):
         contains the motion itself.
         """
         duration, exact = spline.duration, SPLINE_SPACES.exact_multiplicity
-        if RAMPS.are_in(spline):
+        if RAMPS.has_ramp_knots(spline):
             knots = spline.knots / duration
             repeat = exact if fine else SPLINE_SPACES.refined_multiplicity
             space = RAMPS.refined(knots, self.spaces.switches(duration), repeat)

@@ -67,7 +67,7 @@ class SplineSpaces:
         displacement = self.coordinates.goal - self.coordinates.start
         if displacement.any():
             return displacement
-        return np.full_like(displacement, RAMPS.least_way)
+        return np.full_like(displacement, RAMPS.smallest_displacement)
 
     def is_slow(self, duration: float) -> bool:
         """Whether the ramps are so short, compared with the duration [s], that knots follow them.
@@ -92,7 +92,7 @@ class SplineSpaces:
             return False
         fastest = time_optimal(line.limits, line.start, line.goal)
         ratios = path.ratios(line.to_joints(fastest.q), fastest.v @ line.directions.T)
-        return bool(ratios.max() > RAMPS.most_held_back)
+        return bool(ratios.max() > RAMPS.largest_path_ratio)
 
     def is_tight(self, t_max: float) -> bool:
         """Whether all durations up to t_max [s] are too short for the knots of a first solve."""
@@ -104,7 +104,9 @@ class SplineSpaces:
         """Switches of the leading coordinate's jerk, as fractions of the duration [s]."""
         line = self.coordinates
         if self.is_slow(duration):
-            return seven_segment.switches(self._displacement, duration, line.limits, RAMPS.closest)
+            return seven_segment.switches(
+                self._displacement, duration, line.limits, RAMPS.closest_switches
+            )
         return seven_segment.switches(line.goal - line.start, duration, line.limits)
 
     def at_switches(self, duration: float, multiplicity: int) -> Basis:

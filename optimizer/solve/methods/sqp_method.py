@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.planner.path_planner import along, interpolation_is_free
+from joulepath.optimizer.collision.planner.joint_path import interpolation_is_free, path_samples
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.dynamics.plant import has_corners
 from joulepath.optimizer.motion.spline import sample
@@ -211,7 +211,7 @@ class SqpMethod(StagedMethod):
         for path in paths:
             if self.deadline.passed:
                 break
-            q, t = along(path, 1.0, v_max)
+            q, t = path_samples(path, 1.0, v_max)
             motions = [
                 sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None
             ]

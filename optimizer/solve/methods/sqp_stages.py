@@ -10,7 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.motion.spline import Spline, spline_of, time_scale
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.limit_repair import (
     LIMIT_REPAIR,
@@ -130,7 +130,7 @@ class StagedMethod(Method):
         if shortest >= program.t_max:
             return program.t_max
         durations = [shortest * scale for scale in SQP_STAGES.time_scales]
-        if program.t_max < LONGEST_DURATION:
+        if program.t_max < DURATIONS.longest:
             durations.append(program.t_max)
         best, chosen = np.inf, shortest
         for duration in durations:

@@ -14,7 +14,7 @@ from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
 from joulepath.optimizer.motion.bspline import DEGREE, Basis
 from joulepath.optimizer.motion.spline import Spline, sampled
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
 from joulepath.optimizer.solve.methods.end_angle import try_angles
@@ -110,7 +110,7 @@ class ToolPathMotion(Method):
         longer, the candidate is infeasible.
         """
         law, results = None, list[SolveResult]()
-        if self.t_max < LONGEST_DURATION:
+        if self.t_max < DURATIONS.longest:
             fast = self._solved_along(path, fastest(self.prepared), self._laws.scaling(1))
             results.append(replace(fast, status=SolveStatus.FAILED, spline=None))
             if (

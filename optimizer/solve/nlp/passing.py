@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.motion.bspline import DEGREE
-from joulepath.optimizer.motion.passing import nearby, pass_times
+from joulepath.optimizer.motion.passing import pass_times, refined_pass_times
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 
 
@@ -124,7 +124,7 @@ class Passes:
             times = pass_times(curve, target)
         else:
             gaps = np.diff(np.concatenate([[0.0], near.times, [1.0]]))
-            times = nearby(curve, target, near.times, PASSING.slide * float(gaps.min()))
+            times = refined_pass_times(curve, target, near.times, PASSING.slide * float(gaps.min()))
         # two passes at the same time could not both be kept
         times = _apart(times)
         at = self._columns(times, 0)

@@ -18,7 +18,7 @@ from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow
         ("GET", "/docs/a/b", "read"),
         ("GET", "/problems/busy", None),
         ("GET", "/", None),
-        ("GET", "/studio/vendor/uplot/dist/uPlot.min.css", None),
+        ("GET", "/studio/style.css", None),
         ("POST", "/studio", "compute"),
         ("GET", "/metrics", "read"),
         ("GET", "/studies", "read"),

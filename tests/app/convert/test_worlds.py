@@ -15,11 +15,12 @@ from joulepath.app.convert import mesh_file
 from joulepath.app.convert.mesh_file import MOST_KEPT_TRIANGLES, mesh_from_file
 from joulepath.app.convert.scene import to_scene
 from joulepath.app.schemas.examples.values import MESH_FILE
-from joulepath.app.schemas.scene import MOST_CELLS, Scene
+from joulepath.app.schemas.scene import Scene
+from joulepath.app.schemas.shapes import MOST_CELLS
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.clouds import MOST_TRIANGLES, Points, Voxels
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Points, Voxels
 
 # a file in single precision cycles coordinates of a metre to this [m]
 SINGLE = 1e-7
@@ -152,7 +153,11 @@ def test_a_broken_file_is_refused_at_its_field(format_: Any, content: bytes) -> 
 
 
 def test_too_many_triangles_are_refused() -> None:
-    stl = b"\0" * 80 + struct.pack("<I", MOST_TRIANGLES + 1) + bytes(50) * (MOST_TRIANGLES + 1)
+    stl = (
+        b"\0" * 80
+        + struct.pack("<I", CLOUD_RANGES.max_triangles + 1)
+        + bytes(50) * (CLOUD_RANGES.max_triangles + 1)
+    )
     with pytest.raises(InvalidProblem, match="simplify the mesh") as caught:
         mesh_from_file("stl", base64_of(stl), 1.0)
     assert caught.value.field == "data"
@@ -222,9 +227,9 @@ def file_of(count: int, seed: int) -> str:
 
 
 def test_the_mesh_that_rested_longest_leaves_a_full_cache() -> None:
-    kept, fit = mesh_file._mesh, MOST_KEPT_TRIANGLES // MOST_TRIANGLES
+    kept, fit = mesh_file._mesh, MOST_KEPT_TRIANGLES // CLOUD_RANGES.max_triangles
     kept.cache_clear()
-    files = [file_of(MOST_TRIANGLES, seed) for seed in range(fit + 1)]
+    files = [file_of(CLOUD_RANGES.max_triangles, seed) for seed in range(fit + 1)]
     made = [mesh_from_file("stl", file, 1.0) for file in files[:fit]]
     # it counts triangles, not files
     assert kept.cache.currsize == MOST_KEPT_TRIANGLES == kept.cache.maxsize

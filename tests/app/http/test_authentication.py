@@ -87,7 +87,7 @@ PUBLIC = [
     "/problems/unauthenticated",
     "/studio",
     "/studio/main.js",
-    "/studio/vendor/three/build/three.module.js",
+    "/studio/style.css",
 ]
 
 

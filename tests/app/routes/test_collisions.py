@@ -16,7 +16,7 @@ from starlette.testclient import TestClient
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.optimizer.collision.clearance_constraint import RESERVE
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.search.errors import (
@@ -92,7 +92,7 @@ def test_start_and_goal_in_collision(client: TestClient) -> None:
     assert start["branches"] == goal["branches"] and goal["branches"][0]["q"] == FOLDED
     arm = Arm(robot=ROBOT)
     found = CollisionModel(arm).closest_pairs([np.array(FOLDED)])[0].distance
-    assert goal["depth"] == pytest.approx(RESERVE - found)
+    assert goal["depth"] == pytest.approx(CLEARANCE_CONSTRAINT.reserve - found)
     assert (
         answered(client, move(goal={"q": FOLDED}, collisions=False))["certificate"]["clearance"]
         is None

@@ -7,6 +7,7 @@ from __future__ import annotations
 import gzip
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.problem.arm import Payload
+from tests.app.cli.console import run
 from tests.app.job_clients import ended
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import SILENT, Recording, csv_of, recorded, truth_of
@@ -116,6 +118,9 @@ def test_the_measured_energy_of_each_move_stands_beside_the_models(
         assert segment["measured"]["electrical"] == pytest.approx(drawn, rel=SAMPLED)
         ours = segment["energy"]["electrical"]["total"]
         assert segment["measured"]["by_efforts"] == pytest.approx(ours, rel=OWN_FIGURES)
+        assert segment["difference"] == pytest.approx(segment["measured"]["electrical"] / ours - 1)
+        interval = segment["energy"]["electrical"]["interval"]
+        assert interval["p5"] < ours < interval["p95"]
     whole = np.trapezoid(recording.power, recording.time)
     assert answer["total"]["measured"]["electrical"] == pytest.approx(whole, rel=SAMPLED)
     for name, value in answer["total"]["measured"].items():
@@ -276,3 +281,15 @@ def test_the_table_has_the_measured_energies(client: TestClient, recording: Reco
     assert (
         sum(measured[:-1]) == pytest.approx(measured[-1]) and len(rows) == len(recording.moves) + 1
     )
+    low, high = (head.split(",").index(f"electrical.interval.{end}") for end in ("p5", "p95"))
+    assert all(float(row.split(",")[low]) < float(row.split(",")[high]) for row in rows)
+
+
+def test_the_command_sets_measured_against_predicted(recording: Recording, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_bytes(rtde(recording))
+    found = run("evaluate", str(file), "--format", "moves")
+    assert found.returncode == 0, found.stderr
+    head, *rows = found.stdout.decode().splitlines()
+    assert head.split()[0] == "move" and len(rows) == len(recording.moves) + 1
+    assert rows[-1].startswith("total") and all("power" in row and "%" in row for row in rows)

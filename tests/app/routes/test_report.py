@@ -104,6 +104,7 @@ def test_a_cycle_shows_its_legs(client: TestClient) -> None:
     bundle, text = attached_to(page), page.decode()
     assert len(bundle.moves) == 3 and checked(page, False, "test").agrees
     assert "One cycle of 2 stops needs" in text
+    assert not re.search(r"\d (J|s)\b", text.partition("</p>")[0].rpartition("lead")[2])
     for leg in bundle.answer["legs"]:
         assert digits(leg["electrical"]) in text
     # no price is given
@@ -144,4 +145,15 @@ def test_a_file_without_documents_is_no_report(html: bytes) -> None:
 def test_numbers_are_rounded_to_the_safe_side() -> None:
     assert (digits(755.7), down(697.96), up(58.11), up(5.861)) == ("756", "697", "58.2", "5.87")
     assert (digits(1239.4), digits(0.0420), digits(-18.4)) == ("1,239", "0.0420", "−18.4")
-    assert (percent(0.0482), percent(0.0769, "up")) == ("4.8 %", "7.7 %")
+    assert (percent(0.0482), percent(0.0769, "up")) == ("4.8\u00a0%", "7.7\u00a0%")
+
+
+def test_a_cell_that_no_answer_repeats_is_that_of_the_request(client: TestClient) -> None:
+    """Its body is read in a worker, and its answer leaves the arm out."""
+    points = [[4.0 + 0.001 * k, 4.0, 0.1] for k in range(4000)]
+    far = {"position": [0.0, 0.0, 0.0], "rotvec": [0.0, 0.0, 0.0]}
+    cloud = {"name": "wall", "shape": "points", "points": points, "radius": 0.01, "pose": far}
+    page = reported(client, optimize=move(scene={"obstacles": [cloud]}))
+    bundle = attached_to(page)
+    assert bundle.answer["arm"] is None and len(page) > 10_000
+    assert checked(page, again=False, request_id="test").agrees

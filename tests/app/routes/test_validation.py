@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import UnsupportedMediaType
-from joulepath.app.schemas import common
+from joulepath.app.schemas import names
 from tests.app.problems import checked
 from tests.app.requests import HOME, move
 
@@ -223,7 +223,7 @@ def test_thousands_of_unknown_fields_take_no_time(
         compared.append(name)
         return []
 
-    monkeypatch.setattr(common, "get_close_matches", count)
+    monkeypatch.setattr(names, "get_close_matches", count)
     many = {f"x{k}": 1 for k in range(2000)}
     assert len(refused(client, many)) == 20
     refused(client, move(start=many, goal={"any_of": [many] * 3}))

@@ -9,7 +9,7 @@ import numpy as np
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.problem.problem import LEAST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.search.baselines import guesses
 from tests.optimizer.bounds.numpy_terms import greatest
 from tests.optimizer.bounds.test_dual_bound import STEPS
@@ -95,7 +95,7 @@ def test_boxes_hold_motions() -> None:
     own = task.arm.active_limits
     share = np.linspace(0, 1, STEPS + 1)[:, None]
     for start, goal in zip(*ends(12, 8), strict=True):
-        least = max(float(shortest_duration(goal - start, own)), LEAST_DURATION)
+        least = max(float(shortest_duration(goal - start, own)), DURATIONS.least)
         reference = Reference(start + share * (goal - start), np.zeros((STEPS + 1, 6)))
         motion = guesses(task, start, goal, least)["ruckig"]
         if motion.duration <= 0:

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 from joulepath.optimizer.bounds import free_goal_bound
-from joulepath.optimizer.bounds.free_goal_bound import FAMILY, family_bound
+from joulepath.optimizer.bounds.free_goal_bound import POSE_FAMILY, family_bound
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.bounds.subdivide import SUBDIVISION, SearchLimits
 from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
@@ -126,10 +126,10 @@ def test_the_bound_tells_far_from_near() -> None:
 @pytest.mark.parametrize(
     ("most", "alone", "rounds", "rounds_at_goal"),
     long_but(
-        [(FAMILY.most_first_boxes, 2, 20, 10)],
+        [(POSE_FAMILY.most_first_boxes, 2, 20, 10)],
         [
             (most, *given)
-            for most in (FAMILY.most_first_boxes, 8, 1)
+            for most in (POSE_FAMILY.most_first_boxes, 8, 1)
             for given in ((2, 20, 10), (4, 30, 30))
         ],
     ),
@@ -140,7 +140,7 @@ def test_many_starts_are_bounded_together(
     """Also more starts than can have fine boxes at first: the bound of all is no higher than that
     of any.
     """
-    monkeypatch.setattr(free_goal_bound, "FAMILY", replace(FAMILY, most_first_boxes=most))
+    monkeypatch.setattr(free_goal_bound, "POSE_FAMILY", replace(POSE_FAMILY, most_first_boxes=most))
     rng = np.random.default_rng(6)
     made, pose = PreparedProblem.of(problem(HOME, GOAL)), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
     starts = HOME + rng.normal(scale=0.05, size=(4, 6))

@@ -18,7 +18,7 @@ from joulepath.optimizer.bounds.straight_line import Line
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import peak_rates, sample, spline_of
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.search.baselines import guesses
 from tests.optimizer.bounds.test_lower_bound import (
     CONDITIONS,
@@ -93,9 +93,9 @@ def many_motions(
     """Motions within the limits: the fastest, slowed a little and much, and some that leave the
     line by half waves.
     """
-    least = max(float(shortest_duration(goal - start, task.arm.active_limits)), LEAST_DURATION)
+    least = max(float(shortest_duration(goal - start, task.arm.active_limits)), DURATIONS.least)
     for stretch in (1.0, 1.1, 1.5, 4.0):
-        motion = guesses(task, start, goal, max(stretch * least, LEAST_DURATION))["ruckig_slowed"]
+        motion = guesses(task, start, goal, max(stretch * least, DURATIONS.least))["ruckig_slowed"]
         yield motion.t, motion.q, motion.v, motion.a, motion.weights, motion.duration
     space = bspline.uniform(19)
     line = start + np.outer(space.quintic, goal - start)
@@ -109,7 +109,7 @@ def many_motions(
             peaks = peak_rates(spline_of(space, points, 1.0)) / task.arm.active_limits.rates
             duration = max(
                 float((peaks.max(axis=1) ** (1 / np.arange(1, 4))).max()) * (1 + 1e-9),
-                LEAST_DURATION,
+                DURATIONS.least,
             )
             duration *= rng.choice([1.0, 1.5, 4.0])
             t = np.linspace(0, duration, SAMPLES)

@@ -24,7 +24,7 @@ from joulepath.optimizer.motion.spline import peak_rates, spline_of
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.problem import LEAST_DURATION, Problem
+from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.search.baselines import guesses, motion_energy
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, changed, fixed, limits, problem
@@ -111,7 +111,7 @@ def motions(
     straight and bent.
     """
     own = task.arm.active_limits
-    least = max(float(shortest_duration(goal - start, own)), LEAST_DURATION)
+    least = max(float(shortest_duration(goal - start, own)), DURATIONS.least)
     for stretch in (1.0, 1.4, 5.0):
         for motion in guesses(task, start, goal, stretch * least).values():
             ratios = (
@@ -292,5 +292,5 @@ def test_standing_still_costs_idling() -> None:
     least that is planned."""
     torques = Torques(problem())
     q = np.zeros((1, 6))
-    assert bound(torques, q, q)[0][0] == pytest.approx(36.7 * LEAST_DURATION, rel=1e-3)
+    assert bound(torques, q, q)[0][0] == pytest.approx(36.7 * DURATIONS.least, rel=1e-3)
     assert bound(torques, q, q, duration_min=2.0)[0][0] == pytest.approx(36.7 * 2.0, rel=1e-3)

@@ -10,7 +10,7 @@ import pytest
 from joulepath.optimizer.bounds.lower_bound import lower_bounds, priced_bounds
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from tests.optimizer.bounds.test_lower_bound import CONDITIONS, EXACT, Torques, bound, ends
 from tests.optimizer.moves import PAYLOAD, ROBOT, fixed, limits, problem
 from tests.selection import long_but
@@ -31,7 +31,7 @@ def test_the_bound_is_the_least_over_the_duration(name: str, pairs: int) -> None
     start, goal = ends(7, pairs)
     free, shortest = bound(torques, start, goal)
     for k in range(pairs):
-        times = np.geomspace(shortest[k], LONGEST_DURATION, 2000)
+        times = np.geomspace(shortest[k], DURATIONS.longest, 2000)
         each = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[::20]]
         assert free[k] <= min(each) * (1 + EXACT)
         low = max(int(np.argmin(each)) - 1, 0) * 20

@@ -8,7 +8,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 from joulepath.optimizer.kinematics.vectors import cross
-from tests.optimizer.collision.beads import Beads
+from tests.optimizer.collision.cover_spheres import CoverSpheres
 from tests.optimizer.collision.many_points import into, picked, placed, pose_columns, turned
 from tests.optimizer.collision.numpy_closed_forms import box_segment, segment_segment
 
@@ -25,7 +25,7 @@ class NumpyDistances:
         ]
         self._ends = np.array(ends).reshape(-1, 2, 3).transpose(1, 2, 0).copy()
         self._half_space_first = arrays.kinds == PairKind.HALF_SPACE
-        self._beads = Beads(arrays)
+        self._covers = CoverSpheres(arrays)
 
     def bounds(
         self, frames: Array, pairs: Indices, within: float, known: Array | None
@@ -33,8 +33,8 @@ class NumpyDistances:
         """Lower bounds (n, p) [m] on the distances of `pairs` (p,), and where (k,) they are at most
         `within`: rows and columns.
 
-        They are those of balls, improved by beads if `within` is finite, or `known` (n, p) ones
-        where these are greater than `within`.
+        They are those of balls, improved by covering spheres if `within` is finite, or `known`
+        (n, p) bounds greater than `within`.
         """
         distance = self.ball_distances(frames, pairs) if known is None else known.copy()
         configuration, column = np.nonzero(distance <= within)
@@ -46,7 +46,7 @@ class NumpyDistances:
             # the ball around a shelf encloses half of the cell: a second bound leaves out most of
             # these pairs
             near = configuration, column
-            bound = self.bead_bounds(frames, configuration, pairs[column])
+            bound = self.cover_bounds(frames, configuration, pairs[column])
             distance[near] = np.maximum(distance[near], bound)
             chosen = bound <= within
             configuration, column = configuration[chosen], column[chosen]
@@ -72,12 +72,12 @@ class NumpyDistances:
         distance[:, self._half_space_first[pairs]] = -np.inf
         return np.asarray(distance)
 
-    def bead_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
+    def cover_bounds(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
         """Lower bounds (k,) [m] on the signed distances of pairs (k,) at configurations (k,); -inf
         if it has none.
         """
         return np.asarray(
-            self._beads.distances(frames, configuration, pair) - self._arrays.growth[pair]
+            self._covers.distances(frames, configuration, pair) - self._arrays.growth[pair]
         )
 
     def witness_points(

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision import clearance_proof
-from joulepath.optimizer.collision.clearance_proof import GAP, is_proven_clear, proven_clearance
-from joulepath.optimizer.collision.model import STRIDE, CollisionModel
+from joulepath.optimizer.collision.clearance_proof import (
+    CLEARANCE_PROOF,
+    is_proven_clear,
+    proven_clearance,
+)
+from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.clouds import Points
 from joulepath.optimizer.problem.scene import Obstacle, Scene
@@ -31,6 +37,10 @@ def samples(kind: str, seed: int, count: int) -> Array:
     return positions(wander(seed), np.linspace(0, wander(seed).duration, count))
 
 
+STRIDE = 6
+"""Default stride of `CollisionModel.distances_along`."""
+
+
 @pytest.mark.parametrize("kind", ["motion", "leaps", "still"])
 @pytest.mark.parametrize(
     "count", [1, 2 * STRIDE, 2 * STRIDE + 1, 3 * STRIDE + 1, 5 * STRIDE - 1, 97]
@@ -41,13 +51,13 @@ def test_distances_along_a_motion(kind: str, count: int) -> None:
     exact = model.signed_distances(q)[0]
     pairs = np.arange(0, len(model.pairs), 3)
     for within in WITHIN:
-        found = model.along(q, within)
+        found = model.distances_along(q, within)
         assert (found <= exact + ROUNDING).all(), "lower bounds"
         is_near = exact <= within
         assert is_near.any() or within < WITHIN[-1]
         assert found[is_near] == pytest.approx(exact[is_near], abs=ROUNDING)
         assert (found[~is_near] > within).all()
-        some = model.along(q, within, pairs)
+        some = model.distances_along(q, within, pairs)
         assert (some <= exact[:, pairs] + ROUNDING).all() and (
             (some <= within) == is_near[:, pairs]
         ).all()
@@ -64,7 +74,9 @@ def test_what_is_proven_clear_is_certified() -> None:
         )
         assert proof is not None
         clear += is_clear
-        assert proof.min_clearance >= 0 if is_clear else proof.min_clearance < 2 * GAP
+        assert (
+            proof.min_clearance >= 0 if is_clear else proof.min_clearance < 2 * CLEARANCE_PROOF.gap
+        )
     assert 3 < clear < 57
 
 
@@ -80,9 +92,10 @@ def test_what_is_proven_clear_is_certified_even_if_its_proof_takes_too_long(
     model, motion = CollisionModel(Arm(robot=ROBOT, scene=scene)), wander(4)
     exhausted = 0
     for most in (800, 1600, 3200, 6400, 12800):
-        monkeypatch.setattr(clearance_proof, "MOST_CHECKS", most)
+        settings = replace(CLEARANCE_PROOF, max_checks=most)
+        monkeypatch.setattr(clearance_proof, "CLEARANCE_PROOF", settings)
         proof = proven_clearance(model, motion)
         assert proof is not None and proof.min_clearance <= proof.sampled
-        exhausted += proof.min_clearance < proof.sampled - 2 * GAP
+        exhausted += proof.min_clearance < proof.sampled - 2 * CLEARANCE_PROOF.gap
         assert proof.min_clearance >= 0 or not is_proven_clear(model, motion)
     assert exhausted

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
+from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -73,7 +73,7 @@ def test_proven_clearance_is_just_below_the_replay(seed: int, crowded: bool) -> 
     assert proof.min_clearance <= least + ROUNDING
     # the replay misses the least by what moves in half its step: micrometres, at its flat bottom
     assert least <= proof.sampled + 1e-5
-    gap = max(GAP, RELATIVE_GAP * abs(proof.sampled))
+    gap = max(CLEARANCE_PROOF.gap, CLEARANCE_PROOF.relative_gap * abs(proof.sampled))
     assert proof.sampled - proof.min_clearance <= gap + ROUNDING
 
 
@@ -152,7 +152,9 @@ def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
     expected = ends[:, 2].min() - capsule.radius - (height[2, 3] - 0.2)
     assert proof.sampled == pytest.approx(expected, abs=1e-12)
     assert (
-        expected - RELATIVE_GAP * expected - ROUNDING <= proof.min_clearance <= expected + ROUNDING
+        expected - CLEARANCE_PROOF.relative_gap * expected - ROUNDING
+        <= proof.min_clearance
+        <= expected + ROUNDING
     )
 
 

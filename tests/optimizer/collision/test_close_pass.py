@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
-from joulepath.optimizer.collision.close_pass import CLOSE, close_pass
+from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
+from joulepath.optimizer.collision.close_pass import CLOSE_PASS, close_pass
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.recording import Waypoints
@@ -28,7 +28,7 @@ GOAL = START + np.array([1.0, 0, 0, 0, 0, 0])
 MOTION = quintic_spline(START, GOAL, 1.0)
 BALL = 0.05
 # m; the proof ends this far below the distance at the latest
-PROOF = max(GAP, RELATIVE_GAP * CLOSE)
+PROOF = max(CLEARANCE_PROOF.gap, CLEARANCE_PROOF.relative_gap * CLOSE_PASS.distance)
 
 
 def on_the_axis(distance: float, margin: float) -> Arm:
@@ -61,9 +61,9 @@ def test_a_pass_below_the_threshold_is_found(distance: float) -> None:
     assert distance - PROOF <= near.min_clearance <= distance + 1e-6
 
 
-@pytest.mark.parametrize("margin", [0.0, CLOSE, 5e-3])
+@pytest.mark.parametrize("margin", [0.0, CLOSE_PASS.distance, 5e-3])
 def test_a_pass_above_it_is_not(margin: float) -> None:
-    assert found(on_the_axis(CLOSE + 1.1 * PROOF, margin)) is None
+    assert found(on_the_axis(CLOSE_PASS.distance + 1.1 * PROOF, margin)) is None
 
 
 @pytest.mark.parametrize("margin", [1e-3, 1.99e-3])

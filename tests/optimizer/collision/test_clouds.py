@@ -13,16 +13,16 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bounding_tree import BoundingTree, point_segment
-from joulepath.optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
+from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
 from joulepath.optimizer.collision.closed_form_distance import triangle_segment
-from joulepath.optimizer.collision.clouds import LONGEST_EDGE, Cloud, divided
-from joulepath.optimizer.collision.coal_distance import SKIN, coal_shape
+from joulepath.optimizer.collision.clouds import CLOUDS, Cloud, divided
+from joulepath.optimizer.collision.coal_distance import COAL, coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.clouds import MOST_POINTS, Points, TriangleMesh, Voxels
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Points, TriangleMesh, Voxels
 from joulepath.optimizer.problem.clouds import Cloud as Shape
 from joulepath.optimizer.problem.scene import Attachment, Box, Mesh, Obstacle, Scene, Sphere
 from joulepath.optimizer.search.errors import StartInCollision
@@ -32,7 +32,7 @@ from tests.selection import long_but
 
 # two exact computations of one distance [m] differ by rounding; by Coal's tolerance where it takes
 # part
-ROUNDING, COAL = 1e-9, 1e-7
+ROUNDING, COAL_TOLERANCE = 1e-9, 1e-7
 # a gradient by central differences of STEP [rad]: curvature of distances of centimetres, and
 # rounding over the step
 STEP, GRADIENT = 1e-6, 1e-4
@@ -136,7 +136,7 @@ def test_the_distance_is_that_of_the_nearest_part(kind: str, load: int) -> None:
     q = rng().uniform(-3, 3, (25, 6))
     ours = by_body(model_of([Obstacle("cloud", shape, POSE, MARGIN)], load), q)
     theirs = by_body(model_of(parts, load), q)
-    tolerance = THICKNESS if kind == "triangles" else COAL
+    tolerance = THICKNESS if kind == "triangles" else COAL_TOLERANCE
     apart = theirs > -MARGIN  # the depth of an overlap is that of one of the parts
     assert apart.any() and np.abs(ours - theirs)[apart].max() <= tolerance
     assert (ours[~apart] <= -MARGIN + tolerance).all()
@@ -202,7 +202,7 @@ def test_triangle_and_segment_by_coal() -> None:
         x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
         x /= np.linalg.norm(x)
         R = np.column_stack([x, np.cross(z, x), z])
-        capsule = coal.Capsule(SKIN, float(np.linalg.norm(segment[1] - segment[0])))
+        capsule = coal.Capsule(COAL.skin, float(np.linalg.norm(segment[1] - segment[0])))
         theirs = coal.distance(
             coal_shape(Core(triangle))[0],
             coal.Transform3s(),
@@ -212,7 +212,7 @@ def test_triangle_and_segment_by_coal() -> None:
             coal.DistanceResult(),
         )
         if distance[k] > 0:
-            assert distance[k] - SKIN == pytest.approx(theirs, abs=COAL)
+            assert distance[k] - COAL.skin == pytest.approx(theirs, abs=COAL_TOLERANCE)
         else:
             crossings += 1
         # the separation along the normal attains the distance, and along no other direction it is
@@ -234,7 +234,7 @@ def test_divided_triangles_cover_the_same_surface() -> None:
     def doubled(t: Array) -> Array:
         return np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
 
-    assert np.linalg.norm(pieces - np.roll(pieces, 1, axis=1), axis=2).max() <= LONGEST_EDGE
+    assert np.linalg.norm(pieces - np.roll(pieces, 1, axis=1), axis=2).max() <= CLOUDS.longest_edge
     areas = [np.linalg.norm(doubled(t), axis=1).sum() for t in (pieces, triangles)]
     assert areas[0] == pytest.approx(areas[1])
     # distances do not change
@@ -263,7 +263,7 @@ def test_a_closed_box_is_the_box() -> None:
     # the proof and the certificate need the sign within: skins of capsules hold where cores are
     # apart
     assert (
-        np.abs(ours - theirs)[outside].max() < COAL
+        np.abs(ours - theirs)[outside].max() < COAL_TOLERANCE
         and (ours[~outside] < 0).all()
         and (~outside).any()
     )
@@ -292,7 +292,7 @@ def test_the_proof_is_that_of_the_parts(kind: str, seed: int) -> None:
     model = model_of([Obstacle("cloud", shape, POSE, MARGIN)])
     ours, theirs = proven_clearance(model, motion), proven_clearance(model_of(parts), motion)
     assert ours is not None and theirs is not None
-    slack = max(GAP, RELATIVE_GAP * abs(ours.sampled))
+    slack = max(CLEARANCE_PROOF.gap, CLEARANCE_PROOF.relative_gap * abs(ours.sampled))
     assert ours.sampled - slack - ROUNDING <= ours.min_clearance <= ours.sampled
     q = motion.curve(np.linspace(0.0, motion.duration, 4001))
     least = min(model.least_distance(block, 0.05) for block in np.array_split(q, 20))
@@ -300,7 +300,7 @@ def test_the_proof_is_that_of_the_parts(kind: str, seed: int) -> None:
     if ours.sampled > -MARGIN:
         # both are proven to within their gap of the same true clearance
         assert ours.min_clearance == pytest.approx(
-            theirs.min_clearance, abs=slack + THICKNESS + COAL
+            theirs.min_clearance, abs=slack + THICKNESS + COAL_TOLERANCE
         )
 
 
@@ -311,11 +311,11 @@ def test_the_planner_rejects_what_collides(kind: str) -> None:
     checker, stricter = StateValidityChecker(arm, model), StateValidityChecker(arm, model, 5e-3)
     q = rng(12).uniform(-2.5, 2.5, (300, 6))
     distance = model.signed_distances(q)[0].min(axis=1)
-    clear = np.abs(distance) > COAL
+    clear = np.abs(distance) > COAL_TOLERANCE
     valid = np.array([checker.is_valid(each) for each in q])
     assert (valid == (distance > 0))[clear].all() and 5 < valid.sum() < 295
     strict = np.array([stricter.is_valid(each) for each in q])
-    assert (strict == (distance > 5e-3))[np.abs(distance - 5e-3) > COAL].all()
+    assert (strict == (distance > 5e-3))[np.abs(distance - 5e-3) > COAL_TOLERANCE].all()
 
 
 def test_two_obstacles_of_one_content_at_two_places() -> None:
@@ -348,7 +348,7 @@ NAN = np.array([[0.0, np.nan, 0.0]])
         (lambda: Points(np.zeros((0, 3)), 0.1), "points"),
         (lambda: Points(NAN, 0.1), "points"),
         (lambda: Points(np.zeros((2, 2)), 0.1), "points"),
-        (lambda: Points(np.zeros((MOST_POINTS + 1, 3)), 0.1), "points"),
+        (lambda: Points(np.zeros((CLOUD_RANGES.max_points + 1, 3)), 0.1), "points"),
         (lambda: Points(np.full((1, 3), 1e3), 0.1), "points"),
         (lambda: Points(np.zeros((1, 3)), 0.0), "radius"),
         (lambda: Points(np.zeros((1, 3)), float("nan")), "radius"),
@@ -362,7 +362,10 @@ NAN = np.array([[0.0, np.nan, 0.0]])
         (lambda: Attachment(Points(np.zeros((1, 3)), 0.1)), "shape"),
         (
             lambda: Scene(
-                [Obstacle(f"{k}", Points(np.zeros((MOST_POINTS, 3)), 0.1)) for k in range(3)]
+                [
+                    Obstacle(f"{k}", Points(np.zeros((CLOUD_RANGES.max_points, 3)), 0.1))
+                    for k in range(3)
+                ]
             ),
             "scene.obstacles",
         ),

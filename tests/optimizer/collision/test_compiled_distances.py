@@ -136,8 +136,8 @@ def test_bounds(seed: int, within: float) -> None:
             np.testing.assert_array_equal(one, other)
         np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=SAME)
     configuration, pair = (each.ravel() for each in np.indices((len(frames), len(model.pairs))))
-    beads = [each.bead_bounds(frames, configuration, pair) for each in (model.geometry, by_numpy)]
-    np.testing.assert_allclose(*beads, rtol=0, atol=SAME)
+    bounds = [each.cover_bounds(frames, configuration, pair) for each in (model.geometry, by_numpy)]
+    np.testing.assert_allclose(*bounds, rtol=0, atol=SAME)
 
 
 @pytest.mark.parametrize("within", [0.1, np.inf])

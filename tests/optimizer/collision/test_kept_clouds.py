@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.collision.clouds import MOST_DIVIDED, MOST_KEPT_PARTS, cloud_of
+from joulepath.optimizer.collision.clouds import CLOUDS, cloud_of
 from joulepath.optimizer.problem.clouds import Points
 
 # clouds that fill the cache
@@ -33,12 +33,17 @@ def test_a_repeated_obstacle_is_built_once() -> None:
 
 
 def test_the_cloud_that_rested_longest_leaves_a_full_cache() -> None:
-    scans = [Points(points(MOST_KEPT_PARTS // FIT, seed), 0.01) for seed in range(FIT + 1)]
+    scans = [Points(points(CLOUDS.max_kept_parts // FIT, seed), 0.01) for seed in range(FIT + 1)]
     made = [cloud_of(scan) for scan in scans[:FIT]]
     # it counts parts, not obstacles, and holds the largest
-    assert cloud_of.cache.currsize == MOST_KEPT_PARTS == cloud_of.cache.maxsize >= MOST_DIVIDED
+    assert (
+        cloud_of.cache.currsize
+        == CLOUDS.max_kept_parts
+        == cloud_of.cache.maxsize
+        >= CLOUDS.max_triangles
+    )
     assert cloud_of(scans[0]) is made[0]  # now the second one has rested longest
     made.append(cloud_of(scans[FIT]))
-    assert cloud_of.cache.currsize == MOST_KEPT_PARTS
+    assert cloud_of.cache.currsize == CLOUDS.max_kept_parts
     again = [cloud_of(scans[k]) is made[k] for k in (0, *range(2, FIT + 1), 1)]
     assert again == [True] * FIT + [False]

@@ -13,15 +13,9 @@ from scipy.spatial.transform import Rotation
 from joulepath import optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.planner.path_planner import (
-    REGIONS,
-    STEP,
-    PlannedPaths,
-    PlanningEnd,
-    along,
-    interpolation_is_free,
-    plan_paths,
-)
+from joulepath.optimizer.collision.planner.joint_path import interpolation_is_free, path_samples
+from joulepath.optimizer.collision.planner.path_planner import PLANNER, REGIONS, plan_paths
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.exceptions import NoTrajectory
@@ -207,7 +201,10 @@ def test_two_paths_are_distinct() -> None:
     paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     assert len(paths) == 2
     v_max = arm.active_limits.v_max
-    assert np.abs(along(paths[0], 1.0, v_max)[0] - along(paths[1], 1.0, v_max)[0]).max() > 0.3
+    assert (
+        np.abs(path_samples(paths[0], 1.0, v_max)[0] - path_samples(paths[1], 1.0, v_max)[0]).max()
+        > 0.3
+    )
 
 
 def test_a_free_straight_line_is_the_only_path() -> None:
@@ -354,8 +351,8 @@ def test_interpolation_between_paths_on_two_sides_of_an_obstacle_collides() -> N
     arm, q_start, q_goal = task("post")
     model, ones = CollisionModel(arm), np.ones(6)
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    around = along(path, 1.0, ones)[0]
-    through = along(np.stack([q_start, q_goal]), 1.0, ones)[0]
+    around = path_samples(path, 1.0, ones)[0]
+    through = path_samples(np.stack([q_start, q_goal]), 1.0, ones)[0]
     assert interpolation_is_free(model, around, around)
     assert not interpolation_is_free(model, around, 2 * through - around)
 
@@ -388,13 +385,13 @@ def test_planned_paths_keep_the_tool_within_its_cone() -> None:
         plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)).paths for a in (arm, held)
     )
     assert within
-    assert widest(within) <= 1 + STEP / cone.half_angle
+    assert widest(within) <= 1 + PLANNER.step / cone.half_angle
     assert widest(free) > 1.2
 
 
 def test_samples_along_a_path_rest_at_its_ends_and_round_its_corners() -> None:
     path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]])
-    q, t = along(path, 3.0, np.array([1.0, 1.0]))
+    q, t = path_samples(path, 3.0, np.array([1.0, 1.0]))
     assert t[0] == 0 and t[-1] == 3
     np.testing.assert_array_equal(q[[0, -1]], path[[0, -1]])
     v = np.gradient(q, t, axis=0)

@@ -12,7 +12,7 @@ from joulepath.models.uncertainty.spread import spread_of
 from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
 from joulepath.optimizer.dynamics.losses import breakdown
-from joulepath.optimizer.dynamics.plant import REPORT_NODES
+from joulepath.optimizer.dynamics.plant import REPORT
 from joulepath.optimizer.motion.spline import fine_samples
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
@@ -34,7 +34,7 @@ class Replayed:
     def __init__(self, asked: Cycle, move: CycleMove) -> None:
         self.asked, self.planned, self.length = asked, move.planned, move.planned.dwell + move.wait
         spline, still = move.solution.trajectory.spline, np.zeros((1, 6))
-        self.weights, q, self.v, self.a = fine_samples(spline, REPORT_NODES)
+        self.weights, q, self.v, self.a = fine_samples(spline, REPORT.nodes_per_panel)
         before, after = (
             problem(payload=arm.payload) for arm in (move.planned.arm, move.planned.arm_after)
         )

@@ -124,6 +124,18 @@ def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> No
         assert (each.saving is None) == (not each.within_limits)
         if each.saving is not None and each.duration == found.duration:
             assert each.saving == pytest.approx(1 - own / each.electrical, abs=ROUNDING)
+    # the same configurations and times, by the motions of the answers of its moves
+    rests = sum(move.dwell_energy + move.wait_energy for move in found.moves)
+    for name in ("ruckig_slowed", "straight"):
+        (whole,) = (each for each in found.baselines if each.name == name)
+        parts = [
+            each for move in found.moves for each in move.solution.baselines if each.name == name
+        ]
+        assert whole.duration == found.duration
+        assert whole.electrical == pytest.approx(
+            rests + sum(each.electrical for each in parts), rel=ROUNDING
+        )
+        assert whole.within_limits == all(each.within_limits for each in parts)
 
 
 @pytest.mark.parametrize("start", [HOME, poses(1, 4)[3]], ids=["joint positions", "pose"])

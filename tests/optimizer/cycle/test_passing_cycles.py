@@ -21,7 +21,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import MOST_PASSES, Cycle
+from joulepath.optimizer.problem.cycle import CYCLE_RANGES, Cycle
 from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.line import Line
 from joulepath.optimizer.problem.pose import Pose
@@ -283,7 +283,7 @@ def test_what_does_not_fit_a_pass_is_refused(
 
 
 def test_a_motion_has_a_dozen_passes_at_most() -> None:
-    many = [Stop(name=f"{k}", target=Q[k % 3], via=True) for k in range(MOST_PASSES)]
+    many = [Stop(name=f"{k}", target=Q[k % 3], via=True) for k in range(CYCLE_RANGES.max_passes)]
     of(
         *many,
         Stop(name="rest", target=Q[0]),
@@ -291,7 +291,7 @@ def test_a_motion_has_a_dozen_passes_at_most() -> None:
     )
     with pytest.raises(InvalidProblem) as caught:
         of(*many, Stop(name="one more", target=Q[0], via=True))
-    assert caught.value.field == f"stops.{MOST_PASSES}.via"
+    assert caught.value.field == f"stops.{CYCLE_RANGES.max_passes}.via"
 
 
 def test_passes_at_the_same_place_are_one() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel import Kernel
 from joulepath.optimizer.dynamics.kernel_expressions import Parameters
-from joulepath.optimizer.dynamics.plant import KNEE
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem
 
@@ -58,11 +58,13 @@ def left_out(kernel: Kernel, y: Array, weight: Array, p: Array, dry: Array) -> A
     concave. The cost's slope by the parameter `coulomb` tells what friction costs.
     """
     v, step = y[:, 6:12], 1e-6
-    size = np.sqrt(v**2 + KNEE**2)
+    size = np.sqrt(v**2 + SMOOTHING.knee**2)
     concave = np.zeros((len(y), 18, 18))
     for j, k in enumerate(places("coulomb")):
         moved = step * np.eye(len(p))[k]
         slope = (kernel.value(y, p + moved)[0].copy() - kernel.value(y, p - moved)[0]) / (2 * step)
-        bend = -3 * KNEE**2 * v[:, j] / size[:, j] ** 5 * np.broadcast_to(dry, v.shape)[:, j]
+        bend = (
+            -3 * SMOOTHING.knee**2 * v[:, j] / size[:, j] ** 5 * np.broadcast_to(dry, v.shape)[:, j]
+        )
         concave[:, 6 + j, 6 + j] = weight * np.minimum(slope / (v[:, j] / size[:, j]) * bend, 0.0)
     return concave

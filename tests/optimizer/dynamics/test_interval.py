@@ -18,9 +18,9 @@ from joulepath.models.uncertainty.parameters import count, index, place, values
 from joulepath.models.uncertainty.ranges import default_ranges
 from joulepath.models.uncertainty.spread import DRAWS, Spread, spread_of
 from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
-from joulepath.optimizer.dynamics.interval import Known, interval_of, saving_interval
+from joulepath.optimizer.dynamics.interval import MotionEnergy, interval_of, saving_interval
 from joulepath.optimizer.dynamics.losses import breakdown
-from joulepath.optimizer.dynamics.plant import REPORT_NODES
+from joulepath.optimizer.dynamics.plant import REPORT
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
 from joulepath.optimizer.motion.spline import Spline, fine_samples
@@ -74,7 +74,7 @@ class Reevaluated:
 
     def __init__(self, task: Problem, spline: Spline) -> None:
         self.task, self.duration = task, spline.duration
-        self.weights, q, self.v, self.a = fine_samples(spline, REPORT_NODES)
+        self.weights, q, self.v, self.a = fine_samples(spline, REPORT.nodes_per_panel)
         self.tau = torques(task, q, self.v, self.a)
         still = np.zeros((1, q.shape[1]))
         self.held = torques(task, spline.control_points[-1:], still, still)[0]
@@ -201,7 +201,7 @@ def test_errors_of_the_links_widen_the_interval() -> None:
     robot, spline = with_link_errors(ROBOT), quintic_spline(START, GOAL, 0.9)
     plain, task = (problem(payload=PAYLOAD, robot=each) for each in (ROBOT, robot))
     before, after = (
-        interval_of(Known(60.0, PreparedProblem.of(each).sensitivity(spline), 0.9), each.arm)
+        interval_of(MotionEnergy(60.0, PreparedProblem.of(each).sensitivity(spline), 0.9), each.arm)
         for each in (plain, task)
     )
 
@@ -361,7 +361,7 @@ def test_identified_figures_cover_the_truth() -> None:
     task = problem(robot=robot, payload=PAYLOAD)
     splines = [quintic_spline(START, START + x * (GOAL - START), 0.6 + x) for x in (0.3, 0.6, 1.0)]
     known = [
-        Known(
+        MotionEnergy(
             PreparedProblem.of(task).energy(s).electrical.total,
             PreparedProblem.of(task).sensitivity(s),
             s.duration,
@@ -399,7 +399,7 @@ def test_identified_figures_cover_the_truth() -> None:
 def test_a_saving_keeps_what_each_motion_has_of_its_own() -> None:
     """Two motions of the same energy and gradient differ by their move effects alone."""
     arm = problem(robot=identified(session_sd=0.0)).arm
-    one = Known(100.0, Sensitivity(np.zeros(count(6)), 0.0), 2.0)
+    one = MotionEnergy(100.0, Sensitivity(np.zeros(count(6)), 0.0), 2.0)
     saving = saving_interval(one, one, arm)
     assert saving.sd == pytest.approx(np.sqrt(2) * 2.0 * MOVE_SD / 100, rel=0.05)
     assert saving.p5 == pytest.approx(-1.645 * saving.sd, rel=0.1) and saving.p95 == pytest.approx(

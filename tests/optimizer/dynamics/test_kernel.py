@@ -66,7 +66,10 @@ def test_compiled_equals_interpreted(
     )
 
 
-@pytest.mark.parametrize("count", [1, kernel.CHUNK - 1, kernel.CHUNK, kernel.CHUNK + 1])
+@pytest.mark.parametrize(
+    "count",
+    [1, kernel.KERNEL.chunk_nodes - 1, kernel.KERNEL.chunk_nodes, kernel.KERNEL.chunk_nodes + 1],
+)
 def test_torques_are_pinocchios(compiled: Kernel, count: int) -> None:
     """Whatever the number of samples, with payload and tilted gravity."""
     y = states(3, count)

@@ -25,11 +25,16 @@ from joulepath.models.registry import robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.dynamics import kernel
 from joulepath.optimizer.dynamics.kernel import Kernel, kernel_for
-from joulepath.optimizer.dynamics.kernel_cache import SOURCES, compile_kernel, digest, library_path
+from joulepath.optimizer.dynamics.kernel_cache import (
+    SOURCE_MODULES,
+    compile_kernel,
+    digest,
+    library_path,
+)
 from joulepath.optimizer.dynamics.kernel_expressions import build
 from joulepath.optimizer.dynamics.kernel_source import AVX2, PORTABLE, source
 from joulepath.optimizer.native.build import compiler
-from joulepath.optimizer.native.library_cache import workplace
+from joulepath.optimizer.native.library_cache import work_folder
 from joulepath.optimizer.optimize import optimize
 from tests.optimizer.dynamics.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
@@ -77,7 +82,7 @@ def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> No
         source(build(ROBOT), 2)
     finally:
         sys.setprofile(None)
-    sources = {Path(str(module.__file__)).resolve() for module in SOURCES}
+    sources = {Path(str(module.__file__)).resolve() for module in SOURCE_MODULES}
     rooms = [(ours / part).resolve() for part in ("optimizer", "models")]
     assert {
         path.resolve() for path in ran if any(path.resolve().is_relative_to(room) for room in rooms)
@@ -262,7 +267,7 @@ def test_several_processes_make_one_library_of_each_robot(
 def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
     target = library_path(workshop.robot, PORTABLE)
     target.parent.mkdir()
-    with workplace(target) as folder:
+    with work_folder(target) as folder:
         (folder / "kernel.c").write_text("half")
         left = shutil.copytree(folder, f"{folder}-killed.part")
     assert workshop.leftovers() == [left.removeprefix(f"{target.parent}/")]

@@ -14,7 +14,7 @@ import pytest
 from joulepath.optimizer.dynamics.kernel_cache import COMPILER_FLAGS
 from joulepath.optimizer.dynamics.kernel_expressions import SYMBOLICS, build, sizes
 from joulepath.optimizer.dynamics.kernel_functions import Compiled, Interpreted
-from joulepath.optimizer.dynamics.kernel_source import source, vectors
+from joulepath.optimizer.dynamics.kernel_source import source, widest_vectors
 from joulepath.optimizer.native.build import compiler
 from tests.optimizer.dynamics.kernel_states import states
 from tests.optimizer.moves import ROBOT
@@ -30,8 +30,8 @@ def library(functions: list[ca.Function], lanes: int, folder: Path) -> Path:
     code.write_text(source(functions, lanes))
     command = compiler()
     assert command is not None
-    own, flags = vectors()
-    how = [*COMPILER_FLAGS, *(flags if own == lanes else ()), "-O0"]
+    own = widest_vectors()
+    how = [*COMPILER_FLAGS, *(own.flags if own.lanes == lanes else ()), "-O0"]
     subprocess.run([command, *how, str(code), "-o", str(target), "-lm"], check=True)
     return target
 

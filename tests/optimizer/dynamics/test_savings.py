@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.uncertainty.parameters import count
-from joulepath.optimizer.dynamics.interval import Known, saving_interval, saving_intervals
+from joulepath.optimizer.dynamics.interval import MotionEnergy, saving_interval, saving_intervals
 from joulepath.optimizer.result.energy import Sensitivity
 from tests.optimizer.moves import problem
 
@@ -14,7 +14,9 @@ from tests.optimizer.moves import problem
 def test_several_savings_are_each_one_by_itself() -> None:
     """Of no energy, and of none at all, too."""
     arm, rng = problem().arm, np.random.default_rng(5)
-    known = [Known(e, Sensitivity(rng.normal(size=count(6)), 0.1), 1.5) for e in (50.0, 60.0, 0.0)]
+    known = [
+        MotionEnergy(e, Sensitivity(rng.normal(size=count(6)), 0.1), 1.5) for e in (50.0, 60.0, 0.0)
+    ]
     alone = [saving_interval(known[0], each, arm) for each in known]
     for one, other in zip(saving_intervals(known[0], known, arm), alone, strict=True):
         # means over the draws, summed in another order

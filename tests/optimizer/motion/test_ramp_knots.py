@@ -21,7 +21,7 @@ COUNT = 13
 def switches(duration: float, speed: float = 0.1) -> np.ndarray:
     """Of a joint that travels 2 rad."""
     way = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0])
-    return seven_segment.switches(way, duration, limits(v_max=speed), RAMPS.closest)
+    return seven_segment.switches(way, duration, limits(v_max=speed), RAMPS.closest_switches)
 
 
 @pytest.mark.parametrize("repeat", [1, 2, 3])
@@ -35,7 +35,7 @@ def test_spans_grow_from_the_ramps(duration: float, repeat: int) -> None:
     between = (breaks[1:-1] > 0.02) & (breaks[1:-1] < 0.98)
     assert max(ratios[between].max(), 1 / ratios[between].min()) <= RAMPS.growth * (1 + ROUNDING)
     assert lengths.max() <= 1 / (COUNT - bspline.DEGREE) + ROUNDING
-    assert lengths.min() >= RAMPS.finest / 10
+    assert lengths.min() >= RAMPS.shortest_end_span / 10
     assert (counts[1:-1] == repeat).sum() >= 2
     assert np.allclose(breaks, 1 - breaks[::-1], atol=ROUNDING)
 
@@ -43,7 +43,7 @@ def test_spans_grow_from_the_ramps(duration: float, repeat: int) -> None:
 def test_no_ramp_is_too_short_for_a_knot() -> None:
     """Of ten minutes, a ramp of a hundredth of a second: there is a knot at the finest distance."""
     breaks = np.unique(RAMPS.space(np.array([2e-6, 1 - 2e-6]), 3, COUNT).knots)
-    assert breaks[1] == RAMPS.finest and breaks[-2] == 1 - RAMPS.finest
+    assert breaks[1] == RAMPS.shortest_end_span and breaks[-2] == 1 - RAMPS.shortest_end_span
 
 
 @pytest.mark.parametrize("repeat", [2, 3])
@@ -57,7 +57,7 @@ def test_a_refined_space_holds_every_motion_of_the_first(repeat: int) -> None:
     x = np.linspace(0, 1, 4001)
     assert np.allclose(finer.matrix(x) @ again, first.matrix(x) @ points, atol=REFIT)
     breaks, counts = np.unique(finer.knots, return_counts=True)
-    assert np.diff(breaks).max() <= RAMPS.refined_widest + ROUNDING
+    assert np.diff(breaks).max() <= RAMPS.widest_refined_span + ROUNDING
     assert (counts[1:-1] == repeat).sum() == len(at)
 
 

@@ -8,21 +8,22 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from joulepath.optimizer.native import library_cache
 from joulepath.optimizer.native.library_cache import (
+    CacheSettings,
     CompilerHangs,
-    Patience,
     cache_directory,
     compile_library,
     is_intact,
     mark_used,
 )
 
-HASTY = Patience(compiler=0.5, look=0.01)
+HASTY = CacheSettings(compiler_timeout=0.5, poll_interval=0.01)
 ENDED = 20.0  # s; for a process that was killed to be gone, on a machine with much else to do
 
 
@@ -40,7 +41,7 @@ def test_libraries_that_rested_longest_leave(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of many arms that users bring; a library in use is marked, and stays."""
-    monkeypatch.setattr(library_cache, "MOST_LIBRARIES", 3)
+    monkeypatch.setattr(library_cache, "CACHE", replace(library_cache.CACHE, max_libraries=3))
     for k in range(5):
         for ending in (".so", ".sha256", ".lock"):
             (tmp_path / f"arm{k}{ending}").write_bytes(b"?")
@@ -104,7 +105,7 @@ def test_a_compiler_that_hung_rests(
         with pytest.raises(CompilerHangs):
             compile_library(target, (), str, HASTY)
     assert len(hung.read_text().split()) == 2
-    an_hour_ago = time.time() - HASTY.rest
+    an_hour_ago = time.time() - HASTY.retry_delay
     os.utime(note, (an_hour_ago, an_hour_ago))
     with pytest.raises(CompilerHangs):
         compile_library(target, (), str, HASTY)

@@ -10,8 +10,7 @@ import pytest
 from joulepath.optimizer.collision.cores import core_of
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.scene import (
-    MOST_OBSTACLES,
-    MOST_VERTICES,
+    SCENE_RANGES,
     Attachment,
     Box,
     Capsule,
@@ -53,7 +52,7 @@ def test_sizes(bad: float) -> None:
         np.full((8, 3), 0.3),
         CUBE * [1, NAN, 1],
         CUBE * 1e9,
-        np.ones((MOST_VERTICES + 1, 3)),
+        np.ones((SCENE_RANGES.max_vertices + 1, 3)),
         np.zeros((5, 2)),
         "vertices",
         [[0, 0, 0], [1, 0]],
@@ -83,8 +82,8 @@ def test_mesh_keeps_its_hull_alone() -> None:
 
 
 def test_scenes() -> None:
-    obstacles = [Obstacle(f"post {k}", Sphere(0.1)) for k in range(MOST_OBSTACLES)]
-    assert len(Scene(obstacles).obstacles) == MOST_OBSTACLES
+    obstacles = [Obstacle(f"post {k}", Sphere(0.1)) for k in range(SCENE_RANGES.max_obstacles)]
+    assert len(Scene(obstacles).obstacles) == SCENE_RANGES.max_obstacles
     with pytest.raises(InvalidProblem, match="at most"):
         Scene([*obstacles, Obstacle("one more", Sphere(0.1))])
     with pytest.raises(InvalidProblem, match="same name"):

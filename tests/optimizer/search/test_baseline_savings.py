@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.interval import Known
+from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.motion.ruckig_motion import straight, time_optimal
 from joulepath.optimizer.motion.time_scalings import (
     SampledMotion,
@@ -131,7 +131,7 @@ def test_a_saving_is_claimed_in_the_same_time_against_what_keeps_every_limit() -
     goal = standing(task.arm, GOAL, torques)
     table = list(compare(task).values())
     nothing = np.zeros_like(table[0].sensitivity.gradient)
-    ours = Known(60.0, Sensitivity(nothing, 0.0), DURATION)
+    ours = MotionEnergy(60.0, Sensitivity(nothing, 0.0), DURATION)
     fair = {each.name: each for each in with_savings(table, task, ours, goal)}
     for each in fair.values():
         assert (each.saving is None) == (not each.within_limits) == (each.saving_interval is None)

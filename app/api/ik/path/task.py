@@ -29,7 +29,7 @@ from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import PerSample, PerSampleAndJoint, Seconds, Unit
 from joulepath.optimizer.kinematics.tool_path.path_following import PathPoint, follow
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 
 MOST_POINTS = 1000
 """Largest number of points of a path."""
@@ -90,7 +90,7 @@ class IKPathRequest(RobotWithTcp):
         10.0,
         default=10.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=DURATIONS.longest,
     )
 
     @model_validator(mode="after")

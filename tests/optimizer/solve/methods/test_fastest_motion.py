@@ -8,7 +8,7 @@ import pytest
 
 from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.motion.spline import lasting
-from joulepath.optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.search.fastest import fastest_of
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import DurationInterval, fastest
@@ -35,7 +35,7 @@ def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
         )
 
     energy = models.cost_of(SPLINE)
-    own = DurationInterval(models.objective_parameters, LEAST_DURATION, LONGEST_DURATION)
+    own = DurationInterval(models.objective_parameters, DURATIONS.least, DURATIONS.longest)
     assert cost(own) == energy
     assert cost(replace(own, price=30.0)) == pytest.approx(energy + 30.0 * SPLINE.duration)
     assert cost(fastest(models)) == SPLINE.duration

@@ -9,7 +9,7 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.limited_torque import limited_parts
-from joulepath.optimizer.dynamics.torque_bound import SHARPNESS
+from joulepath.optimizer.dynamics.torque_bound import TORQUE_BOUND
 from joulepath.optimizer.motion import bspline, seven_segment
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.spline import Spline, peak_rates, retimed, sample, time_scale
@@ -71,11 +71,11 @@ def test_what_is_far_below_the_torque_limits_is_within_them_everywhere(
             q, v, a = sample(spline, np.linspace(0.0, spline.duration, SAMPLES))
             truth = np.abs(prepared.limited_torques(q, v, a)).max(axis=0)
             worst = max(worst, float((truth / estimated).max()))
-            if (estimated <= SHARPNESS.far_below * tau_max).all():
+            if (estimated <= TORQUE_BOUND.far_below * tau_max).all():
                 skipped += 1
                 assert (truth <= tau_max).all()
             else:
                 assert (torque_peaks(prepared, spline) >= truth * (1 - ROUNDING)).all()
     # with limits at the measured torques, all motions would count as far below
-    assert worst <= 1 / SHARPNESS.far_below
+    assert worst <= 1 / TORQUE_BOUND.far_below
     assert skipped

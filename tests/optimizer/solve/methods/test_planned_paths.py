@@ -8,14 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.collision.planner.path_planner import (
-    USUAL,
-    Effort,
-    PlannedPaths,
-    PlanningEnd,
-    along,
-    plan_paths,
-)
+from joulepath.optimizer.collision.planner.joint_path import path_samples
+from joulepath.optimizer.collision.planner.path_planner import USUAL_EFFORT, Effort, plan_paths
+from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -49,7 +44,7 @@ def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     turned = q_goal - 2 * np.pi * np.sign(q_goal) * np.eye(6)[3]
     alone = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), Effort(paths=1))
-    beside = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), like=path)
+    beside = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), template=path)
     (found,) = beside.paths
     np.testing.assert_array_equal(found[[0, -1]], [q_start, turned])
     assert least(arm, between(found)) > 0
@@ -61,7 +56,7 @@ def test_more_paths_are_planned_only_where_the_first_is_hard_to_find() -> None:
     ends, more = task("post"), Effort(paths=4, more_states=12_000)
     usual, many, easy = (
         plan_paths(*ends, Deadline.after(AMPLE), effort).paths
-        for effort in (USUAL, more, replace(more, easy=10**9))
+        for effort in (USUAL_EFFORT, more, replace(more, easy=10**9))
     )
     assert 2 == len(usual) < len(many) <= 4
     for path, same in zip(usual, easy, strict=True):
@@ -89,7 +84,7 @@ def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion()
     arm, q_start, q_goal = task("post")
     prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    path, t = along(path, 1.0, arm.active_limits.v_max)
+    path, t = path_samples(path, 1.0, arm.active_limits.v_max)
 
     def solved(incumbent_cost: float) -> SolveResult:
         context = SolveContext.of(prepared, q_start, q_goal, NEVER)
@@ -163,7 +158,7 @@ def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(
     solver = FreeSpline(replace(context, incumbent_cost=0.1))
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     assert (
-        solver.along_path(*along(path, 1.0, arm.active_limits.v_max)).iterations == 0
+        solver.along_path(*path_samples(path, 1.0, arm.active_limits.v_max)).iterations == 0
     ) == skipped
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import WIDTH
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -28,7 +28,7 @@ SPACE = bspline.uniform(13)
 def motions(**given: float) -> BatchedMotions:
     arm_limits = limits(**given)
     prepared = PreparedProblem.of(problem(objective="mechanical", **fixed(DURATION)))
-    p = prepared.parameters(mechanical=1.0, width=WIDTH)
+    p = prepared.parameters(mechanical=1.0, width=SMOOTHING.power_width)
     return BatchedMotions(prepared.kernel, SPACE, arm_limits, DURATION, p)
 
 

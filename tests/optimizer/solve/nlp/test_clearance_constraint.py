@@ -10,10 +10,7 @@ from joulepath import optimize
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_constraint import (
-    CHECKED,
-    COUNTED,
-    RESERVE,
-    SCALE,
+    CLEARANCE_CONSTRAINT,
     ClearanceConstraint,
 )
 from joulepath.optimizer.collision.model import CollisionModel
@@ -49,7 +46,11 @@ USED = 0.999
 # the same after peaks between the path points were repaired by one and a half times their excess
 USED_AFTER_REPAIR = 0.997
 # ratio of a clearance above which it is exact
-COUNTED_SHARE = 1 - (COUNTED - RESERVE) / SCALE
+COUNTED_SHARE = (
+    1
+    - (CLEARANCE_CONSTRAINT.gradient_distance - CLEARANCE_CONSTRAINT.reserve)
+    / CLEARANCE_CONSTRAINT.ratio_range
+)
 # relative tolerance of energies of one motion solved twice
 SAME_ENERGY = 1e-3
 
@@ -149,24 +150,32 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     q = np.linspace(HOME, GOAL, 25)
     v = np.zeros_like(q)
     found = path.linearised(q, v)
-    near = (found.value > COUNTED_SHARE) & (found.value < 1 + 0.01 / SCALE)
+    near = (found.value > COUNTED_SHARE) & (
+        found.value < 1 + 0.01 / CLEARANCE_CONSTRAINT.ratio_range
+    )
     assert near.sum() > 10
     for j in range(6):
         d = EPS * np.eye(6)[j]
         by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * EPS)
         np.testing.assert_allclose(
-            found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE
+            found.by_q[near][:, j],
+            by_q[near],
+            atol=GRADIENT_TOLERANCE / CLEARANCE_CONSTRAINT.ratio_range,
         )
 
 
 def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     model = CollisionModel(problem_with(HOME, GOAL, scene=Scene((low_post(),))).arm)
     q = np.linspace(HOME, GOAL, 25)
-    expected = 1 - (model.signed_distances(q)[0] - RESERVE) / SCALE
+    expected = (
+        1
+        - (model.signed_distances(q)[0] - CLEARANCE_CONSTRAINT.reserve)
+        / CLEARANCE_CONSTRAINT.ratio_range
+    )
     path, v = every_pair(model), np.zeros_like(q)
     for shares, counted, low in (
         (path.linearised(q, v).value, COUNTED_SHARE, WORKING_SET.near_path),
-        (path.ratios(q, v), CHECKED, 1 - LIMIT_REPAIR.tightening),
+        (path.ratios(q, v), CLEARANCE_CONSTRAINT.exact_ratio, 1 - LIMIT_REPAIR.tightening),
     ):
         near = expected > counted
         assert 2 < near.sum() < near.size

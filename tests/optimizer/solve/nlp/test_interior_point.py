@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.plant import SHARPER_WIDTHS
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.spline import peak_rates, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -101,13 +101,15 @@ def test_work_falls_within_the_limits(prepared: PreparedProblem, given: dict[str
     bounds = own.unbounded()
     wide = own.minimised(ENDS, own.first(ENDS, line(), WIDE, bounds), WIDE, bounds, 1e-3)
     first = own.first(ENDS, wide.free, WIDE, bounds)
-    found = own.minimised(ENDS, first, SHARPER_WIDTHS[-1], bounds, 2e-4)
+    found = own.minimised(ENDS, first, SMOOTHING.sharper_power_widths[-1], bounds, 2e-4)
     assert found.converged and found.work < first.work
     spline = spline_of(SPACE, own.points(ENDS, found.free), DURATION)
     # between the points, a rate exceeds its limit by little
     assert (peak_rates(spline) <= 1.02 * own.limits.rates).all()
     assert (found.slack > 0).all() and (np.abs(found.slope) <= 1).all()
-    again = own.minimised(ENDS, first, SHARPER_WIDTHS[-1], bounds, 2e-4, below=0.5 * found.work)
+    again = own.minimised(
+        ENDS, first, SMOOTHING.sharper_power_widths[-1], bounds, 2e-4, below=0.5 * found.work
+    )
     assert again.costlier and again.iterations < found.iterations
 
 

@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.losses import drawn_power, power_flow
-from joulepath.optimizer.dynamics.plant import KNEE, WIDTH
+from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.bspline import DEGREE, Basis
 from joulepath.optimizer.motion.quadrature import quadrature
@@ -99,10 +99,12 @@ def power(case: Case, q: Array, v: Array, a: Array) -> Array:
     task = case.task.problem
     tau = torques(task, q, v, a)
     if task.objective == "mechanical":
-        return np.asarray(np.hypot(tau * v, WIDTH).sum(axis=1))
-    friction = replace(task.arm.friction_law, knee=KNEE)
-    net = 36.7 + power_flow(tau, v, a, ROBOT.drives, friction, 0.1 * WIDTH).joints.sum(axis=1)
-    return np.asarray(drawn_power(net, 0.4, WIDTH))
+        return np.asarray(np.hypot(tau * v, SMOOTHING.power_width).sum(axis=1))
+    friction = replace(task.arm.friction_law, knee=SMOOTHING.knee)
+    net = 36.7 + power_flow(
+        tau, v, a, ROBOT.drives, friction, 0.1 * SMOOTHING.power_width
+    ).joints.sum(axis=1)
+    return np.asarray(drawn_power(net, 0.4, SMOOTHING.power_width))
 
 
 def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
@@ -130,7 +132,7 @@ def test_torques_are_those_of_the_motion(case: Case) -> None:
     """At every node, friction included, from SciPy's spline in real time."""
     curve, t = motion(case), case.program.basis.nodes * case.duration
     q, v, a = curve(t), curve(t, 1), curve(t, 2)
-    friction = replace(case.task.friction, knee=KNEE)
+    friction = replace(case.task.friction, knee=SMOOTHING.knee)
     expected = torques(case.task.problem, q, v, a) + friction.torque(v)
     tau = case.program.value(case.free, case.duration)[1].copy()
     assert np.abs(tau - expected).max() < TORQUE_TOLERANCE

@@ -1,0 +1,72 @@
+import { useState } from "preact/hooks";
+import { Button } from "../ui/Button";
+import { Section } from "../ui/Section";
+import { answered, stale, type Answered } from "../store/state";
+import type { Baseline } from "../store/types";
+import { figure, percent } from "../store/units";
+import { baselineName, energyOf, nounOf } from "../store/facts";
+
+const FEW = 1; // of those that break a limit, which are shown at once
+
+/** The same task in the usual ways. A saving is claimed only against those that keep every limit. */
+export function Baselines() {
+  const shown = answered.value;
+  const [all, setAll] = useState(false);
+  if (!shown) return null;
+  const { baselines, objective } = shown.solution;
+  const kept = baselines.filter((each) => each.within_limits);
+  const broken = baselines.filter((each) => !each.within_limits);
+  const first = all ? broken : broken.slice(0, FEW);
+  const row = (each: Baseline) => (
+    <tr key={each.name} class={each.within_limits ? undefined : "broken"}>
+      <th scope="row">
+        <i class={`swatch ${each.within_limits ? "other" : "hatched"}`} />
+        {baselineName(each.name)}
+      </th>
+      <td>{figure(each.duration)} s</td>
+      <td>{figure(each[objective])}</td>
+      <td>{each.within_limits ? <Saving of={each} /> : "–"}</td>
+    </tr>
+  );
+  return (
+    <Section title="Against the usual ways" id="baselines">
+      <table class={stale.value ? "stale" : undefined}>
+        <thead>
+          <tr><td /><th scope="col">time</th><th scope="col">J a {nounOf(shown)}</th><th scope="col">saves</th></tr>
+        </thead>
+        <tbody>
+          <Own shown={shown} />
+          {kept.map(row)}
+          {first.map(row)}
+        </tbody>
+      </table>
+      {!kept.length && <p class="hint">No usual way that was computed keeps every limit, so no saving is claimed.</p>}
+      {broken.length > 0 && (
+        <p class="hint">
+          Hatched: breaks a limit, so no saving is claimed.{" "}
+          {first.filter(({ reason }) => reason).map(({ name, reason }) => (
+            <span class="reason" key={name}>{baselineName(name)}: {reason}. </span>
+          ))}
+          {broken.length > FEW && <Button kind="link" onClick={() => setAll(!all)}>{all ? "Fewer" : `${broken.length - FEW} more`}</Button>}
+        </p>
+      )}
+    </Section>
+  );
+}
+
+function Own({ shown }: { shown: Answered }) {
+  return (
+    <tr class="total">
+      <th scope="row"><i class="swatch own" />This {nounOf(shown)}</th>
+      <td>{figure(shown.solution.duration)} s</td>
+      <td>{figure(energyOf(shown))}</td>
+      <td />
+    </tr>
+  );
+}
+
+function Saving({ of: { saving, saving_interval: interval } }: { of: Baseline }) {
+  if (saving === null) return <>–</>;
+  const likely = interval ? `likely ${percent(interval.p5)} to ${percent(interval.p95)}` : undefined;
+  return saving > 0 ? <b class="good" title={likely}>{percent(saving)}</b> : <span title={likely}>needs {percent(-saving)} less</span>;
+}

@@ -1,0 +1,33 @@
+// Projects as files.
+import { newId } from "../store/persist";
+import { cellOf, presentCell, save } from "../store/share";
+import { page, project, replaceCell, toast } from "../store/state";
+import { tell } from "../store/trouble";
+
+/** Saves the project as a file. */
+export function saveFile(): void {
+  const name = project.value.name.replace(/[^\w.-]+/g, "-").toLowerCase() || "cell";
+  save(`${name}.joulepath.json`, JSON.stringify(presentCell(), null, 1), "application/json");
+  toast.value = "The project is saved as a file.";
+}
+
+/** Opens a project file that is chosen, or a request as JSON. */
+export function openFile(): void {
+  const input = Object.assign(document.createElement("input"), { type: "file", accept: ".json,application/json" });
+  input.onchange = () => {
+    const file = input.files?.[0];
+    if (file) void readFile(file);
+  };
+  input.click();
+}
+
+export async function readFile(file: File): Promise<void> {
+  try {
+    const cell = cellOf(await file.text());
+    const name = cell.name ?? file.name.replace(/(\.joulepath)?\.json$/, "");
+    replaceCell({ project: { id: newId(), name }, request: cell.request, typed: cell.typed, economics: cell.economics });
+    page.value = "cell";
+  } catch (error) {
+    tell(new Error(`${file.name} is no project: ${(error as Error).message}`));
+  }
+}

@@ -1,0 +1,53 @@
+// A plain program of `movej` to the found joints, for those who write their programs by hand.
+import type { Answered } from "../store/state";
+import type { Payload } from "../store/types";
+
+const number = (value: number) => `${Number(value.toFixed(6))}`;
+const joints = (q: number[]) => `[${q.map(number).join(", ")}]`;
+const payload = (load: Payload | null | undefined) =>
+  `  set_target_payload(${number(load?.mass ?? 0)}, [${(load?.com ?? [0, 0, 0]).map(number).join(", ")}])`;
+
+interface Stop {
+  name: string;
+  q: number[];
+  load: Payload | null;
+  dwell: number;
+}
+
+/** Where the arm stands, in order, and what it carries from there on. */
+function stopsOf({ solution, cycle, cell }: Answered): Stop[] {
+  const { start, goal } = solution.branch;
+  if (!cycle) {
+    const load = cell.payload ?? null;
+    return [{ name: "start", q: start.q, load, dwell: 0 }, { name: "goal", q: goal.q, load, dwell: 0 }];
+  }
+  const stops: Stop[] = [{ name: "start", q: start.q, load: cycle.loads[0]?.payload ?? null, dwell: 0 }];
+  cycle.legs.forEach(({ kind, goal: to, duration }, k) => {
+    const load = cycle.loads[k + 1]?.payload ?? cycle.loads[k]?.payload ?? null;
+    if (kind === "dwell" || kind === "wait") stops.at(-1)!.dwell += duration;
+    else stops.push({ name: to.stop ?? "?", q: to.q, load, dwell: 0 });
+  });
+  return stops;
+}
+
+/** The text of a URScript program; `output`: a digital output that is on while the arm carries something more. */
+export function movejProgram(shown: Answered, speed: number, output: number | null): string {
+  const stops = stopsOf(shown);
+  const [a, v] = [number(1.4 * speed * speed), number(1.05 * speed)];
+  const base = stops[0]!.load?.mass ?? 0;
+  const lines = stops.flatMap(({ name, q, load, dwell }, k) => {
+    const before = k ? (stops[k - 1]!.load?.mass ?? 0) : base;
+    const mass = load?.mass ?? 0;
+    const grip = output === null || mass === before ? [] : [`  set_standard_digital_out(${output}, ${mass > base ? "True" : "False"})`];
+    const loaded = mass === before && k ? [] : [payload(load)];
+    return [`  # ${name}`, `  movej(${joints(q)}, a=${a}, v=${v})`, ...grip, ...(dwell ? [`  sleep(${number(dwell)})`] : []), ...loaded];
+  });
+  return [
+    "# The found joints; the controller chooses the way and the time between them.",
+    "# Clearance and energy of these ways are not proven.",
+    "def joulepath_movej():",
+    ...lines,
+    "end",
+    "",
+  ].join("\n");
+}

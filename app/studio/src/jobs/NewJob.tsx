@@ -1,0 +1,86 @@
+import { useState } from "preact/hooks";
+import { Button } from "../ui/Button";
+import { Dialog } from "../ui/Dialog";
+import { robotNow } from "../picture/pictured";
+import { post } from "../store/client";
+import { parseMoves, requestsOf } from "../store/moves";
+import { keepJob } from "../store/persist";
+import { robotName } from "../store/request";
+import { request, project } from "../store/state";
+import { figure } from "../store/units";
+import { loadJob, loadJobs, type Job } from "./model";
+
+const SAMPLE = "from; to; kg; x mm; y; z; rx rad; ry; rz; x mm; y; z; rx; ry; rz";
+const SHOWN = 5;
+
+/** A table of moves becomes a job, in the cell as it is now. */
+export function NewJob({ onClose }: { onClose: () => void }) {
+  const [text, setText] = useState("");
+  const [source, setSource] = useState("a pasted table");
+  const [name, setName] = useState("Moves");
+  const [chosen, setChosen] = useState(-1);
+  const [why, setWhy] = useState("");
+  const [busy, setBusy] = useState(false);
+  const joints = robotNow.value?.joints.length ?? 6;
+  const read = text.trim() ? parseMoves(text, joints) : null;
+  const readings = read && "readings" in read ? read.readings : [];
+  const reading = readings.length === 1 ? readings[0] : readings[chosen];
+  const moves = read && "moves" in read ? read.moves : [];
+  const start = async () => {
+    setBusy(true);
+    setWhy("");
+    try {
+      const requests = requestsOf(moves, reading!, request.value, joints);
+      const bodies = requests.map((each) => ({ optimize: { ...each, candidates: "none" } }));
+      const { id } = await post<Job>("jobs", { name, requests: bodies });
+      await keepJob({ id, source, moves, requests }).catch(() => undefined);
+      await loadJobs();
+      await loadJob(id);
+      onClose();
+    } catch (error) {
+      setWhy((error as Error).message);
+    } finally {
+      setBusy(false);
+    }
+  };
+  const take = async (file: File | undefined) => {
+    if (!file) return;
+    setText(await file.text());
+    setSource(file.name);
+    setName(file.name.replace(/\.\w+$/, ""));
+  };
+  return (
+    <Dialog
+      title="New job"
+      wide
+      onClose={onClose}
+      footer={<><span class="hint">In the cell “{project.value.name}”: {robotName(request.value)}, {request.value.scene?.obstacles?.length ?? 0} obstacles.</span><span class="space" /><Button onClick={onClose}>Cancel</Button><Button kind="primary" id="start-job" disabled={!reading || !moves.length || busy} onClick={start}>Start {moves.length || ""} moves</Button></>}
+    >
+      <div class="fields">
+        <label>Name <input type="text" value={name} onChange={(event) => setName(event.currentTarget.value)} /></label>
+        <label>A CSV file <input type="file" id="moves-file" accept=".csv,.txt,.tsv" onChange={(event) => void take(event.currentTarget.files?.[0])} /></label>
+        <label>
+          or paste: one move in a row
+          <textarea id="moves-text" rows={9} spellcheck={false} placeholder={SAMPLE} value={text} onInput={(event) => { setText(event.currentTarget.value); setChosen(-1); }} />
+        </label>
+        <p class="hint">Names and kg may be left out. Joint positions may stand in place of poses; with one target in a row, the moves go from each to the next.</p>
+        {read && "why" in read && <p class="error" role="alert">{read.why}</p>}
+        {why && <p class="error" role="alert" id="job-error">{why}</p>}
+        {readings.length > 1 && (
+          <div class="row" id="job-readings">
+            <b>How is it meant?</b>
+            {readings.map(({ echo }, k) => <Button key={echo} small pressed={k === chosen} onClick={() => setChosen(k)}>{echo}</Button>)}
+          </div>
+        )}
+        {reading && moves.length > 0 && (
+          <>
+            <p>{moves.length} moves, read as {reading.echo}.</p>
+            <ul class="hint">
+              {moves.slice(0, SHOWN).map(({ from, to, mass }, k) => <li key={k}>{from} → {to}{mass === null ? "" : `, ${figure(mass)} kg`}</li>)}
+            </ul>
+          </>
+        )}
+      </div>
+    </Dialog>
+  );
+}

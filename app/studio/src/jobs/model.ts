@@ -1,0 +1,116 @@
+// Jobs of the service, and what the page adds to them: names of moves, intervals and savings.
+import { signal } from "@preact/signals";
+import { get, send } from "../store/client";
+import { jobNotes, type JobNotes } from "../store/persist";
+import type { Interval, ProblemDetails, Solution } from "../store/types";
+
+export interface Job {
+  id: string;
+  name: string | null;
+  state: "waiting" | "running" | "done" | "cancelling" | "cancelled";
+  created: string;
+  counts: Record<"waiting" | "running" | "done" | "failed" | "cancelled", number>;
+  progress: number;
+  eta: number | null;
+}
+
+export interface JobRow {
+  index: number;
+  kind: string;
+  state: keyof Job["counts"];
+  energy: number | null;
+  duration: number | null;
+  answer: string | null;
+  problem: ProblemDetails | null;
+}
+
+/** What a whole answer says beyond its row. */
+export interface Detail {
+  interval: Interval | null;
+  rival: string | null;
+  rivalEnergy: number | null;
+  saving: number | null;
+}
+
+export interface Opened {
+  job: Job;
+  rows: JobRow[];
+  notes: JobNotes | null;
+  details: Map<number, Detail> | null;
+}
+
+const PAGE = 1000;
+
+export const jobs = signal<Job[] | null>(null);
+export const opened = signal<Opened | null>(null);
+
+export const loadJobs = async () => {
+  jobs.value = (await get<{ jobs: Job[] }>("jobs?limit=200")).jobs;
+};
+
+export const isOver = ({ state }: Job) => state === "done" || state === "cancelled";
+
+/** A job with all of its rows. Throws Problem. */
+export async function loadJob(id: string): Promise<void> {
+  const rows: JobRow[] = [];
+  let job: (Job & { requests: JobRow[]; next: number | null }) | null = null;
+  let after = -1;
+  do {
+    job = await get<Job & { requests: JobRow[]; next: number | null }>(`jobs/${id}?limit=${PAGE}&after=${after}`);
+    rows.push(...job.requests);
+    after = job.next ?? -1;
+  } while (after >= 0);
+  const before = opened.value?.job.id === id ? opened.value : null;
+  opened.value = { job, rows, notes: before?.notes ?? (await jobNotes(id)) ?? null, details: before?.details ?? null };
+}
+
+/** Reads the whole answers of a job, one after the other, for intervals and savings. Throws Problem. */
+export async function loadDetails(id: string): Promise<void> {
+  const response = await send(`jobs/${id}/results`, {});
+  const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
+  const details = new Map<number, Detail>();
+  let text = "";
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    text += part.value;
+    const lines = text.split("\n");
+    text = lines.pop() ?? "";
+    for (const line of lines) if (line) keep(details, JSON.parse(line) as { index: number; result: Partial<Solution> | null });
+  }
+  if (text.trim()) keep(details, JSON.parse(text) as { index: number; result: Partial<Solution> | null });
+  if (opened.value?.job.id === id) opened.value = { ...opened.value, details };
+}
+
+function keep(details: Map<number, Detail>, { index, result }: { index: number; result: Partial<Solution> | null }): void {
+  if (!result?.energy) return;
+  const kept = (result.baselines ?? []).filter((each) => each.within_limits && each.saving !== null);
+  // the nearest of the ways that keep every limit
+  const [rival] = kept.sort((a, b) => a.electrical - b.electrical);
+  details.set(index, {
+    interval: result.energy.electrical.interval ?? null,
+    rival: rival?.name ?? null,
+    rivalEnergy: rival?.electrical ?? null,
+    saving: rival?.saving ?? null,
+  });
+}
+
+/** The names of a move. */
+export function namesOf({ notes }: Opened, index: number): [string, string] {
+  const move = notes?.moves[index];
+  return move ? [move.from, move.to] : [`move ${index + 1}`, ""];
+}
+
+/** The table of a job as CSV. */
+export function csvOfJob(shown: Opened): string {
+  const quoted = (value: unknown) => {
+    const text = value === null || value === undefined ? "" : String(value);
+    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  };
+  const head = ["no", "from", "to", "kg", "state", "duration_s", "energy_J", "p5_J", "p95_J", "rival", "rival_J", "saving", "problem", "answer"];
+  const lines = shown.rows.map((row) => {
+    const [from, to] = namesOf(shown, row.index);
+    const detail = shown.details?.get(row.index);
+    const { interval, rival, rivalEnergy, saving } = detail ?? { interval: null, rival: null, rivalEnergy: null, saving: null };
+    return [row.index + 1, from, to, shown.notes?.moves[row.index]?.mass, row.state, row.duration, row.energy, interval?.p5, interval?.p95, rival, rivalEnergy, saving, row.problem?.detail, row.answer].map(quoted).join(",");
+  });
+  return [head.join(","), ...lines, ""].join("\n");
+}

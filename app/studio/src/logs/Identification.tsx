@@ -1,0 +1,70 @@
+import { useEffect, useState } from "preact/hooks";
+import { Button } from "../ui/Button";
+import { plain } from "../store/facts";
+import { get } from "../store/client";
+import { robotOf } from "../store/service";
+import { edit, page, request, toast } from "../store/state";
+import type { Robot } from "../store/types";
+import { figure, percent } from "../store/units";
+import { Curves } from "./Curves";
+import { ErrorTable, FigureTable } from "./FigureTables";
+import { openedIdentification, type Found, type LogDetail } from "./model";
+
+/** An identification: measured and modelled, errors on moves that no fit has seen, figures with their letters. */
+export function Identification() {
+  const { found, moves } = openedIdentification.value!;
+  const result = found.result!;
+  const [robot, setRobot] = useState<Robot | null>(null);
+  const [logs, setLogs] = useState<Pick<LogDetail, "id" | "name" | "warnings">[]>([]);
+  useEffect(() => {
+    void robotOf(result.robot).then(setRobot);
+    const ids = [...new Set(moves.map(({ log }) => log))];
+    const asked = ids.map((id) => get<LogDetail>(`logs/${id}`).catch(() => ({ id, name: null, warnings: ["This log was deleted."] })));
+    void Promise.all(asked).then(setLogs);
+  }, [found.id]);
+  if (!robot) return <p class="hint">…</p>;
+  const told = result.parameters.filter(({ identified }) => identified).length;
+  const use = () => {
+    edit({ ...request.value, robot: robot.name, figures: found.figures });
+    page.value = "cell";
+    toast.value = "The cell has these figures now: Optimise computes with them.";
+  };
+  return (
+    <div id="identification">
+      <header class="page-head">
+        <div>
+          <h2>Identification of {robot.name}</h2>
+          <p class="hint">{new Date(found.created).toLocaleString()}, {told} of {result.parameters.length} figures told by the logs</p>
+        </div>
+        <span class="space" />
+        <Button kind="primary" disabled={!found.figures} onClick={use}>Use these figures</Button>
+        <Button onClick={() => (openedIdentification.value = null)}>Back to the logs</Button>
+      </header>
+      <div class="columns">
+        <Curves moves={moves} logs={logs} robot={robot} />
+        <ErrorTable validation={result.validation} robot={robot} />
+        <Advice result={result} logs={logs} figures={found.figures} />
+        <FigureTable result={result} robot={robot} />
+      </div>
+    </div>
+  );
+}
+
+/** What is odd in the logs or in what was found, and what would help most. */
+function Advice({ result, logs, figures }: { result: Found; logs: Pick<LogDetail, "id" | "name" | "warnings">[]; figures: string | null }) {
+  const { residuals, physical, advice, payload } = result;
+  const all = [
+    !figures && "The figures are not stored: there was no room, or they were deleted.",
+    payload && (payload.why ?? `The last log carried ${figure(payload.mass)} ± ${figure(payload.mass_sd, 2)} kg.`),
+    physical && !physical.consistent && "Not all links are real bodies.",
+    !residuals.white && "Neighbouring residuals are alike: something moves that the model does not have. Standard deviations are over motions, and hold.",
+    ...logs.flatMap(({ id, name, warnings }) => warnings.map((text) => `${name ?? id.slice(0, 8)}: ${text}`)),
+    advice && `Most of the energy's uncertainty (${percent(advice.share)}) is from ${advice.figure.replaceAll("_", " ")}. ${advice.do}`,
+  ].filter((text) => typeof text === "string");
+  return (
+    <article>
+      <h3>Warnings and advice</h3>
+      {all.length ? <ul>{all.map((text) => <li key={text}>{plain(text)}</li>)}</ul> : <p class="hint">none</p>}
+    </article>
+  );
+}

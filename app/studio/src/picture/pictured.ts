@@ -1,0 +1,78 @@
+// What is drawn: the motion of the answer while it belongs to the request, else the cell at rest.
+import { computed, effect, signal } from "@preact/signals";
+import { obstaclesOf } from "../store/chain";
+import { reached } from "../store/reach";
+import { robotName, rowsOf, targetAt, type Row } from "../store/request";
+import { robotOf } from "../store/service";
+import { answered, racers, request, stale, type Answered } from "../store/state";
+import { dressed, toolNow } from "../store/tools";
+import type { ApiRequest, Robot, Solution } from "../store/types";
+
+/** The robot of the request, when its figures have come. */
+export const robotNow = signal<Robot | null>(null);
+
+export interface Pictured {
+  robot: Robot;
+  /** Tool, payload, TCP and the obstacles in the base frame. */
+  cell: ApiRequest;
+  /** The motion with its round; null: the arm stands. */
+  motion: Answered | null;
+  arms: { name: string; solution: Solution; colour: number }[];
+  /** Where the arm stands, and where it is to go. */
+  start: number[];
+  goal: number[] | null;
+}
+
+/** The configuration that a target names, or the one that reaches it without a collision nearest to `near`. */
+export function configurationOf(row: Row | undefined, near: number[] | null): number[] | null {
+  if (!row) return null;
+  const target = targetAt(request.value, row);
+  if (target.kind === "joints") return target.q;
+  const reach = reached.value[row.pointer];
+  if (reach?.state !== "reached") return null;
+  const free = reach.solutions.filter(({ collides }) => !collides);
+  const all = (free.length ? free : reach.solutions).map(({ q }) => q);
+  if (!near) return all[0] ?? null;
+  const far = (q: number[]) => Math.hypot(...q.map((x, j) => x - (near[j] ?? 0)));
+  return [...all].sort((a, b) => far(a) - far(b))[0] ?? null;
+}
+
+export const pictured = computed<Pictured | null>(() => {
+  const shown = answered.value;
+  if (shown && !stale.value) {
+    const { solution, robot, cell } = shown;
+    const arms = [{ name: "this motion", solution, colour: 0xffffff }, ...racers.value];
+    const { q } = solution.trajectory;
+    return { robot, cell, motion: shown, arms, start: q[0]!, goal: shown.cycle ? null : q.at(-1)! };
+  }
+  const robot = robotNow.value;
+  if (!robot) return null;
+  const rows = rowsOf(request.value);
+  const fits = (q: number[] | null | undefined) => (q?.length === robot.joints.length ? q : null);
+  const old = shown?.robot.name === robot.name ? shown.solution.branch : null;
+  const start = fits(configurationOf(rows[0], old?.start.q ?? null)) ?? fits(old?.start.q) ?? robot.joints.map(() => 0);
+  const goal = fits(configurationOf(rows.at(-1), old?.goal.q ?? start));
+  return { robot, cell: stillCell(dressed(request.value, toolNow.value), robot), motion: null, arms: [], start, goal: rows.length > 1 ? goal : null };
+});
+
+/** The cell of a request that is being edited; what is wrong with it, the service says. */
+function stillCell(asked: ApiRequest, robot: Robot): ApiRequest {
+  try {
+    return { ...asked, scene: { obstacles: obstaclesOf(asked, robot) } };
+  } catch {
+    return { tcp: asked.tcp, scene: { obstacles: [] } };
+  }
+}
+
+/** Fetches the figures of the robot that is chosen, from now on. */
+export function followRobot(): void {
+  effect(() => {
+    const name = robotName(request.value);
+    if (robotNow.peek()?.name === name) return;
+    robotOf(name)
+      .then((robot) => {
+        if (robotName(request.peek()) === name) robotNow.value = robot;
+      })
+      .catch(() => undefined); // the service says so when the request is sent
+  });
+}

@@ -1,0 +1,102 @@
+// Requests to the service. All addresses are relative to the page, so that they hold behind a proxy's path.
+import { signal } from "@preact/signals";
+import type { ProblemDetails } from "./types";
+
+const KEY = "joulepath key";
+
+/** A refusal by the service, with its problem document. */
+export class Problem extends Error {
+  constructor(readonly details: ProblemDetails) {
+    super(details.detail ?? details.title ?? "The service did not answer.");
+  }
+}
+
+/** The dialog that asks for an API key: called with the key, or null. */
+export const keyAsked = signal<((key: string | null) => void) | null>(null);
+/** Whether the last request found no service. */
+export const offline = signal(false);
+
+export const get = async <T>(path: string, signal?: AbortSignal): Promise<T> =>
+  (await send(path, { signal })).json() as Promise<T>;
+
+export const post = async <T>(path: string, body: unknown, signal?: AbortSignal): Promise<T> =>
+  (await send(path, posting(body, signal))).json() as Promise<T>;
+
+export const remove = (path: string) => send(path, { method: "DELETE" });
+
+const posting = (body: unknown, signal?: AbortSignal, headers: Record<string, string> = {}): RequestInit => ({
+  method: "POST",
+  body: JSON.stringify(body),
+  headers: { "Content-Type": "application/json", ...headers },
+  signal,
+});
+
+/** The response to a request that was accepted. It asks for the key where one is needed. Throws Problem. */
+export async function send(path: string, options: RequestInit): Promise<Response> {
+  const key = sessionStorage.getItem(KEY);
+  const headers = { ...(options.headers as Record<string, string>), ...(key ? { Authorization: `Bearer ${key}` } : {}) };
+  let response: Response;
+  try {
+    response = await fetch(path.replace(/^\//, ""), { ...options, headers });
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    offline.value = true;
+    throw new Problem({
+      title: "The service does not answer",
+      detail: "The service cannot be reached: is it running? Your work is saved here.",
+    });
+  }
+  offline.value = false;
+  if (response.ok) return response;
+  if (response.status === 401 && (await askForKey())) return send(path, options);
+  throw new Problem(await problemOf(response));
+}
+
+async function problemOf(response: Response): Promise<ProblemDetails> {
+  const title = `The service answered ${response.status}`; // a proxy's own page
+  const details = (await response.json().catch(() => ({ title }))) as ProblemDetails;
+  return { status: response.status, retry: Number(response.headers.get("Retry-After")) || null, ...details };
+}
+
+/** Posts, and passes every event of the stream on. Where the answer is plain JSON, it is the only event: `answer`.
+ * Throws Problem, or AbortError. */
+export async function stream(path: string, body: unknown, event: (name: string, data: unknown) => void, signal: AbortSignal): Promise<void> {
+  const accept = { Accept: "text/event-stream, application/json;q=0.9" };
+  const response = await send(path, posting(body, signal, accept));
+  if (!response.headers.get("Content-Type")?.startsWith("text/event-stream")) {
+    event("answer", await response.json());
+    return;
+  }
+  const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  for (;;) {
+    const { value, done } = await reader.read();
+    if (done) return;
+    text += value.replaceAll("\r\n", "\n");
+    const blocks = text.split("\n\n");
+    text = blocks.pop() ?? "";
+    for (const block of blocks) pass(block, event);
+  }
+}
+
+function pass(block: string, event: (name: string, data: unknown) => void): void {
+  const lines = block.split("\n");
+  const of = (name: string) =>
+    lines.filter((line) => line.startsWith(`${name}:`)).map((line) => line.slice(name.length + 1).replace(/^ /, ""));
+  const data = of("data").join("\n");
+  if (!data) return;
+  const name = of("event")[0] ?? "message";
+  const content = JSON.parse(data) as ProblemDetails;
+  if (name === "problem") throw new Problem(content);
+  event(name, content);
+}
+
+function askForKey(): Promise<boolean> {
+  return new Promise((resolve) => {
+    keyAsked.value = (key) => {
+      keyAsked.value = null;
+      if (key) sessionStorage.setItem(KEY, key);
+      resolve(Boolean(key));
+    };
+  });
+}

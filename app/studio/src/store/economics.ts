@@ -1,0 +1,56 @@
+// What a motion costs: joules to kWh, money and CO₂e, with every assumption named.
+
+export interface Sourced {
+  value: number;
+  /** Where it is from, or "yours". */
+  source: string;
+}
+
+export interface Economics {
+  /** One move every so many seconds; null: back to back. */
+  cycle: number | null;
+  /** Hours of a shift. */
+  shift: number;
+  shiftsPerYear: number;
+  /** € per kWh. */
+  price: Sourced;
+  /** kg CO₂e per kWh. */
+  carbon: Sourced;
+  /** Power of the control box by a wattmeter [W]; null: not counted. */
+  box: Sourced | null;
+}
+
+export const DEFAULT_ECONOMICS: Economics = {
+  cycle: null,
+  shift: 8,
+  shiftsPerYear: 460,
+  price: { value: 0.2, source: "Eurostat: non-household consumers in the EU, second half of 2023" },
+  carbon: { value: 0.21, source: "EEA: electricity generation in the EU, 2023" },
+  box: null,
+};
+
+const JOULES = 3.6e6; // of a kWh
+
+export interface Costs {
+  cycle: number;
+  cyclesPerShift: number;
+  rows: { name: string; joules: number; shift: number; year: number }[];
+  total: { joules: number; shift: number; year: number };
+  money: { shift: number; year: number };
+  carbon: { shift: number; year: number };
+}
+
+/** Costs of a motion of `energy` [J] that takes `duration` [s], with `waiting` [J] until the next one begins. */
+export function costsOf(parts: { name: string; joules: number }[], duration: number, given: Economics): Costs {
+  const cycle = Math.max(given.cycle ?? duration, duration);
+  const cyclesPerShift = Math.floor((given.shift * 3600) / cycle + 1e-9);
+  const box = given.box ? [{ name: "Control box", joules: given.box.value * cycle }] : [];
+  const rows = [...parts, ...box].map((part) => {
+    const shift = (part.joules * cyclesPerShift) / JOULES;
+    return { ...part, shift, year: shift * given.shiftsPerYear };
+  });
+  const sum = (key: "joules" | "shift" | "year") => rows.reduce((all, row) => all + row[key], 0);
+  const total = { joules: sum("joules"), shift: sum("shift"), year: sum("year") };
+  const times = (value: number) => ({ shift: total.shift * value, year: total.year * value });
+  return { cycle, cyclesPerShift, rows, total, money: times(given.price.value), carbon: times(given.carbon.value) };
+}

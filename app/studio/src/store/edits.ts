@@ -1,0 +1,93 @@
+// Changes of a request that are more than one field: kinds, stops and their order, obstacles.
+import { at, join, put, type Pointer } from "./pointer";
+import { freshName, isObject, listOf, targetOf, type Kind, type Row } from "./request";
+import type { ApiRequest, Obstacle, Pose, Stop } from "./types";
+
+// fields that one kind of request has and another one has not
+const OF_MOVES = ["goal", "path", "duration", "dwell", "bound"];
+const OF_ROUNDS = ["stops", "order", "before", "together", "closed", "time", "hold", "wait"];
+
+const without = (request: ApiRequest, fields: string[]): ApiRequest =>
+  Object.fromEntries(Object.entries(request).filter(([name]) => !fields.includes(name)));
+
+/** The same cell as a request of another kind: its first and last targets stay. */
+export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
+  if (kind === "round") {
+    if (request.stops) return request;
+    const via = listOf<Pose>(at(request, "/path/via")).map((pose, k): Stop => ({ name: `via ${k + 1}`, target: { pose } }));
+    const goal: Stop = { name: "goal", target: request.goal ?? null };
+    return { ...without(request, OF_MOVES), stops: [...via, goal] };
+  }
+  const last = listOf<Stop>(request.stops).filter((stop) => isObject(stop) && stop.target).at(-1)?.target;
+  const goal = request.stops ? last : request.goal;
+  const rest = without(request, request.stops ? OF_ROUNDS : ["path"]);
+  const move: ApiRequest = goal === undefined ? rest : { ...rest, goal };
+  return kind === "path" ? { ...move, path: isObject(request.path) ? request.path : {} } : move;
+}
+
+const namesOf = (stops: Stop[]) => stops.map((stop, k) => stop?.name ?? `${k + 1}`);
+
+/** The request with one more stop at its end; a move becomes a round, a path has one more pose on its way. */
+export function withStop(request: ApiRequest, target: unknown = null, name = "stop 1"): ApiRequest {
+  const round = asKind(request, "round");
+  const stops = listOf<Stop>(round.stops);
+  return { ...round, stops: [...stops, { name: freshName(name, namesOf(stops)), target }] };
+}
+
+export function withVia(request: ApiRequest, pose: Pose): ApiRequest {
+  return put(request, "/path/via", [...listOf(at(request, "/path/via")), pose]);
+}
+
+/** Pointer and index of the list entry that a row is. */
+export function entryOf(row: Row): { list: Pointer; index: number } | null {
+  const found = /^(\/stops|\/path\/via)\/(\d+)/.exec(row.pointer);
+  return found ? { list: found[1]!, index: Number(found[2]) } : null;
+}
+
+function relisted(request: ApiRequest, row: Row, change: (items: unknown[], index: number) => unknown[]): ApiRequest {
+  const entry = entryOf(row);
+  if (!entry) return request;
+  return put(request, entry.list, change([...listOf<unknown>(at(request, entry.list))], entry.index));
+}
+
+export const withoutRow = (request: ApiRequest, row: Row) =>
+  relisted(request, row, (items, index) => items.filter((_, k) => k !== index));
+
+/** The row once more behind itself, under a name of its own. */
+export const duplicated = (request: ApiRequest, row: Row) =>
+  relisted(request, row, (items, index) => {
+    const copy = structuredClone(items[index]);
+    if (isObject(copy) && row.role === "stop") copy.name = freshName(row.name, namesOf(items as Stop[]));
+    return [...items.slice(0, index + 1), copy, ...items.slice(index + 1)];
+  });
+
+/** The row `steps` places further; unchanged where there is no such place. */
+export const moved = (request: ApiRequest, row: Row, steps: number) =>
+  relisted(request, row, (items, index) => {
+    const to = index + steps;
+    if (to < 0 || to >= items.length) return items;
+    const [item] = items.splice(index, 1);
+    items.splice(to, 0, item);
+    return items;
+  });
+
+export const withTarget = (request: ApiRequest, row: Row, target: { pose: Pose } | { q: number[] }) =>
+  put(request, row.pointer, "pose" in target ? targetOf(row, target.pose) : target);
+
+export const OBSTACLES = {
+  box: { shape: "box", size: [0.2, 0.2, 0.2] },
+  cylinder: { shape: "cylinder", radius: 0.05, length: 0.3 },
+  sphere: { shape: "sphere", radius: 0.1 },
+  half_space: { shape: "half_space" },
+} as const;
+
+/** The request with one more obstacle. */
+export function withObstacle(request: ApiRequest, shape: Omit<Obstacle, "name">, name: string): ApiRequest {
+  const others = listOf<Obstacle>(at(request, "/scene/obstacles"));
+  const own: Obstacle = { ...shape, name: freshName(name, others.map((each) => each?.name)) } as Obstacle;
+  return put(request, "/scene", { ...request.scene, obstacles: [...others, own] });
+}
+
+export function withoutObstacle(request: ApiRequest, index: number): ApiRequest {
+  return put(request, join("scene", "obstacles", index), undefined);
+}

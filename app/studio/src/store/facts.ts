@@ -1,0 +1,49 @@
+// Figures of the answer, in words.
+import type { Answered } from "./state";
+import { figure, words } from "./units";
+
+export const BASELINES: Record<string, string> = {
+  trapezoid: "Trapezoid in joints",
+  quintic: "Quintic in joints",
+  ruckig: "Fastest in time",
+  ruckig_slowed: "Fastest, slowed",
+  straight: "Straight in joints",
+  controller_default: "Controller default",
+  stopping: "Rests at every stop",
+  move_by_move: "Each move by itself",
+  same_factor: "All moves slowed alike",
+  fastest_then_wait: "Fastest, then a wait",
+  given_order: "In the given order",
+  without_storage: "Without the storage",
+};
+
+export const baselineName = (name: string) => BASELINES[name] ?? capital(words(name));
+
+export const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
+
+export const nounOf = (shown: Answered) => (shown.cycle ? "round" : "move");
+
+/** Energy of the objective that was minimised [J]. */
+export const energyOf = ({ solution }: Answered) => solution.energy[solution.objective].total;
+
+/** By how much the energy is at most above the least possible; null without a bound. */
+export function gapOf(shown: Answered): number | null {
+  const bound = shown.solution.energy.lower_bound;
+  return bound > 0 ? energyOf(shown) / bound - 1 : null;
+}
+
+const FULL = 1.0005; // share of a limit that counts as kept, in the certificate's own tolerance
+
+/** The limit that the certificate finds broken; null if none is. */
+export function brokenLimit({ solution }: Answered): string | null {
+  const { worst_ratio: ratios, clearance } = solution.certificate;
+  const over = Object.entries(ratios).find(([, share]) => (share ?? 0) > FULL);
+  if (over) return `${words(over[0])} at ${figure((over[1] ?? 0) * 100)} % of its limit`;
+  if (clearance && clearance.min_clearance < -1e-4) return `${clearance.pair.join(" and ")} come too close`;
+  return null;
+}
+
+/** `left/up/no_flip` in words. */
+export const postureWords = (label: string) => label.split("/").map((part) => words(part)).join(", ");
+
+export const plain = (text: string) => text.replaceAll("`", "");

@@ -1,0 +1,66 @@
+// Opening cells: from an example, a project, a link or a kept answer.
+import { get } from "./client";
+import { stopsOf } from "./cycle";
+import { askedFor, newId, projects, type Saved } from "./persist";
+import { optimise, showAnswer } from "./run";
+import type { Cell } from "./share";
+import { page, replaceCell, toast } from "./state";
+import { tell } from "./trouble";
+import type { ApiRequest, Cycle, Solution, Stop } from "./types";
+
+const FIRST = "studio/first.json";
+
+/** The example of the first visit, computed at once. */
+export async function openFirst(): Promise<void> {
+  await openCell({ request: await get<ApiRequest>(FIRST) }, "Bin to shelf");
+}
+
+/** A cell as a project of its own; it is computed at once. */
+export async function openCell(cell: Cell, name: string, compute = true): Promise<void> {
+  replaceCell({ project: { id: newId(), name }, request: cell.request, typed: cell.typed, economics: cell.economics });
+  page.value = "cell";
+  if (compute) await optimise(cell.request).catch((error) => tell(error, cell.request));
+}
+
+/** The project that was saved last; the example, where there is none. */
+export async function openLast(): Promise<void> {
+  const [last] = await projects().catch((): Saved[] => []);
+  await (last ? openProject(last) : openFirst());
+}
+
+/** A saved project, with its answer where the service still has it. */
+export async function openProject(project: Saved): Promise<void> {
+  replaceCell({ project: { id: project.id, name: project.name }, request: project.request, typed: project.typed, economics: project.economics });
+  page.value = "cell";
+  if (!project.answer || !project.asked) return;
+  try {
+    const { answer } = await get<{ answer: unknown }>(`answers/${encodeURIComponent(project.answer)}`);
+    await showAnswer(answer, project.asked);
+  } catch {
+    toast.value = "The answer of this project is no longer kept: optimise again.";
+  }
+}
+
+/** A kept answer by its id or path: with its request as it was typed, where this browser has asked for it. Throws Problem. */
+export async function openKept(path: string): Promise<void> {
+  const address = path.includes("/") ? path.replace(/^\//, "") : `answers/${encodeURIComponent(path)}`;
+  const { answer } = await get<{ answer: Solution & Partial<Cycle> }>(address);
+  if (!answer?.branch && !answer?.legs) throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
+  const known = answer.id ? await askedFor(answer.id) : null;
+  const request = known?.request ?? (answer.legs ? requestOfCycle(answer as unknown as Cycle) : requestOfMove(answer));
+  replaceCell({ project: { id: newId(), name: `Kept ${answer.id?.slice(0, 8) ?? "answer"}` }, request, typed: known?.typed, economics: known?.economics });
+  page.value = "cell";
+  await showAnswer(answer, request);
+  if (!known) toast.value = "The request was not typed here: targets are the joints of the answer.";
+}
+
+/** The same arm between the same ends: what the answer does not say of its request stays at the defaults. */
+const requestOfMove = ({ robot, arm, branch }: Solution): ApiRequest => ({ robot, ...arm, start: { q: branch.start.q }, goal: { q: branch.goal.q } });
+
+function requestOfCycle(cycle: Cycle): ApiRequest {
+  const places = new Map(stopsOf(cycle).map(({ stop, q }) => [stop ?? "", q]));
+  const dwell = (name: string) => cycle.legs.find((leg) => leg.kind === "dwell" && leg.goal.stop === name)?.duration ?? 0;
+  const stops = cycle.order.filter((name) => places.has(name)).map((name): Stop => ({ name, target: { q: places.get(name) }, dwell: dwell(name) }));
+  return { robot: cycle.robot, start: { q: cycle.legs[0]!.start.q }, stops };
+}
+

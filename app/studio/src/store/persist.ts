@@ -1,0 +1,122 @@
+// Projects in this browser: saved half a second after each change, one record each (IndexedDB).
+import { effect, untracked } from "@preact/signals";
+import { answered, economics, project, request, saved, typed } from "./state";
+import type { Cell } from "./share";
+
+export interface Saved extends Cell {
+  id: string;
+  name: string;
+  savedAt: number;
+  /** Id of the answer that was shown, and the request that it belongs to. */
+  answer: string | null;
+  asked: Cell["request"] | null;
+}
+
+/** The request of an answer that this browser has asked for. */
+interface Asked {
+  id: string;
+  cell: Cell;
+}
+
+const PAUSE = 500;
+const MOST_ASKED = 500;
+let opened: Promise<IDBDatabase> | null = null;
+
+function database(): Promise<IDBDatabase> {
+  opened ??= new Promise((resolve, reject) => {
+    const asked = indexedDB.open("joulepath studio", 1);
+    asked.onupgradeneeded = () => {
+      for (const name of ["projects", "asked", "jobs"]) asked.result.createObjectStore(name, { keyPath: "id" });
+    };
+    asked.onsuccess = () => resolve(asked.result);
+    asked.onerror = () => reject(asked.error ?? new Error("IndexedDB is not open."));
+  });
+  return opened;
+}
+
+async function within<T>(store: string, mode: IDBTransactionMode, act: (store: IDBObjectStore) => IDBRequest<T>): Promise<T> {
+  const open = (await database()).transaction(store, mode).objectStore(store);
+  return new Promise((resolve, reject) => {
+    const asked = act(open);
+    asked.onsuccess = () => resolve(asked.result);
+    asked.onerror = () => reject(asked.error ?? new Error("IndexedDB refused."));
+  });
+}
+
+export const newId = () => crypto.randomUUID?.() ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`;
+
+/** All projects, the last saved first. */
+export async function projects(): Promise<Saved[]> {
+  const all = await within<Saved[]>("projects", "readonly", (store) => store.getAll());
+  return all.sort((a, b) => b.savedAt - a.savedAt);
+}
+
+export const deleteProject = (id: string) => within("projects", "readwrite", (store) => store.delete(id));
+
+/** What was asked when an answer was computed here; null for answers of others. */
+export async function askedFor(id: string): Promise<Cell | null> {
+  const found = await within<Asked | undefined>("asked", "readonly", (store) => store.get(id)).catch(() => undefined);
+  return found?.cell ?? null;
+}
+
+async function keepAsked(id: string, cell: Cell): Promise<void> {
+  await within("asked", "readwrite", (store) => store.put({ id, cell } satisfies Asked));
+  const ids = await within<IDBValidKey[]>("asked", "readonly", (store) => store.getAllKeys());
+  if (ids.length > MOST_ASKED) await within("asked", "readwrite", (store) => store.delete(ids[0]!));
+}
+
+/** What the page knows of a job that it has started: the names of its moves. */
+export interface JobNotes {
+  id: string;
+  source: string;
+  moves: { from: string; to: string; mass: number | null }[];
+  requests: Cell["request"][];
+}
+
+export const keepJob = (notes: JobNotes) => within("jobs", "readwrite", (store) => store.put(notes));
+
+export const jobNotes = (id: string) =>
+  within<JobNotes | undefined>("jobs", "readonly", (store) => store.get(id)).catch(() => undefined);
+
+/** Writes the present project now. */
+export async function saveNow(): Promise<void> {
+  if (!project.value.id) return;
+  const shown = answered.value;
+  const record: Saved = {
+    ...project.value,
+    savedAt: Date.now(),
+    request: request.value,
+    typed: typed.value,
+    economics: economics.value,
+    answer: shown?.asked ? shown.solution.id : null,
+    asked: shown?.asked ?? null,
+  };
+  try {
+    await within("projects", "readwrite", (store) => store.put(record));
+    saved.value = "saved";
+  } catch {
+    saved.value = "failed"; // a private window, or no room
+  }
+}
+
+/** Saves after each change, from now on. */
+export function followChanges(): void {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  effect(() => {
+    void [project.value, request.value, typed.value, economics.value, answered.value];
+    untracked(() => {
+      if (!project.value.id) return;
+      saved.value = "saving";
+      clearTimeout(timer);
+      timer = setTimeout(() => void saveNow(), PAUSE);
+    });
+  });
+  effect(() => {
+    const shown = answered.value;
+    const id = shown?.solution.id;
+    if (!shown?.asked || !id) return;
+    const { asked } = shown;
+    untracked(() => void keepAsked(id, { request: asked, typed: typed.value, economics: economics.value }).catch(() => undefined));
+  });
+  window.addEventListener("pagehide", () => void saveNow());
+}

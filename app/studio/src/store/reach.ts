@@ -1,0 +1,77 @@
+// Whether the poses of the request are reached, and how: asked of `POST /ik` as they are typed.
+import { effect, signal, untracked } from "@preact/signals";
+import { Problem, post } from "./client";
+import { at, type Pointer } from "./pointer";
+import { robotName, rowsOf, targetAt, poseAt } from "./request";
+import { request } from "./state";
+import type { ApiRequest, IkSolution, Pose } from "./types";
+
+export type Reach =
+  | { state: "asking" }
+  | { state: "reached"; solutions: IkSolution[] }
+  | { state: "refused"; text: string };
+
+const PAUSE = 300; // after the last edit [ms]
+const MOST = 24; // rows that are asked about
+
+export const reached = signal<Record<Pointer, Reach>>({});
+
+const known = new Map<string, Reach>();
+let waiting: ReturnType<typeof setTimeout> | undefined;
+let round = 0;
+
+/** What `POST /ik` is asked about a pose of a request. */
+export function ikBody(asked: ApiRequest, pose: Pose, windings: boolean): Record<string, unknown> {
+  const { tcp, tool, payload, scene } = asked;
+  const shape = payload?.shape ? { payload: { shape: payload.shape, ...(payload.touches === undefined ? {} : { touches: payload.touches }) } } : {};
+  return JSON.parse(JSON.stringify({ robot: robotName(asked), tcp, tool, scene, pose, windings, ...shape })) as Record<string, unknown>;
+}
+
+/** All configurations that reach a pose. Throws Problem. */
+export const solutionsOf = async (asked: ApiRequest, pose: Pose, windings = false, signal?: AbortSignal) =>
+  (await post<{ solutions: IkSolution[] }>("ik", ikBody(asked, pose, windings), signal)).solutions;
+
+/** Asks about every pose of the request, from now on. */
+export function followReach(): void {
+  effect(() => {
+    const asked = request.value;
+    untracked(() => {
+      clearTimeout(waiting);
+      waiting = setTimeout(() => void askAll(asked), PAUSE);
+    });
+  });
+}
+
+async function askAll(asked: ApiRequest): Promise<void> {
+  const own = ++round;
+  const rows = rowsOf(asked).filter((row) => targetAt(asked, row).kind === "pose").slice(0, MOST);
+  const bodies = rows.map((row) => ({ pointer: row.pointer, pose: at(asked, poseAt(row)) as Pose }));
+  const keys = bodies.map(({ pose }) => JSON.stringify(ikBody(asked, pose, false)));
+  const next: Record<Pointer, Reach> = {};
+  bodies.forEach(({ pointer }, k) => (next[pointer] = known.get(keys[k]!) ?? { state: "asking" }));
+  reached.value = next;
+  for (const [k, { pointer, pose }] of bodies.entries()) {
+    if (known.has(keys[k]!)) continue;
+    const found = await ask(asked, pose);
+    if (own !== round) return;
+    if (found) known.set(keys[k]!, found);
+    reached.value = { ...reached.value, [pointer]: found ?? { state: "asking" } };
+  }
+}
+
+async function ask(asked: ApiRequest, pose: Pose): Promise<Reach | null> {
+  try {
+    return { state: "reached", solutions: await solutionsOf(asked, pose) };
+  } catch (error) {
+    // fields that are wrong elsewhere are told when the request is sent
+    const about = error instanceof Problem && error.details.status === 422 && !error.details.errors;
+    return about ? { state: "refused", text: withoutFigures(error.message) } : null;
+  }
+}
+
+/** "The goal pose is 0.09433 m out of reach …" in the units of the page. */
+function withoutFigures(text: string): string {
+  return text
+    .replace(/^The .*? pose is /, "The pose is ")
+    .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b/g, (whole, metres: string) => (Number(metres) < 5 ? `${(Number(metres) * 1000).toPrecision(2)} mm` : whole));
+}

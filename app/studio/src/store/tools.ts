@@ -1,0 +1,72 @@
+// Tools by name: a request that names one has its shape and its TCP.
+import { effect, signal } from "@preact/signals";
+import { get } from "./client";
+import { request } from "./state";
+import type { ApiRequest, Parameter } from "./types";
+
+export interface ToolSummary {
+  name: string;
+  title: string;
+}
+
+export interface ToolDetail extends ToolSummary {
+  trust: Record<string, string>;
+  mass: Parameter;
+  center_of_mass: Parameter;
+  tcp: Parameter;
+  capsules: Parameter;
+}
+
+const known = new Map<string, Promise<ToolDetail>>();
+
+/** The tool that the request names, when its figures have come. */
+export const toolNow = signal<ToolDetail | null>(null);
+
+/** Throws Problem. */
+export const toolList = async (): Promise<ToolSummary[]> => (await get<{ tools: ToolSummary[] }>("tools")).tools;
+
+/** Figures of a tool, asked for once. Throws Problem. */
+function toolOf(name: string): Promise<ToolDetail> {
+  let asked = known.get(name);
+  if (!asked) {
+    asked = get<ToolDetail>(`tools/${encodeURIComponent(name)}`);
+    known.set(name, asked);
+    asked.catch(() => known.delete(name));
+  }
+  return asked;
+}
+
+export const toolName = ({ tool }: ApiRequest): string | null => (typeof tool === "string" ? tool : null);
+
+/** The request with the shape and the TCP of the tool that it names, as it is drawn. */
+export function dressed(asked: ApiRequest, tool: ToolDetail | null): ApiRequest {
+  if (toolName(asked) === null) return asked;
+  if (tool?.name !== toolName(asked)) return { ...asked, tool: { capsules: [] } };
+  const rows = tool.capsules.value as number[][];
+  const capsules = rows.map((row) => ({ start: row.slice(0, 3), end: row.slice(3, 6), radius: row[6]! }));
+  const own = tool.tcp.value as number[];
+  return { ...asked, tool: { capsules }, tcp: asked.tcp ?? { position: own.slice(0, 3), rpy: own.slice(3, 6) } };
+}
+
+/** The same, with figures that are asked for. Throws Problem. */
+export async function dressedLater(asked: ApiRequest): Promise<ApiRequest> {
+  const name = toolName(asked);
+  return name === null ? asked : dressed(asked, await toolOf(name));
+}
+
+/** Fetches the figures of the tool that the request names, from now on. */
+export function followTool(): void {
+  effect(() => {
+    const name = toolName(request.value);
+    if (name === toolNow.peek()?.name) return;
+    if (name === null) {
+      toolNow.value = null;
+      return;
+    }
+    toolOf(name)
+      .then((tool) => {
+        if (toolName(request.peek()) === name) toolNow.value = tool;
+      })
+      .catch(() => undefined); // the service says so when the request is sent
+  });
+}

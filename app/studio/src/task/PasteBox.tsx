@@ -1,0 +1,43 @@
+import { Button } from "../ui/Button";
+import { Note } from "../ui/Note";
+import { answer, pasteWrong, question, read, rowOfPaste } from "./paste";
+
+/** A place for what is copied from a pendant, a program or a table. */
+export function PasteBox() {
+  const asked = question.value;
+  return (
+    <div class="paste-box">
+      <input
+        type="text"
+        id="paste"
+        aria-label="Paste a pose, joint positions or a table"
+        placeholder="Paste p[…], six numbers, or rows of a table"
+        onPaste={(event) => {
+          event.preventDefault();
+          read(event.clipboardData?.getData("text/plain") ?? "", rowOfPaste());
+        }}
+        onKeyDown={(event) => {
+          if (event.key !== "Enter" || event.ctrlKey) return;
+          read(event.currentTarget.value, rowOfPaste());
+          event.currentTarget.value = "";
+        }}
+      />
+      {pasteWrong.value && <p class="error" role="alert">{pasteWrong.value}</p>}
+      {asked && (
+        <Note>
+          <b>How is this meant?</b>
+          <div class="readings" id="readings">
+            {asked.readings.map((reading) => (
+              <Button key={reading.echo} small onClick={() => answer(asked, reading)}>
+                {reading.echo}
+              </Button>
+            ))}
+            <Button small kind="quiet" onClick={() => (question.value = null)}>
+              Neither
+            </Button>
+          </div>
+        </Note>
+      )}
+    </div>
+  );
+}

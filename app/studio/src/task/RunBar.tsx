@@ -1,0 +1,106 @@
+import { useEffect, useState } from "preact/hooks";
+import { Button } from "../ui/Button";
+import { Note } from "../ui/Note";
+import { offline } from "../store/client";
+import { cancel, optimise } from "../store/run";
+import { lackOf } from "../store/request";
+import { answered, changes, jsonBroken, page, request, run, trouble } from "../store/state";
+import { tell } from "../store/trouble";
+import { atMost, figure } from "../store/units";
+
+/** Sends the request, if nothing is missing. */
+export function send(): void {
+  if (run.value || jsonBroken.value || lackOf(request.value)) return;
+  const asked = request.value;
+  optimise(asked).catch((error) => tell(error, asked));
+}
+
+/** The button that computes, and how far it is. */
+export function RunBar() {
+  const lack = lackOf(request.value);
+  const fresh = answered.value && !changes.value.length;
+  return (
+    <div class="run-bar">
+      <Wrong />
+      {run.value ? (
+        <Progress />
+      ) : (
+        <>
+          <button type="button" id="optimise" class={`button big${fresh ? "" : " primary"}`} disabled={Boolean(lack) || jsonBroken.value} onClick={send}>
+            {changes.value.length ? "Optimise again" : "Optimise"} <kbd>Ctrl ↵</kbd>
+          </button>
+          <p class="hint" role="status" id="run-state">
+            {jsonBroken.value ? "The JSON is no request." : (lack?.text ?? stateText())}
+          </p>
+        </>
+      )}
+    </div>
+  );
+}
+
+function stateText(): string {
+  if (offline.value) return "The service does not answer. Your work is saved here.";
+  const count = changes.value.length;
+  if (count) return `${count} ${count === 1 ? "change" : "changes"} since the last answer`;
+  const took = answered.value?.took;
+  if (answered.value) return `The answer belongs to this request${took ? ` · took ${figure(took, 2)} s` : ""}`;
+  return "Not computed yet";
+}
+
+/** What went wrong; it also stands at its fields. */
+function Wrong() {
+  const now = trouble.value;
+  if (!now || page.value !== "cell") return null;
+  const elsewhere = now.fields.filter(({ text }) => text !== now.text);
+  return (
+    <div id="problem">
+      <Note kind="error" action={<Button kind="quiet" icon="close" label="Dismiss" onClick={() => (trouble.value = null)} />}>
+        <b>{now.title}.</b> {now.text}
+        {elsewhere.length > 0 && (
+          <ul>
+            {elsewhere.map(({ pointer, text }) => (
+              <li key={pointer}>
+                <code>{pointer.slice(1).replaceAll("/", ".")}</code> {text}
+              </li>
+            ))}
+          </ul>
+        )}
+        {now.link && (
+          <>
+            {" "}
+            <a href={now.link}>What this means</a>
+          </>
+        )}
+      </Note>
+    </div>
+  );
+}
+
+function Progress() {
+  const [, again] = useState(0);
+  useEffect(() => {
+    const timer = setInterval(() => again((count) => count + 1), 250);
+    return () => clearInterval(timer);
+  }, []);
+  const now = run.value;
+  if (!now) return null;
+  const passed = (performance.now() - now.began) / 1000;
+  const best = now.incumbents.at(-1);
+  const share = now.total ? Math.min(1, now.done / now.total) : null;
+  const left = share && share > 0.05 && share < 1 ? (passed * (1 - share)) / share : null;
+  return (
+    <div class="progress" id="progress">
+      <progress max={1} value={share ?? undefined} aria-label="Progress" />
+      <p class="hint" role="status" id="progress-text">
+        {best
+          ? `Best so far ${figure(best.energy)} J, at least ${figure(best.bound)} J: ${best.bound > 0 ? `at most ${atMost(best.energy / best.bound - 1)} above the least possible` : "no bound yet"}`
+          : "Searching for a first motion"}
+        {` · ${passed.toFixed(1)} s`}
+        {left !== null && `, about ${figure(left, 1)} s left`}
+      </p>
+      <Button id="cancel" onClick={cancel}>
+        Cancel
+      </Button>
+    </div>
+  );
+}

@@ -1,0 +1,145 @@
+import { Button } from "../ui/Button";
+import { Errors } from "../ui/Errors";
+import { NumberCell } from "../ui/NumberCell";
+import { robotNow } from "../picture/pictured";
+import { untyped } from "../picture/drag";
+import { at, join, put } from "../store/pointer";
+import { isObject, listOf, sixOf, withNumber } from "../store/request";
+import { edit, request } from "../store/state";
+import type { Payload, Pose, Shape, Tool } from "../store/types";
+import { figure } from "../store/units";
+import { dressed, toolNow } from "../store/tools";
+import { PoseCells } from "./PoseCells";
+import { ToolPicker } from "./ToolPicker";
+
+const NO_TURN: Pose = { position: [0, 0, 0], rotvec: [0, 0, 0] };
+
+/** What is on the flange: the tool with its TCP, and what the arm carries. */
+export function ToolPayload() {
+  const asked = request.value;
+  const named = typeof asked.tool === "string";
+  const own = dressed(asked, toolNow.value).tcp;
+  const tcp = isObject(own) ? (own as Pose) : NO_TURN;
+  const [x = 0, y = 0, z = 0] = listOf<number>(tcp.position);
+  const mass = at(asked, "/payload/mass");
+  const count = listOf(at(asked, "/tool/capsules")).length;
+  const rated = robotNow.value?.limits.rated_payload?.value;
+  return (
+    <section class="section" aria-label="Tool and payload">
+      <details class="fold" id="tool-fold">
+        <summary>
+          <span class="fold-name">Tool</span> <b>{named ? (toolNow.value?.title ?? asked.tool as string) : `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm`}</b>
+          <small>{named ? `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm` : count ? `${count} capsules` : "no shape"}</small>
+        </summary>
+        <ToolPicker />
+        <TcpCells tcp={tcp} />
+        {!named && <Capsules />}
+      </details>
+      <div class="field payload">
+        <span class="fold-name">Payload</span>
+        <NumberCell label="Payload mass" pointer="/payload/mass" value={mass ?? 0} unit="kg" withUnit onValue={(value, text) => setMass(value, text)} />
+        <small>{isObject(at(asked, "/payload/shape")) ? String(at(asked, "/payload/shape/shape")) : mass ? "no shape" : "nothing carried"}</small>
+      </div>
+      {typeof mass === "number" && typeof rated === "number" && mass > rated && (
+        <p class="warning-text">
+          {figure(mass)} kg is more than a {robotNow.value?.title} may carry ({rated} kg).
+        </p>
+      )}
+      {isObject(asked.payload) && <PayloadFields payload={asked.payload as Payload} />}
+      <Errors under="/tool" />
+      <Errors under="/tcp" />
+      <Errors under="/payload" />
+    </section>
+  );
+}
+
+/** A payload without mass is none; a first one has its centre 50 mm before the flange. */
+function setMass(value: number, text: string): void {
+  const { payload } = request.value;
+  const next = value === 0 ? undefined : { ...(isObject(payload) ? payload : { com: [0, 0, 0.05] }), mass: value };
+  edit(put(request.value, "/payload", next), { ...untyped("/payload"), "/payload/mass": text });
+}
+
+function TcpCells({ tcp }: { tcp: Pose }) {
+  const six = sixOf({ ...tcp, position: listOf<number>(tcp.position) });
+  return (
+    <>
+      <p class="hint">TCP at the flange, as on the pendant</p>
+      <PoseCells
+        name="TCP"
+        pointer="/tcp"
+        six={six}
+        onNumber={(index, value, text, pointer) => edit(put(request.value, "/tcp", withNumber(tcp, index, value)), { ...untyped(""), [pointer]: text })}
+      />
+    </>
+  );
+}
+
+function Capsules() {
+  const capsules = listOf<NonNullable<Tool["capsules"]>[number]>(at(request.value, "/tool/capsules"));
+  const set = (next: unknown[]) => edit(put(request.value, "/tool", { ...(isObject(request.value.tool) ? request.value.tool : {}), capsules: next }), untyped("/tool"));
+  const add = () => set([...capsules, { start: [0, 0, 0.02], end: [0, 0, 0.12], radius: 0.03 }]);
+  return (
+    <>
+      {capsules.map((_, k) => (
+        <div class="field" key={k}>
+          <span>Capsule {k + 1}, z from</span>
+          <NumberCell label={`Capsule ${k + 1} start`} pointer={join("tool", "capsules", k, "start", 2)} value={at(request.value, join("tool", "capsules", k, "start", 2))} unit="mm" />
+          <span>to</span>
+          <NumberCell label={`Capsule ${k + 1} end`} pointer={join("tool", "capsules", k, "end", 2)} value={at(request.value, join("tool", "capsules", k, "end", 2))} unit="mm" />
+          <span>radius</span>
+          <NumberCell label={`Capsule ${k + 1} radius`} pointer={join("tool", "capsules", k, "radius")} value={at(request.value, join("tool", "capsules", k, "radius"))} unit="mm" withUnit />
+          <Button kind="quiet" small icon="trash" label={`Remove capsule ${k + 1}`} onClick={() => set(capsules.filter((__, other) => other !== k))} />
+        </div>
+      ))}
+      <Button kind="link" icon="plus" onClick={add}>
+        Add a capsule around the tool
+      </Button>
+    </>
+  );
+}
+
+const SHAPES: Record<string, Shape | null> = {
+  none: null,
+  box: { shape: "box", size: [0.06, 0.06, 0.1] },
+  cylinder: { shape: "cylinder", radius: 0.03, length: 0.1 },
+  sphere: { shape: "sphere", radius: 0.04 },
+};
+
+function PayloadFields({ payload }: { payload: Payload }) {
+  const shape = isObject(payload.shape) ? payload.shape : null;
+  const choose = (name: string) => {
+    const next = SHAPES[name];
+    // about the centre of mass
+    const placed = next ? { ...next, pose: { position: payload.com ?? [0, 0, 0], rotvec: [0, 0, 0] } } : null;
+    edit(put(request.value, "/payload", { ...payload, shape: placed }), untyped("/payload/shape"));
+  };
+  const cell = (name: string, pointer: string) => <NumberCell label={name} pointer={pointer} value={at(request.value, pointer) ?? 0} unit="mm" />;
+  return (
+    <details class="fold">
+      <summary>
+        <span class="fold-name">Centre and shape</span>
+      </summary>
+      <div class="field">
+        <span>Centre of mass, mm</span>
+        {["X", "Y", "Z"].map((axis, k) => cell(`Centre of mass ${axis}`, `/payload/com/${k}`))}
+      </div>
+      <div class="field">
+        <span>Shape</span>
+        <select aria-label="Shape of the payload" value={shape ? (String(shape.shape) in SHAPES ? String(shape.shape) : "other") : "none"} onChange={(event) => choose(event.currentTarget.value)}>
+          {Object.keys(SHAPES).map((name) => <option key={name}>{name}</option>)}
+          {shape && !(String(shape.shape) in SHAPES) && <option value="other">{String(shape.shape)}, see JSON</option>}
+        </select>
+        {shape?.shape === "box" && ["X", "Y", "Z"].map((axis, k) => cell(`Payload size ${axis}`, `/payload/shape/size/${k}`))}
+        {shape && "radius" in shape && cell("Payload radius", "/payload/shape/radius")}
+        {shape && "length" in shape && cell("Payload length", "/payload/shape/length")}
+      </div>
+      {shape && (
+        <div class="field">
+          <span>Its middle at, mm</span>
+          {["X", "Y", "Z"].map((axis, k) => cell(`Payload middle ${axis}`, `/payload/shape/pose/position/${k}`))}
+        </div>
+      )}
+    </details>
+  );
+}

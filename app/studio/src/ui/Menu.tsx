@@ -1,0 +1,54 @@
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef } from "preact/hooks";
+import { Icon, type IconName } from "./icons";
+
+interface Props {
+  label: ComponentChildren;
+  children: ComponentChildren;
+  /** What a reader says, where the label is an icon. */
+  name?: string;
+  icon?: IconName;
+  id?: string;
+  align?: "left" | "right";
+  quiet?: boolean;
+}
+
+/** A list that opens below its button; a click elsewhere and Escape close it. */
+export function Menu({ label, children, name, icon, id, align = "right", quiet }: Props) {
+  const box = useRef<HTMLDetailsElement>(null);
+  useEffect(() => {
+    const away = (event: Event) => {
+      const { current } = box;
+      const inside = current?.contains(event.target as Node);
+      const chosen = inside && (event.target as HTMLElement).closest(".drop button:not([data-stays])");
+      if (current?.open && (!inside || chosen)) setTimeout(() => (current.open = false));
+    };
+    const escape = (event: KeyboardEvent) => {
+      if (event.key !== "Escape" || !box.current?.open) return;
+      box.current.open = false;
+      box.current.querySelector("summary")?.focus();
+      event.stopPropagation();
+    };
+    const filed = (event: Event) => {
+      const { current } = box;
+      if (current?.contains(event.target as Node) && (event.target as HTMLInputElement).type === "file") current.open = false;
+    };
+    document.addEventListener("click", away);
+    document.addEventListener("change", filed);
+    document.addEventListener("keydown", escape, true);
+    return () => {
+      document.removeEventListener("change", filed);
+      document.removeEventListener("click", away);
+      document.removeEventListener("keydown", escape, true);
+    };
+  }, []);
+  return (
+    <details class="menu" ref={box} id={id}>
+      <summary class={`button${quiet ? " quiet" : ""}`} aria-label={name} title={name}>
+        {icon && <Icon name={icon} />}
+        {label}
+      </summary>
+      <div class={`drop ${align}`}>{children}</div>
+    </details>
+  );
+}

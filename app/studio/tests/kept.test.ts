@@ -1,0 +1,53 @@
+import "fake-indexeddb/auto";
+import { beforeAll, expect, it, vi } from "vitest";
+import { askedFor, deleteProject, followChanges, jobNotes, keepJob, projects, saveNow } from "../src/store/persist";
+import { cellOf, link, presentCell, shared } from "../src/store/share";
+import { answered, replaceCell, saved, write, type Answered } from "../src/store/state";
+import { MOVE } from "./cells";
+
+beforeAll(() => {
+  vi.stubGlobal("window", new EventTarget());
+  followChanges();
+});
+
+it("a project is saved by itself, as it was typed", async () => {
+  replaceCell({ project: { id: "a", name: "bin" }, request: MOVE });
+  write("/payload/mass", 1.6, "1,60");
+  await vi.waitFor(() => expect(saved.value).toBe("saved"), 3000);
+  const [project] = await projects();
+  expect(project).toMatchObject({ id: "a", name: "bin", typed: { "/payload/mass": "1,60" }, request: { payload: { mass: 1.6 } } });
+  await deleteProject("a");
+  expect(await projects()).toEqual([]);
+});
+
+it("the request of an answer is known again by its id", async () => {
+  replaceCell({ project: { id: "b", name: "b" }, request: MOVE });
+  write("/payload/mass", 2, "2,0");
+  answered.value = { asked: { ...MOVE, payload: { mass: 2 } }, solution: { id: "answer-1" } } as Answered;
+  await vi.waitFor(async () => expect(await askedFor("answer-1")).toMatchObject({ request: { payload: { mass: 2 } }, typed: { "/payload/mass": "2,0" } }));
+  expect(await askedFor("answer-2")).toBeNull();
+  await saveNow();
+  expect((await projects())[0]).toMatchObject({ answer: "answer-1" });
+  answered.value = null;
+});
+
+it("names of the moves of a job are kept", async () => {
+  await keepJob({ id: "j", source: "moves.csv", moves: [{ from: "a", to: "b", mass: null }], requests: [MOVE] });
+  expect((await jobNotes("j"))?.moves[0]?.from).toBe("a");
+});
+
+it("a link brings the whole cell back", async () => {
+  replaceCell({ project: { id: "c", name: "cell" }, request: MOVE });
+  write("/goal/pose/position/2", 0.5, "500,0");
+  const address = await link(presentCell(), "http://cell/studio");
+  expect((await shared(new URL(address).hash)).cell).toEqual(presentCell());
+  await expect(shared(new URL(address.slice(0, -20)).hash)).rejects.toThrow("A part of it is missing");
+  expect(await shared("#answer=x")).toEqual({ answer: "x" });
+  expect(await shared("")).toEqual({});
+});
+
+it("a file holds a project or a request", () => {
+  expect(cellOf(JSON.stringify(MOVE)).request).toEqual(MOVE);
+  expect(cellOf(JSON.stringify(presentCell()))).toEqual(presentCell());
+  for (const text of ["3", "[]", "null", "{"]) expect(() => cellOf(text)).toThrow();
+});

@@ -1,0 +1,81 @@
+import { describe, expect, it } from "vitest";
+import { asKind, duplicated, moved, withObstacle, withoutRow, withStop } from "../src/store/edits";
+import { at, located, put } from "../src/store/pointer";
+import { kindOf, lackOf, rowsOf, sixOf, targetAt, withNumber } from "../src/store/request";
+import type { ApiRequest, Pose } from "../src/store/types";
+import { MOVE } from "./cells";
+
+const round = withStop(withStop(asKind(MOVE, "round"), { q: [1, 2, 3, 4, 5, 6] }, "pick"), null, "pick");
+const names = (request: ApiRequest) => rowsOf(request).map(({ name }) => name);
+const row = (request: ApiRequest, name: string) => rowsOf(request).find((each) => each.name === name)!;
+
+describe("kinds", () => {
+  it("a move with a stop becomes a round that ends in it", () => {
+    expect(kindOf(round)).toBe("round");
+    expect(names(round)).toEqual(["Start", "goal", "pick 1", "pick 2"]);
+    expect("goal" in round).toBe(false);
+  });
+  it("and a round a move to its last stop", () => {
+    const back = asKind(round, "move");
+    expect(back.goal).toEqual({ q: [1, 2, 3, 4, 5, 6] });
+    expect(asKind(asKind(MOVE, "round"), "move")).toEqual(MOVE);
+  });
+  it("a path keeps its ends", () => {
+    const path = asKind(MOVE, "path");
+    expect([kindOf(path), path.goal]).toEqual(["path", MOVE.goal]);
+  });
+});
+
+describe("stops", () => {
+  it("are duplicated under names of their own", () => {
+    expect(names(duplicated(round, row(round, "pick 1")))).toEqual(["Start", "goal", "pick 1", "pick 3", "pick 2"]);
+  });
+  it("are moved and deleted", () => {
+    expect(names(moved(round, row(round, "pick 2"), -1))).toEqual(["Start", "goal", "pick 2", "pick 1"]);
+    expect(moved(round, row(round, "goal"), -1).stops).toEqual(round.stops);
+    expect(names(withoutRow(round, row(round, "goal")))).toEqual(["Start", "pick 1", "pick 2"]);
+  });
+  it("what lacks is told", () => {
+    expect(lackOf(round)?.text).toContain("pick 2 is empty");
+    expect(lackOf(MOVE)).toBeNull();
+    expect(lackOf(put(MOVE, "/goal", undefined))?.pointer).toBe("/goal");
+  });
+});
+
+describe("poses", () => {
+  const pose = at(MOVE, "/goal/pose") as Pose;
+  it("are shown as on the pendant", () => {
+    expect(sixOf(pose)).toEqual([-0.35, -0.52, 0.45, expect.closeTo(Math.PI / 2), 0, 0]);
+  });
+  it("keep the form of their orientation until it is edited", () => {
+    expect(withNumber(pose, 2, 0.5)).toEqual({ ...pose, position: [-0.35, -0.52, 0.5] });
+    expect(withNumber(pose, 4, 0.1)).toEqual({ position: pose.position, rotvec: [expect.closeTo(Math.PI / 2), 0.1, 0] });
+  });
+});
+
+it("values of wrong types are read as something else", () => {
+  for (const goal of [3, null, { q: "x" }, { pose: { position: 1 } }, []]) {
+    const wrong = { ...MOVE, goal } as ApiRequest;
+    expect(["other", "empty"]).toContain(targetAt(wrong, row(wrong, "Goal")).kind);
+  }
+  expect(names({ stops: 3 } as unknown as ApiRequest)).toEqual(["Start"]);
+});
+
+it("pointers set and delete without changing what was", () => {
+  const next = put(MOVE, "/limits/tcp_speed", 0.5);
+  expect([at(next, "/limits/tcp_speed"), "limits" in MOVE]).toEqual([0.5, false]);
+  expect(put(next, "/limits/tcp_speed", undefined)).toEqual(MOVE);
+  expect(put(MOVE, "/duration/max", undefined)).toEqual(MOVE);
+});
+
+it("errors are located at the field that a request has", () => {
+  expect(located(MOVE, ["body", "payload", "mass"])).toBe("/payload/mass");
+  expect(located(MOVE, ["body", "goal", "pose", "rpy", "position", 2])).toBe("/goal/pose/position/2");
+  expect(located(MOVE, ["body", "goal", "PoseTarget", "pose", "position", 1])).toBe("/goal/pose/position/1");
+  expect(located(MOVE, ["body", "payload", "inertia"])).toBe("/payload/inertia");
+});
+
+it("obstacles have names of their own", () => {
+  const two = withObstacle(withObstacle(MOVE, { shape: "box" }, "box"), { shape: "box" }, "box");
+  expect(two.scene?.obstacles?.map(({ name }) => name)).toEqual(["table", "box 1", "box 2"]);
+});

@@ -1,0 +1,1 @@
+"""Pictures of an arm in its cell, as SVG."""

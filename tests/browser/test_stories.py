@@ -1,0 +1,301 @@
+"""The studio page in a real browser: what people come for, from the first minute to the result that
+they take away.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.app.live import Server
+from tests.browser.pages import (
+    FIRST,
+    SHOWN,
+    fill_json,
+    go,
+    opened,
+    show_json,
+    state,
+    type_into,
+    until,
+)
+from tests.browsers import BROWSER, MISSING
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
+
+PENDANT = {"start": "-420.0 280.0 300.0 0.000 3.142 0.000", "goal": "-350 -420 350 2.221 -2.221 0"}
+"""Poses as a teach pendant shows them: mm, and RX RY RZ in radians."""
+RADIANS = "pose in mm and RX RY RZ in rad"
+
+
+def paste(page: Page, text: str, reading: str = RADIANS) -> None:
+    """Enters a text into the paste box, and answers the question how it is meant."""
+    page.locator("#paste").fill(text)
+    page.locator("#paste").press("Enter")
+    page.locator("#readings").get_by_role("button", name=reading, exact=True).click()
+
+
+def new_cell(page: Page) -> None:
+    until(page, SHOWN)
+    page.locator("#project > summary").click()
+    page.get_by_role("button", name="New cell").click()
+
+
+def optimised(page: Page) -> None:
+    page.keyboard.press("Control+Enter")
+    until(page, "() => !studio.state.run && studio.state.answered && !studio.state.stale")
+
+
+def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, service: Server) -> None:
+    """From an empty cell with two poses of the pendant, 4 kg and a table."""
+    with opened(browser, f"{service.url}/studio") as page:
+        new_cell(page)
+        expect(page.locator("#optimise")).to_be_disabled()
+        page.locator("#change-robot").click()
+        page.get_by_label("Search robots").fill("ur10e")
+        page.get_by_role("button", name="Universal Robots UR10e").click()
+        assert state(page, "request.robot") == "ur10e"
+        paste(page, PENDANT["goal"])
+        goal = state(page, "request.goal.pose")
+        assert goal == {"position": [-0.35, -0.42, 0.35], "rotvec": [2.221, -2.221, 0]}
+        page.locator("[data-row='/start']").get_by_label("More for Start").click()
+        page.get_by_role("button", name="As a pose").click()
+        page.locator("[data-row='/start'] input").first.focus()
+        paste(page, PENDANT["start"])
+        assert state(page, "request.start.pose.rotvec") == [0, 3.142, 0]
+        type_into(page, "/payload/mass", "4")
+        page.locator("#scene").get_by_text("Add", exact=True).click()
+        page.get_by_role("button", name="Table or wall").click()
+        type_into(page, "/scene/obstacles/0/pose/position/2", "-20")
+        for row in ("/start", "/goal"):
+            expect(page.locator(f"[data-row='{row}']")).to_contain_text("postures free")
+        optimised(page)
+        answer = state(page, "answered.solution")
+        assert answer["robot"] == "ur10e" and answer["arm"]["payload"]["mass"] == 4
+        page.get_by_label("One move every so many seconds").fill("6")
+        page.get_by_label("One move every so many seconds").blur()
+        expect(page.locator("#costs")).to_contain_text("Waiting, motors on")
+        expect(page.locator("#costs thead")).to_contain_text("4,800×")
+        expect(page.locator("#notes")).to_contain_text("a cycle is waiting")
+        page.locator("#export").click()
+        expect(page.locator("#preview")).to_contain_text("0.1 of its speed")
+        with page.expect_download() as download:
+            page.locator("#download").click()
+        program = Path(download.value.path()).read_text()
+        assert "servoj" in program and re.search(r"payload.* 4 kg", program)
+
+
+def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server) -> None:
+    """Stops are pasted, ordered, duplicated and deleted; the round is exported as plain moves."""
+    rows = [
+        "pick;450;-250;150;0;3.142;0",
+        "place;100;500;250;0;3.142;0",
+        "rest;300;300;400;0;3.142;0",
+    ]
+    with opened(browser, f"{service.url}/studio") as page:
+        new_cell(page)
+        page.locator("#paste").evaluate(
+            "(box, text) => { const data = new DataTransfer(); data.setData('text/plain', text);"
+            "box.dispatchEvent(new ClipboardEvent('paste', { clipboardData: data, bubbles: true,"
+            "cancelable: true })); }",
+            "\n".join(rows),
+        )
+        page.locator("#readings").get_by_role("button", name=RADIANS, exact=True).click()
+        names = "() => studio.state.request.stops.map(({ name }) => name).join()"
+        assert page.evaluate(names) == "pick 1,place 1,rest 1"
+        rest = page.locator("[data-row='/stops/2/target']")
+        rest.get_by_label("rest 1 X in mm").press("Alt+ArrowUp")
+        assert page.evaluate(names) == "pick 1,rest 1,place 1"
+        page.locator("[data-row='/stops/1/target']").get_by_label("More for rest 1").click()
+        page.get_by_role("button", name="Delete", exact=True).click()
+        assert page.evaluate(names) == "pick 1,place 1"
+        page.keyboard.press("Control+z")
+        assert page.evaluate(names) == "pick 1,rest 1,place 1"
+        page.keyboard.press("Control+Shift+z")
+        page.locator("[data-row='/stops/0/target'] input").nth(1).focus()
+        page.get_by_role("radio", name="takes").click()
+        type_into(page, "/stops/0/payload/mass", "2")
+        type_into(page, "/stops/0/dwell", "0.3")
+        page.locator("[data-row='/stops/1/target'] input").nth(1).focus()
+        page.get_by_role("radio", name="puts down").click()
+        optimised(page)
+        legs = state(page, "answered.cycle.legs")
+        expect(page.locator("#legs tbody tr")).to_have_count(len(legs))
+        total = sum(leg["electrical"] for leg in legs)
+        assert float(page.locator("#joules").inner_text().split()[0]) == pytest.approx(
+            total, rel=0.01
+        )
+        page.locator("#export").click()
+        page.locator("[data-format=movej]").click()
+        page.get_by_label("Gripper output").select_option("0")
+        expect(page.locator("#preview")).to_contain_text("set_standard_digital_out(0, True)")
+        program = page.locator("#preview").inner_text()
+        assert program.count("movej([") == 4, "start, two stops, and back"
+        assert "set_target_payload(2," in program
+
+
+def test_figures_older_than_the_cell_are_marked(page: Page) -> None:
+    """The old motion is not drawn; undo brings the answer back; a reload loses nothing."""
+    fill_json(page, FIRST)
+    show_json(page, False)
+    optimised(page)
+    paths = "() => studio.view.parts.path.children.length"
+    assert page.evaluate(paths) == 1
+    type_into(page, "/goal/pose/position/2", "500")
+    type_into(page, "/payload/mass", "1.6")
+    expect(page.locator("#stale")).to_contain_text("Goal Z 450.0 mm → 500.0 mm")
+    expect(page.locator("#stale")).to_contain_text("Payload 0.800 kg → 1.600 kg")
+    expect(page.locator("#joules s")).to_have_count(1)
+    expect(page.locator("#export")).to_be_disabled()
+    expect(page.locator("#play")).to_be_disabled()
+    assert page.evaluate(paths) == 0
+    page.locator("#undo").click()
+    page.locator("#undo").click()
+    expect(page.locator("#stale")).to_have_count(0)
+    assert page.evaluate(paths) == 1
+    page.locator("#redo").click()
+    typed = page.locator("[data-pointer='/goal/pose/position/2']")
+    expect(typed).to_have_value("500")
+    expect(page.locator("#saved")).to_have_text("Saved in this browser")
+    page.reload()
+    until(page, "() => Boolean(window.studio?.state.answered)")
+    expect(typed).to_have_value("500")
+    expect(page.locator("#stale")).to_contain_text("Goal Z")
+    page.get_by_role("button", name="Undo it").click()
+    expect(page.locator("#stale")).to_have_count(0)
+
+
+def test_projects_are_named_saved_and_opened(page: Page, tmp_path: Path) -> None:
+    """In the browser, and as files."""
+    page.get_by_label("Name of the project").fill("Night cell")
+    page.get_by_label("Name of the project").blur()
+    type_into(page, "/payload/mass", "1,25")
+    with page.expect_download() as download:
+        page.keyboard.press("Control+s")
+    file = tmp_path / "night.joulepath.json"
+    download.value.save_as(file)
+    assert json.loads(file.read_text())["typed"]["/payload/mass"] == "1,25"
+    new_cell(page)
+    assert state(page, "project.name") == "New cell"
+    page.locator("#project > summary").click()
+    page.locator("#open-file").set_input_files(file)
+    expect(page.locator("[data-pointer='/payload/mass']")).to_have_value("1,25")
+    page.locator("#project > summary").click()
+    page.get_by_role("button", name="Open a project").click()
+    page.get_by_label("Search projects").fill("New")
+    page.get_by_role("dialog").get_by_role("button", name="New cell").first.click()
+    assert state(page, "project.name") == "New cell"
+
+
+@pytest.mark.parametrize(
+    ("pointer", "text", "told"),
+    [
+        ("/goal/pose/position/0", "800000", "give it in metres"),
+        ("/goal/pose/position/2", "1400", "out of reach in this orientation"),
+        ("/payload/mass", "40", "more than a Universal Robots UR5e may carry"),
+        ("/scene/obstacles/0/pose/position/2", "200", "in collision"),
+    ],
+)
+def test_each_mistake_leads_to_a_sentence_at_its_field(
+    page: Page, pointer: str, text: str, told: str
+) -> None:
+    fill_json(page, FIRST)
+    show_json(page, False)
+    if pointer.startswith("/scene"):
+        page.locator("#scene").get_by_role("button", name="table", exact=False).first.click()
+    type_into(page, pointer, text)
+    page.locator("#optimise").click()
+    expect(page.locator("#form")).to_contain_text(told)
+    page.locator("#undo").click()
+
+
+def test_an_engineer_takes_a_table_of_moves_overnight(
+    browser: Browser, service: Server, tmp_path: Path
+) -> None:
+    """A job from a CSV file, in the cell as it is; its totals and its CSV."""
+    start, goal = "-420;280;300;0;3.142;0", "-350;-420;350;1.571;0;0"
+    table = tmp_path / "line 2.csv"
+    head = "from;to;kg;x mm;y;z;rx rad;ry;rz;x;y;z;rx;ry;rz"
+    away = "-3000;0;300;0;3.142;0"
+    rows = [
+        f"bin;shelf;0.8;{start};{goal}",
+        f"shelf;bin;0;{goal};{start}",
+        f"bin;far;0;{start};{away}",
+    ]
+    table.write_text("\n".join([head, *rows]))
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        fill_json(page, {"start": FIRST["start"], "goal": FIRST["goal"], "windings": False})
+        show_json(page, False)
+        go(page, "Jobs")
+        page.locator("#new-job").click()
+        page.locator("#moves-file").set_input_files(table)
+        expect(page.get_by_role("dialog")).to_contain_text(f"3 moves, read as {RADIANS}")
+        page.locator("#start-job").click()
+        expect(page.locator("#job-progress")).to_have_text("3 of 3 moves")
+        expect(page.locator("#moves tbody tr.failed")).to_contain_text("out of reach")
+        page.get_by_role("button", name="Intervals and savings").click()
+        expect(page.locator("#moves tbody tr").first).to_contain_text(" to ")
+        with page.expect_download() as download:
+            page.locator("#job-csv").click()
+        lines = list(csv.DictReader(io.StringIO(Path(download.value.path()).read_text())))
+        assert [line["state"] for line in lines] == ["done", "done", "failed"]
+        assert [line["from"] for line in lines] == ["bin", "shelf", "bin"]
+        joules = [float(line["energy_J"]) for line in lines[:2]]
+        for line, energy in zip(lines, joules, strict=False):
+            assert float(line["p5_J"]) < energy < float(line["p95_J"])
+        total = page.locator("#job-totals dd").first.inner_text()
+        assert float(total.split()[0]) == pytest.approx(sum(joules), rel=0.01)
+        page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()
+        until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.trouble)")
+        expect(page.locator("[data-row='/goal']")).to_contain_text("out of reach")
+
+
+def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:
+    """It brings its TCP, its shape and its mass, with the letters of their sources."""
+    fill_json(page, {"start": FIRST["start"], "goal": FIRST["goal"], "payload": FIRST["payload"]})
+    show_json(page, False)
+    page.locator("#tool-fold > summary").click()
+    page.locator("#tool").select_option(label="Robotiq 2F-85")
+    assert state(page, "request.tool") == "robotiq_2f_85"
+    expect(page.locator("#tool-figures")).to_contain_text("0.900 kg C")
+    expect(page.locator("[data-pointer='/tcp/position/2']")).to_have_value("142.0")
+    optimised(page)
+    flange = np.array(page.evaluate("() => studio.view.arms[0].frames.at(-1)")).reshape(4, 4)
+    tcp = np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
+    assert np.linalg.norm(tcp[:3, 3] - flange[:3, 3]) == pytest.approx(0.142)
+    meshes = "() => studio.view.arms[0].links.at(-1).children.length"
+    assert page.evaluate(meshes) == 2, "the tool and the part"
+    type_into(page, "/tcp/position/2", "150")
+    assert state(page, "request.tcp.position") == [0, 0, 0.15]
+    page.locator("#undo").click()
+    page.locator("#tool").select_option("")
+    assert state(page, "request.tool") is None
+
+
+def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:
+    """With the costs as they were set, as a page and as PDF."""
+    fill_json(page, FIRST)
+    show_json(page, False)
+    optimised(page)
+    page.locator("#costs").get_by_role("button", name="Assumptions").click()
+    page.get_by_label("Electricity in € per kWh").fill("0.31")
+    page.get_by_label("Electricity in € per kWh").blur()
+    expect(page.locator("#costs")).to_contain_text("0.31 € a kWh (yours)")
+    joules = page.locator("#joules").inner_text().split()[0]
+    found = {}
+    for kind, button in (("html", "Page (HTML)"), ("pdf", "PDF, to print")):
+        page.locator("#report > summary").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name=button).click()
+        found[kind] = Path(download.value.path()).read_bytes()
+    assert found["pdf"].startswith(b"%PDF")
+    text = found["html"].decode()
+    assert joules in text and "0.31" in text
