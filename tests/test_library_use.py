@@ -39,6 +39,8 @@ FUNCTIONS = {
     "tool_names",
     "what_if",
 }
+SERVICE = {"Client", "InvalidRequest", "ServiceError"}
+"""What is there for services over HTTP."""
 ERRORS = {
     "ContradictoryOrder",
     "CycleTooShort",
@@ -66,6 +68,7 @@ ERRORS = {
     "NothingHeldOut",
     "OutsideLimits",
     "PathInfeasible",
+    "ServiceUnreachable",
     "PayloadUnknown",
     "SingularPose",
     "StartInCollision",
@@ -189,7 +192,7 @@ TYPES = {
 
 
 def test_the_public_names_are_a_promise() -> None:
-    assert set(joulepath.__all__) == FUNCTIONS | ERRORS | TYPES
+    assert set(joulepath.__all__) == FUNCTIONS | ERRORS | TYPES | SERVICE
     assert all(callable(getattr(joulepath, name)) for name in FUNCTIONS)
     assert re.fullmatch(r"\d+\.\d+\.\d+", joulepath.__version__)
 
@@ -203,7 +206,7 @@ def test_the_stub_lists_each_name_once() -> None:
     assert len(set(imported)) == len(imported)
 
 
-@pytest.mark.parametrize("name", sorted(FUNCTIONS | ERRORS | TYPES))
+@pytest.mark.parametrize("name", sorted(FUNCTIONS | ERRORS | TYPES | SERVICE))
 def test_every_name_is_documented(name: str) -> None:
     """A dataclass without a docstring has its signature as one."""
     text = getattr(joulepath, name).__doc__

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from math import pi
 from typing import Any
@@ -12,6 +13,7 @@ import orjson
 from joulepath.app.cli.answer import content_of
 
 POSE_LENGTH = 6
+_WRITTEN = re.compile(r"(p?)\[([-+0-9.eE,\s]*)\]\s*((?:deg)?)")
 
 
 class Target(click.ParamType[dict[str, Any], Any]):
@@ -28,12 +30,13 @@ class Target(click.ParamType[dict[str, Any], Any]):
         if isinstance(value, dict):
             return value
         text = str(value).strip()
-        is_pose, in_degrees = text.startswith("p["), text.endswith("]deg")
+        parts = _WRITTEN.fullmatch(text)
+        pose, numbers, degrees = parts.groups() if parts else ("", "", "")
         try:
-            numbers = orjson.loads(text.removeprefix("p").removesuffix("deg"))
-            values = [float(each) for each in numbers]
-        except (TypeError, ValueError):
+            values = [float(each) for each in numbers.split(",")]
+        except ValueError:
             values = []
+        is_pose, in_degrees = bool(pose), bool(degrees)
         if not values or (is_pose and (in_degrees or len(values) != POSE_LENGTH)):
             self.fail(
                 f"{text!r}: write joint positions as [0,-1.57,1.57,-1.57,-1.57,0], in degrees with "

@@ -44,6 +44,7 @@ def test_a_first_move_needs_no_file(here: Here, tmp_path: Path) -> None:
     [
         ("[0, 1.5]", {"q": [0.0, 1.5]}),
         ("[0, 90]deg", {"q": [0.0, pi / 2]}),
+        (" [.5,-1e-1] deg", {"q": [0.5 * pi / 180, -0.1 * pi / 180]}),
         (DOWN, {"pose": {"position": [0.4, -0.2, 0.3], "rotvec": [2.221441, -2.221441, 0.0]}}),
     ],
 )
@@ -57,7 +58,8 @@ def test_targets_as_pendants_and_programs_write_them(text: str, target: Any) -> 
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "0,1", "p[1,2,3]", DOWN + "deg", "[a]", "p", "{}", "[[1]]"]
+    "text",
+    ["", "[]", "0,1", "p[1,2,3]", DOWN + "deg", "[a]", "p", "{}", "[[1]]", "[nan]", "[1,,2]"],
 )
 def test_a_target_that_is_none_is_wrong_usage(here: Here, text: str) -> None:
     code, out, err = here.run("optimize", "--from", FROM, "--to", text)
