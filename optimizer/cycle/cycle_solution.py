@@ -1,6 +1,4 @@
-"""The solution of a cycle: its moves, energy, lower bound, baselines and certificate, in SI
-units.
-"""
+"""The solution of a cycle: moves, energy, lower bound, baselines and certificate in SI units."""
 
 from __future__ import annotations
 
