@@ -26,7 +26,7 @@ from joulepath.models.own_arm.plausible_units import (
 from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
-from joulepath.models.own_arm.urdf_tree import CHAIN, refuse
+from joulepath.models.own_arm.urdf_tree import CHAIN, listed, refuse
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
@@ -53,6 +53,11 @@ def own_figures(
         warnings.append(
             "Angles of joint origins written with few decimals, such as 1.571, are read as the "
             f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
+        )
+    if chain.coarse:
+        warnings.append(
+            f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as they "
+            "stand, so that the axes are not at right angles. Write 1.5708 and 3.1416 if they are."
         )
     problems = Problems()
     with problems.noted():

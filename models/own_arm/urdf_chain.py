@@ -17,6 +17,7 @@ from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
     CONTINUOUS,
     UrdfTree,
+    is_coarse,
     joint_axis,
     joint_end,
     joint_limit,
@@ -48,7 +49,8 @@ class Chain:
     `base_link` in the base; None if it is the base or not fixed to it. Limits (nq,) are position
     [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of the URDF
     links fixed to the base and to every moving link. `rounded` [rad] is the largest change of a
-    rounded angle to the quarter turn that it stands for.
+    rounded angle to the quarter turn that it stands for, `coarse` has the names of the joints with
+    angles rounded too far for this.
     """
 
     model: pin.Model
@@ -65,6 +67,7 @@ class Chain:
     tau_max: Array
     root: Element
     rounded: float
+    coarse: tuple[str, ...]
 
     @property
     def nq(self) -> int:
@@ -236,6 +239,7 @@ def _merged(
         tau_max,
         root,
         rounded,
+        tuple(name for name in names if is_coarse(tree.joints[name])),
     )
 
 

@@ -165,6 +165,21 @@ def restore_rounded(joint: Element) -> float:
     return changed
 
 
+def is_coarse(joint: Element) -> bool:
+    """Whether an angle of a joint's origin is a quarter turn with two decimals: 1.57 or 3.14.
+
+    It is read as it stands, because this is too far from the quarter turn for rounding alone.
+    """
+    origin = joint.find("origin")
+    words = [] if origin is None else origin.get("rpy", "").split()
+    values = [(float(word), len(word.partition(".")[2])) for word in words]
+    quarters = [(value, round(value / (math.pi / 2)), decimals) for value, decimals in values]
+    return any(
+        count != 0 and decimals == 2 and abs(value - count * math.pi / 2) < 10.0**-decimals
+        for value, count, decimals in quarters
+    )
+
+
 def _exact_angle(text: str) -> float:
     """The quarter turn that a rounded figure stands for, or its value [rad]."""
     value = float(text)

@@ -5,12 +5,12 @@ while it holds the pose (wrist). Singular configurations of the first kind are o
 those of the second kind are members of a self-motion, a curve of solutions.
 
 `InverseKinematics` is the interface; `inverse_kinematics_for` selects the implementation for a
-robot. Six joints use, in this order: the closed form of Universal Robots' arms (`ur_closed_form`),
-the closed form of arms with three parallel or meeting axes (`decomposition`), and Newton's method
-from many starts (`multi_start`), which may miss branches. Seven joints hold every pose on
-self-motions and use the closed form of arms with a spherical shoulder (`redundant_arm`), or
-self-motions traced point by point (`traced_arm`), some of which may be missed. Any other arm has no
-inverse kinematics and takes joint positions as targets.
+robot. Six joints use, in this order: the closed form of arms of Universal Robots' form in any
+convention (`ur_closed_form`), the closed form of arms with three parallel or meeting axes
+(`decomposition`), and Newton's method from many starts (`multi_start`), which may miss branches.
+Seven joints hold every pose on self-motions and use the closed form of arms with a spherical
+shoulder (`redundant_arm`), or self-motions traced point by point (`traced_arm`), some of which may
+be missed. Any other arm has no inverse kinematics and takes joint positions as targets.
 """
 
 from __future__ import annotations

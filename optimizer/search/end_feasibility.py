@@ -103,12 +103,12 @@ def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None
         prepared.problem.arm.active_limits.tau_max,
         prepared.problem.arm.robot.joint_names,
     )
-    still = np.zeros_like(q)
+    still, with_payload = np.zeros_like(q), prepared.problem.arm.payload.mass > 0
     needed = np.abs(prepared.torques(q, still, still))
     found: list[InvalidReason | None] = []
     for k, j in enumerate((needed / tau_max).argmax(axis=1).tolist()):
         overload = needed[k, j] > tau_max[j]
-        error = TorqueInfeasible(joints[j], float(needed[k, j]), float(tau_max[j]))
+        error = TorqueInfeasible(joints[j], float(needed[k, j]), float(tau_max[j]), with_payload)
         found.append(
             InvalidReason(f"{joints[j]} cannot hold the load", error) if overload else None
         )

@@ -246,12 +246,18 @@ class TorqueInfeasible(JoulepathError):
     """
     available: NewtonMetres
     """Torque limit of the joint."""
+    with_payload: Annotated[bool, Internal] = True
+    """Whether the arm has a payload."""
 
     def __str__(self) -> str:
+        needed = f"{self.joint} needs {self.needed:.4g} N·m and has {self.available:.4g} N·m"
+        if not self.with_payload:
+            return (
+                f"{needed} without a payload: relax the torque limit, or correct that of the robot."
+            )
         return (
-            f"{self.joint} needs {self.needed:.4g} N·m and has {self.available:.4g} N·m: lighten "
-            "the payload, bring it "
-            "closer to the flange, or relax the torque limit."
+            f"{needed}: lighten the payload, bring it closer to the flange, or relax the torque "
+            "limit."
         )
 
 

@@ -122,6 +122,17 @@ def test_a_load_that_cannot_be_held_is_told() -> None:
     assert (error.joint, error.needed, error.available) == pytest.approx(
         (ROBOT.joint_names[1], needed, 0.9 * needed)
     )
+    assert "lighten the payload" in str(error)
+
+
+def test_an_arm_without_a_payload_is_not_told_to_lighten_it() -> None:
+    stretched = np.array([0.0, 0.0, 0.0, 0.0, -1.57, 0.0])
+    weak = problem(
+        START, stretched, payload=Payload(0.0), limits=limits(tau_max=[150, 20, 150, 28, 28, 28])
+    )
+    with pytest.raises(TorqueInfeasible, match="without a payload: relax") as refusal:
+        optimize(weak)
+    assert "lighten" not in str(refusal.value)
 
 
 def test_a_payload_beyond_the_rating_is_refused() -> None:

@@ -15,9 +15,10 @@ asin(δ / ρ).
 - The second axis n turns by r1. So the angle between n and the last axis z, which is abs(q5), is
   within e = r1 + h. q6 is the azimuth of n about z, and ψ = q2 + q3 + q4 the azimuth of z about n,
   from the arm's plane: both are within asin(sin e / sin a).
-- The fourth axis is at (ahead, height) - d5 (sin ψ, -cos ψ) in the arm's plane, with
-  ahead = ±sqrt(ρ² - d4²): within r4 of its position for the middles, from the bounds of ahead,
-  height and ψ. If ψ is unbounded, the fourth axis is on the whole circle.
+- The fourth axis is at (ahead - a1, height) - d5 (sin ψ, -cos ψ) in the arm's plane, with
+  ahead = ±sqrt(ρ² - d4²), and ψ counted from the tilt of `URGeometry`: within r4 of its position
+  for the middles, from the bounds of ahead, height and ψ. If ψ is unbounded, the fourth axis is on
+  the whole circle.
 - D is the distance of the fourth axis from the second: cos q3 = (D² - a2² - a3²) / (2 a2 a3), which
   is monotone in D. With q2 = η - β(q3), η the azimuth of the fourth axis:
   dβ / dq3 = 1 / 2 + (a3² - a2²) / (2 D²), with its extrema at the ends of the interval of D. So q2

@@ -93,6 +93,15 @@ def test_the_description_says_which_angles_were_rounded() -> None:
         assert any("written with few decimals" in each for each in warnings) == told
 
 
+@pytest.mark.parametrize(
+    ("written", "told"),
+    [("1.57", True), ("-3.14", True), ("0.00", False), ("1.571", False), ("1.2", False)],
+)
+def test_a_quarter_turn_with_two_decimals_is_remarked(written: str, told: bool) -> None:
+    warnings = own_figures("mine", described(_first_turned(written)))[1]
+    assert any("angles of 1.57 or 3.14: joint_1" in each for each in warnings) == told
+
+
 def _first_turned(yaw: str) -> str:
     """UR5e on a base turned about the vertical by a written angle."""
     return drawn(UR5E, AS_GIVEN).replace('rpy="0.0 -0.0 0.0"', f'rpy="0 0 {yaw}"', 1)

@@ -28,6 +28,17 @@ RELATIONS: tuple[Relation, ...] = (
 # largest of the smallest singular values at random configurations, below which an arm is degenerate
 DEGENERATE = 5e-3
 
+UR_AXES = JointAxes.of(Chain.of(UR5E.model))
+
+
+def shifted(ahead: float, beside: float) -> JointAxes:
+    """UR5e with its second axis ahead of the first and its fifth beside the fourth [m]."""
+    points, T_zero = UR_AXES.points.copy(), UR_AXES.T_zero.copy()
+    points[1:, 0] += ahead
+    points[4:, 0] += beside
+    T_zero[:3, 3] += points[5] - UR_AXES.points[5]
+    return JointAxes(UR_AXES.directions, points, T_zero)
+
 
 def random_axes(pattern: tuple[Relation, ...], rng: np.random.Generator) -> JointAxes:
     """Axes of which each stands in a relation of the pattern (5,) to the one before.

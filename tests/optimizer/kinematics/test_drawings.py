@@ -7,26 +7,15 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.joint_axes import JointAxes
 from joulepath.optimizer.kinematics.six.drawing import DrawnMotion
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
-from tests.optimizer.kinematics.axis_patterns import redrawn, robot_of
-from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, UR5E, flange, solved
+from tests.optimizer.kinematics.axis_patterns import UR_AXES, redrawn, robot_of, shifted
+from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, solved
 
-AXES = JointAxes.of(Chain.of(UR5E.model))
 # at an edge of the workspace, a rounding of the pose by 1e-16 m moves the joints so far [rad]
 FOUND_ON_AN_EDGE = 2e-6
-
-
-def shifted(ahead: float, beside: float) -> JointAxes:
-    """UR5e with its second axis ahead of the first and its fifth beside the fourth [m]."""
-    points, T_zero = AXES.points.copy(), AXES.T_zero.copy()
-    points[1:, 0] += ahead
-    points[4:, 0] += beside
-    T_zero[:3, 3] += points[5] - AXES.points[5]
-    return JointAxes(AXES.directions, points, T_zero)
 
 
 def form_of(axes: JointAxes) -> URClosedForm:
@@ -42,7 +31,7 @@ def test_the_makers_convention_is_that_of_the_form(name: str) -> None:
     assert (drawing.T_form_base == np.eye(4)).all() and (drawing.T_flange_form == np.eye(4)).all()
 
 
-@pytest.mark.parametrize("axes", [AXES, shifted(0.07, 0.0), shifted(-0.05, 0.04)])
+@pytest.mark.parametrize("axes", [UR_AXES, shifted(0.07, 0.0), shifted(-0.05, 0.04)])
 def test_every_configuration_is_found_in_every_drawing(axes: JointAxes) -> None:
     rng, form = np.random.default_rng(11), form_of(axes)
     for _ in range(10):
@@ -59,7 +48,7 @@ def test_every_configuration_is_found_in_every_drawing(axes: JointAxes) -> None:
             assert len(found.branches) == len(solved(robot_of(axes), q).branches)
 
 
-@pytest.mark.parametrize("axes", [AXES, shifted(-0.05, 0.04)])
+@pytest.mark.parametrize("axes", [UR_AXES, shifted(-0.05, 0.04)])
 def test_singular_configurations_are_found_in_every_drawing(axes: JointAxes) -> None:
     rng = np.random.default_rng(12)
     for _ in range(10):

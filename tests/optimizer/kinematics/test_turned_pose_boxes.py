@@ -7,20 +7,30 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.covers.turned_pose_boxes import BRANCHES, TurnedPose
+from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
+from tests.optimizer.kinematics.axis_patterns import redrawn, robot_of, shifted
 
 # largest error of a solution of the closed form next to a singularity [rad]
 EXACT = 1e-9
 
 
+def _drawn() -> Robot:
+    """UR5e with offsets at the first and the fourth axis, in another convention."""
+    return robot_of(redrawn(shifted(-0.05, 0.04), np.random.default_rng(8))[0])
+
+
+ARMS = {"ur5e": load_robot("ur5e"), "ur10e": load_robot("ur10e"), "drawn": _drawn()}
+
+
 def _singular(rng: np.random.Generator, kind: str) -> Array:
-    """Configuration (6,) [rad] at a singularity, or next to one."""
+    """Configuration (6,) [rad] of the closed form at a singularity, or next to one."""
     q = rng.uniform(-np.pi, np.pi, 6)
     if kind == "shoulder":
         # The last axis' origin is as close to the first axis as possible.
@@ -33,16 +43,18 @@ def _singular(rng: np.random.Generator, kind: str) -> Array:
 
 
 @pytest.mark.parametrize("kind", ["any", "elbow", "wrist", "beside the wrist", "shoulder"])
-@pytest.mark.parametrize("robot", ["ur5e", "ur10e"])
+@pytest.mark.parametrize("robot", ARMS, ids=list(ARMS))
 def test_no_configuration_is_outside_the_boxes(robot: str, kind: str) -> None:
-    """For arbitrary tools and tool axes."""
+    """For arbitrary tools and tool axes, and arms drawn in another convention."""
     for seed in range(6):
         rng = np.random.default_rng([seed, len(kind)])
         aligned = seed % 2 == 0
         quaternion = [0, 0, 0, 1] if aligned else Rotation.random(random_state=seed).as_quat()
         T_flange_tcp = Pose.from_quaternion(rng.uniform(-0.2, 0.2, 3), quaternion).T
-        arm = Arm(robot=load_robot(robot), T_flange_tcp=T_flange_tcp)
-        q = _singular(rng, kind)
+        arm = Arm(robot=ARMS[robot], T_flange_tcp=T_flange_tcp)
+        form = URClosedForm.of(arm.robot.model)
+        assert form is not None
+        q = form.drawing.file_within_turn(_singular(rng, kind))
         T, axis = tcp_pose(arm, q), np.array([0.0, 0.0, 1.0]) if aligned else rng.normal(size=3)
         given = Pose(T)
         pose = ConeOrientedPose.about(given, axis)
