@@ -4,7 +4,7 @@ import { Section } from "../ui/Section";
 import { costsOf, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
 import { figure, fixed, parseNumber } from "../store/units";
-import { wait } from "./waits";
+import { wait, waitFailed } from "./waits";
 
 /** The parts of what one move or round costs. */
 function partsOf(shown: Answered): { name: string; joules: number }[] {
@@ -55,7 +55,7 @@ export function CostTable() {
         <span title={given.carbon.source}>{fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon.source)})</span>.{" "}
         {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
         {given.cycle === null && !shown.cycle ? "Back to back: say how often the move comes to price the wait." : ""}
-        {unpriced ? "The wait is being priced." : ""}
+        {unpriced ? (waitFailed.value ? "The wait could not be computed." : "The wait is being priced.") : ""}
       </p>
       {open && <Assumptions />}
     </Section>

@@ -15,6 +15,8 @@ export interface Wait {
 }
 
 export const wait = signal<Wait | null>(null);
+/** Whether the wait could not be computed. */
+export const waitFailed = signal(false);
 
 /** Whether the motion has an end after which it waits. */
 const waits = (shown: Answered, cycle: number | null): cycle is number =>
@@ -26,11 +28,14 @@ export function followWaits(): void {
   effect(() => {
     const shown = answered.value;
     const cycle = economics.value.cycle;
-    if (shown !== last[0] || cycle !== last[1]) wait.value = null;
+    if (shown !== last[0] || cycle !== last[1]) {
+      wait.value = null;
+      waitFailed.value = false;
+    }
     last = [shown, cycle];
     if (!shown || stale.value || !waits(shown, cycle) || wait.peek()?.whole) return undefined;
     const own = new AbortController();
-    const timer = setTimeout(() => untracked(() => void compute(shown, cycle, own.signal).catch(() => undefined)), PAUSE);
+    const timer = setTimeout(() => untracked(() => void compute(shown, cycle, own.signal).catch(() => (waitFailed.value = !own.signal.aborted))), PAUSE);
     return () => {
       clearTimeout(timer);
       own.abort();

@@ -5,6 +5,7 @@ import { at, type Pointer } from "./pointer";
 import { robotName, rowsOf, targetAt, poseAt } from "./request";
 import { request } from "./state";
 import type { ApiRequest, IkSolution, Pose } from "./types";
+import { figure } from "./units";
 
 export type Reach =
   | { state: "asking" }
@@ -73,5 +74,5 @@ async function ask(asked: ApiRequest, pose: Pose): Promise<Reach | null> {
 function withoutFigures(text: string): string {
   return text
     .replace(/^The .*? pose is /, "The pose is ")
-    .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b/g, (whole, metres: string) => (Number(metres) < 5 ? `${(Number(metres) * 1000).toPrecision(2)} mm` : whole));
+    .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b/g, (whole, metres: string) => (Number(metres) < 5 ? `${figure(Number(metres) * 1000, 2)} mm` : whole));
 }

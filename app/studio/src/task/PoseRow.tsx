@@ -8,7 +8,7 @@ import { duplicated, entryOf, moved, withoutRow, withTarget } from "../store/edi
 import { at, put } from "../store/pointer";
 import { reached } from "../store/reach";
 import { poseAt, sixOf, targetAt, withNumber, type Row, type Target } from "../store/request";
-import { changes, edit, request, selected, typed } from "../store/state";
+import { changes, edit, request, selected, trouble, typed } from "../store/state";
 import { JointSliders } from "./JointSliders";
 import { pasteInto } from "./paste";
 import { PoseCells } from "./PoseCells";
@@ -77,7 +77,8 @@ function Numbers({ row, target }: { row: Row; target: Target }) {
   const paste = (text: string) => pasteInto(row, text);
   if (target.kind === "pose") {
     const reach = reached.value[row.pointer];
-    const refused = reach?.state === "refused" ? reach.text : null;
+    const told = trouble.value?.fields.some(({ pointer }) => pointer.startsWith(row.pointer));
+    const refused = reach?.state === "refused" && !told ? reach.text : null;
     return (
       <>
         <PoseCells
