@@ -9,7 +9,26 @@ import "../styles/pages.css";
 import "../styles/narrow.css";
 import { render } from "preact";
 import { multiply, ofPose } from "../store/chain";
-import { answered, changes, economics, page, playing, project, racers, request, run, saved, selected, show, stale, tab, time, typed, duration, trouble } from "../store/state";
+import {
+  answered,
+  changes,
+  economics,
+  page,
+  playing,
+  project,
+  racers,
+  request,
+  run,
+  saved,
+  selected,
+  show,
+  stale,
+  tab,
+  time,
+  typed,
+  duration,
+  trouble,
+} from "../store/state";
 import { postures } from "../answer/postures";
 import { picture } from "../picture/instance";
 import { reachedGhost } from "../picture/reachedGhost";
@@ -23,11 +42,39 @@ declare global {
   }
 }
 
-const signals = { answered, changes, duration, economics, page, playing, postures, project, racers, request, run, saved, selected, show, stale, tab, time, trouble, typed };
+const signals = {
+  answered,
+  changes,
+  duration,
+  economics,
+  page,
+  playing,
+  postures,
+  project,
+  racers,
+  request,
+  run,
+  saved,
+  selected,
+  show,
+  stale,
+  tab,
+  time,
+  trouble,
+  typed,
+};
 
 /** For tests, and for those who look in the console. */
 window.studio = {
-  state: Object.defineProperties({}, Object.fromEntries(Object.entries(signals).map(([name, each]) => [name, { get: () => each.value, enumerable: true }]))),
+  state: Object.defineProperties(
+    {},
+    Object.fromEntries(
+      Object.entries(signals).map(([name, each]) => [
+        name,
+        { get: () => each.value, enumerable: true },
+      ]),
+    ),
+  ),
   get view() {
     return picture.value;
   },
