@@ -20,6 +20,7 @@ RUN python3 -m venv venv \
 # The studio page, by a Node that stays in this step.
 COPY requirements-node.lock scripts/build_studio.py /tmp/studio/scripts/
 COPY app/studio /tmp/studio/joulepath/app/studio
+COPY examples/optimize/bin_to_shelf.json /tmp/studio/examples/optimize/
 RUN mv /tmp/studio/scripts/requirements-node.lock /tmp/studio/ \
     && python3 -m venv /tmp/node && PATH=/tmp/node/bin:$PATH \
     && python /tmp/studio/scripts/build_studio.py \

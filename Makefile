@@ -16,7 +16,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 INSTALL := $(PY) scripts/install.py
 STUDIO := app/static/studio
-STUDIO_SOURCES := $(shell find app/studio -type f -not -path '*/node_modules/*' -not -path '*/.node/*')
+STUDIO_SOURCES := $(shell find app/studio -type f -not -path '*/node_modules/*' -not -path '*/.node/*') \
+	examples/optimize/bin_to_shelf.json
 NATIVE := optimizer/native/libjoulepath.so.1
 SOURCES := app optimizer models tests benchmarks examples scripts
 

@@ -23,7 +23,8 @@ from scipy.stats import spearmanr
 from joulepath import Problem, optimize
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.evaluate.recording import Waypoints
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics

@@ -1,5 +1,7 @@
 __version__: str
 
+from .app.client import Client, ServiceUnreachable
+from .app.exceptions.base import InvalidRequest, ServiceError
 from .models.own_arm.description import InvalidArm
 from .models.registry import load_robot, robot_names
 from .models.robot import Limits, Robot
@@ -7,10 +9,12 @@ from .models.tools.registry import tool_names
 from .models.uncertainty.document import InvalidFigures
 from .optimizer.collision.model import ClosestPair
 from .optimizer.compare import Compared, Comparison, compare
-from .optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
+from .optimizer.cycle.cycle_move import CycleMove
+from .optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
 from .optimizer.cycle.errors import CycleTooShort, NoSequence
 from .optimizer.evaluate.errors import NotCertified
-from .optimizer.evaluate.evaluate import Evaluation, evaluate
+from .optimizer.evaluate.evaluate import evaluate
+from .optimizer.evaluate.evaluation import Evaluation
 from .optimizer.evaluate.interval_energy import IntervalEnergy
 from .optimizer.evaluate.limit_report import LimitReport
 from .optimizer.evaluate.nearest_contact import LeastClearance
@@ -103,6 +107,7 @@ from .optimizer.replay.replay import (
     SimulatedSaving,
     replay,
 )
+from .optimizer.result.baseline import Baseline
 from .optimizer.result.candidates import CandidateReport, CandidateStatus, UnreachableTarget
 from .optimizer.result.certificate import Certificate, Clearance
 from .optimizer.result.energy import (
@@ -116,7 +121,6 @@ from .optimizer.result.energy import (
 )
 from .optimizer.result.front import Dropped, Front, FrontSolver
 from .optimizer.result.solution import (
-    Baseline,
     Configuration,
     LimitsInForce,
     Samples,
@@ -153,6 +157,7 @@ __all__ = [
     "Capsule",
     "Certificate",
     "Clearance",
+    "Client",
     "ClosestPair",
     "Compared",
     "Comparison",
@@ -195,6 +200,7 @@ __all__ = [
     "InvalidArm",
     "InvalidFigures",
     "InvalidProblem",
+    "InvalidRequest",
     "InvalidTable",
     "Inverter",
     "JointEnergy",
@@ -253,6 +259,8 @@ __all__ = [
     "SavingInterval",
     "SavingRange",
     "Scene",
+    "ServiceError",
+    "ServiceUnreachable",
     "SimulatedSaving",
     "SingularPose",
     "Solution",

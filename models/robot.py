@@ -188,6 +188,9 @@ class Robot:
     elbow: LinkCapsule | None = None
     T_base_base_link: Array = field(default_factory=lambda: np.eye(4), repr=False)
 
+    def __repr__(self) -> str:
+        return f"Robot({self.name!r}, {self.nq} joints, payload up to {self.rated_payload:g} kg)"
+
     @property
     def nq(self) -> int:
         """Number of joints."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from joulepath.models.robot import Array
 
@@ -82,6 +81,9 @@ def hull_of_body(name: str, points: Array) -> Array:
     Raises WrongSize if they lie within the smallest size, or in a plane; the message begins with
     `name`.
     """
+    # here: its import takes longer than all others of a first problem
+    from scipy.spatial import ConvexHull, QhullError
+
     check_extent(name, points)
     extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     try:

@@ -6,10 +6,16 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
+import numpy as np
+
+from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlineShares
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
 from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.presentation.chart import Chart
+from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,
@@ -19,7 +25,7 @@ from joulepath.optimizer.progress import (
     no_listener,
     only_news,
 )
-from joulepath.optimizer.result.energy import Objective
+from joulepath.optimizer.result.energy import Objective, energy_text
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.solve.methods import METHODS
 
@@ -33,8 +39,8 @@ class Compared:
     error: JoulepathError | None
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
     """Solutions of one problem by several methods, with at least one motion.
 
     `methods` has an entry for every method, in the requested order.
@@ -70,8 +76,71 @@ class Comparison:
         least = self._energy(self.best)
         return self._energy(method) / least - 1 if least > 0 else 0.0
 
+    def _headline(self) -> str:
+        others = (
+            f"{each.method} {self.excess(each.method):+.1%}"
+            if each.error is None
+            else f"{each.method} {type(each.error).__name__}"
+            for each in self.methods
+            if each.method != self.best
+        )
+        best = energy_text(self.solutions[self.best].energy, self.objective)
+        return "; ".join([f"best {self.best} {best}", *others])
+
+    def _rows(self) -> Rows:
+        names = ("method", "energy", "excess", "duration", "status")
+        columns = self._columns()
+        rows = zip(*(columns[name] for name in names), strict=True)
+        cells = ([_cell(each) for each in row] for row in rows)
+        return [("method", "energy [J]", "excess", "duration [s]", "status"), *cells]
+
+    def _shown(self) -> Any:
+        return {
+            "objective": self.objective,
+            "lower_bound": self.lower_bound,
+            "best": self.best,
+            "methods": [
+                {
+                    "method": each.method,
+                    "solution": each.solution and each.solution.solved_motion(),
+                    "problem": each.error and str(each.error),
+                }
+                for each in self.methods
+            ],
+        }
+
+    def _columns(self) -> dict[str, Any]:
+        """One row per method, without figures where it found no motion."""
+        found = [each.solution for each in self.methods]
+        return {
+            "method": [each.method for each in self.methods],
+            "energy": [each and each.energy.of(self.objective) for each in found],
+            "excess": [each.solution and self.excess(each.method) for each in self.methods],
+            "electrical": [each and each.energy.electrical.total for each in found],
+            "mechanical": [each and each.energy.mechanical.total for each in found],
+            "duration": [each and each.duration for each in found],
+            "wall_time": [each and each.solver.wall_time for each in found],
+            "status": [
+                type(each.error).__name__ if each.solution is None else each.solution.status
+                for each in self.methods
+            ],
+        }
+
+    def _charts(self) -> Sequence[Chart]:
+        """Power of each method over the longest motion; 0 W after the end of a shorter one."""
+        trajectories = {name: each.trajectory for name, each in self.solutions.items()}
+        t = np.unique(np.concatenate([each.t for each in trajectories.values()]))
+        power: dict[str, Array] = {
+            name: np.interp(t, each.t, each.power, right=0.0) for name, each in trajectories.items()
+        }
+        return [Chart(t, "t [s]", "power [W]", power)]
+
     def _energy(self, method: MethodName) -> float:
         return self.solutions[method].energy.of(self.objective)
+
+
+def _cell(value: float | str | None) -> str:
+    return "" if value is None else value if isinstance(value, str) else f"{value:.4g}"
 
 
 def compare(

@@ -1,7 +1,8 @@
 """Declarations of the fields of results and errors beside their types: units, axes, and display.
 
 The text below a field is its meaning. This module only names the markers;
-`joulepath.app.answers.declared` reads them to write JSON, JSON Schema and the reference.
+`joulepath.optimizer.presentation` reads them to write JSON, `joulepath.app.answers.declared` to
+write JSON Schema and the reference.
 """
 
 from __future__ import annotations

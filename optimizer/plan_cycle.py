@@ -14,11 +14,11 @@ from joulepath.optimizer.cycle.cycle_baselines import (
     move_by_move,
     recompared,
 )
+from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import (
     CycleBaseline,
     CycleEnergies,
-    CycleMove,
     CycleSolution,
     energies_of,
 )

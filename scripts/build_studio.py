@@ -26,10 +26,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "joulepath" / "app" / "studio"
 PAGE = ROOT / "joulepath" / "app" / "static" / "studio"
+FIRST = ROOT / "examples" / "optimize" / "bin_to_shelf.json"  # the request of the first visit
 DIGEST = "sources.txt"  # beside the built page: the digest of what it was built from
 OLDEST_NODE = (20, 19)
 PARTS = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"]
-FOLDERS = ["public", "src"]
 
 
 def main() -> None:
@@ -70,6 +70,7 @@ def build(page: Path = PAGE) -> None:
     with tempfile.TemporaryDirectory(dir=page.parent, prefix=".studio-") as folder:
         new = Path(folder) / "studio"
         run("npm", "run", "--silent", "build", "--", "--outDir", str(new), "--logLevel", "warn")
+        shutil.copy(FIRST, new / "first.json")
         (new / DIGEST).write_text(digest(), encoding="utf-8")
         shutil.rmtree(page, ignore_errors=True)
         new.rename(page)
@@ -162,15 +163,15 @@ def digest() -> str:
     """The digest of everything that the page is built from. Raises OSError."""
     found = hashlib.sha256()
     for path in _files():
-        found.update(f"{path.relative_to(SOURCES)}\0".encode())
+        found.update(f"{path.relative_to(ROOT)}\0".encode())
         found.update(path.read_bytes())
     return found.hexdigest()
 
 
 def _files() -> Iterator[Path]:
     yield from (SOURCES / name for name in PARTS)
-    for folder in FOLDERS:
-        yield from sorted(path for path in (SOURCES / folder).rglob("*") if path.is_file())
+    yield FIRST
+    yield from sorted(path for path in (SOURCES / "src").rglob("*") if path.is_file())
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 """Answers from declared classes: JSON for orjson, pydantic models for OpenAPI.
 
-A declared class is a dataclass, a NamedTuple or a TypedDict. Its fields have types with the markers
-of `joulepath.optimizer.declared`, and their meaning as the text below them. Only this module reads
-the markers.
+`joulepath.optimizer.presentation.declared_fields` reads the fields of a class and their markers.
 """
 
 from __future__ import annotations
@@ -13,7 +11,6 @@ import re
 import sys
 import types
 from collections.abc import Callable, Iterator
-from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache
 from operator import attrgetter
@@ -25,14 +22,18 @@ from typing import (
     Union,
     get_args,
     get_origin,
-    get_type_hints,
-    is_typeddict,
 )
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from joulepath.optimizer.declared import Axes, Internal, Keys, NotEmpty, NullIfInfinite, Unit
+from joulepath.optimizer.declared import Axes, Keys, NotEmpty, NullIfInfinite, Unit
+from joulepath.optimizer.presentation.declared_fields import (
+    hints_of,
+    is_declared,
+    markers_of,
+    shown_fields,
+)
 
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -56,20 +57,11 @@ def _reader(kind: type) -> Callable[[Any], dict[str, Any]]:
 
 
 @cache
-def shown_fields(kind: type) -> tuple[str, ...]:
-    """Names of the public fields of a declared class, in order."""
-    if not _is_declared(kind):
-        raise TypeError(f"{kind.__name__} declares no fields")
-    hints = _hints(kind)
-    return tuple(name for name in _names(kind) if Internal not in _markers(hints[name]))
-
-
-@cache
 def model_of(kind: type) -> type[BaseModel]:
     """The pydantic model of a declared class: its schema, and the check of a JSON document in
     tests.
     """
-    hints, texts = _hints(kind), texts_of(kind)
+    hints, texts = hints_of(kind), texts_of(kind)
     own: dict[str, Any] = {}
     for name in shown_fields(kind):
         if name not in texts:
@@ -113,38 +105,11 @@ def _below_fields(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
                 yield name, " ".join(words.split())
 
 
-def _is_declared(kind: Any) -> bool:
-    return isinstance(kind, type) and (
-        is_dataclass(kind) or hasattr(kind, "_fields") or is_typeddict(kind)
-    )
-
-
-def _names(kind: Any) -> tuple[str, ...]:
-    if is_dataclass(kind):
-        return tuple(field.name for field in fields(kind))
-    return tuple(kind._fields if hasattr(kind, "_fields") else kind.__annotations__)
-
-
-@cache
-def _hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind, include_extras=True)
-
-
-def _markers(hint: Any) -> tuple[Any, ...]:
-    """The markers of a type, and of the alternatives of a union: `Joules | None` is in joules."""
-    origin = get_origin(hint)
-    if origin is Annotated:
-        return (*hint.__metadata__, *_markers(hint.__origin__))
-    if origin in (Union, types.UnionType, NotRequired):
-        return tuple(marker for option in get_args(hint) for marker in _markers(option))
-    return ()
-
-
 def _field(hint: Any, text: str) -> Any:
     others: dict[str, Any] = {}
-    units = [marker.symbol for marker in _markers(hint) if isinstance(marker, Unit)]
+    units = [marker.symbol for marker in markers_of(hint) if isinstance(marker, Unit)]
     unit = units[0] if units else None
-    if NotEmpty in _markers(hint):
+    if NotEmpty in markers_of(hint):
         others["min_length"] = 1
     if get_origin(hint) is NotRequired:
         # a factory: a default would be in the schema
@@ -171,7 +136,7 @@ def _type(hint: Any) -> Any:
         return dict[args[0], _type(args[1])]  # type: ignore[misc,valid-type]
     if isinstance(hint, type) and issubclass(hint, Enum):
         return Literal[tuple(member.value for member in hint)]
-    return model_of(hint) if _is_declared(hint) else hint
+    return model_of(hint) if is_declared(hint) else hint
 
 
 def _annotated(inner: Any, markers: tuple[Any, ...]) -> Any:

@@ -12,9 +12,10 @@ from fastapi import APIRouter, Path
 from fastapi.responses import HTMLResponse
 
 from joulepath.app.engine.result import json_document
+from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.transport import NotFound
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.http.problems import occasion, own_fields, problem_of, types_of_error
+from joulepath.app.http.problems import occasion, own_fields, problem_of
 from joulepath.app.schemas.examples.problems import example_of
 from joulepath.app.schemas.examples.values import REQUEST_ID
 from joulepath.optimizer.exceptions import DeclaredError

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 import orjson
 
+from joulepath.app.cli import terminal
 from joulepath.app.cli.exit_codes import of_error
 
 if TYPE_CHECKING:
@@ -34,13 +35,23 @@ OUTPUT: Callable[[Any], Any] = click.option(
 
 
 class Refused(Exception):
-    """The request is answered with a problem: its JSON (RFC 9457), and the exit code of the
-    command.
+    """The request is answered with a problem.
+
+    Attributes:
+        problem: its JSON (RFC 9457).
+        exit_code: exit code of the command.
+        remedy: what to do, in words.
     """
 
-    def __init__(self, problem: bytes, exit_code: int) -> None:
+    def __init__(self, problem: bytes, exit_code: int, remedy: str = "") -> None:
         super().__init__(problem)
-        self.problem, self.exit_code = problem, exit_code
+        self.problem, self.exit_code, self.remedy = problem, exit_code, remedy
+
+    def shown(self) -> bytes:
+        """What standard error shows: words on a terminal, else the JSON."""
+        if not sys.stderr.isatty():
+            return self.problem
+        return terminal.problem(orjson.loads(self.problem), self.remedy).encode()
 
 
 def new_id() -> str:
@@ -89,9 +100,10 @@ def result_of(task: Task, deadline: float, request_id: str) -> TaskResult:
 def refused(error: Exception, request_id: str | None = None) -> Refused:
     """The exception of a command for an error of the library or the service."""
     from joulepath.app.engine.result import json_document
-    from joulepath.app.http.problems import problem_of
+    from joulepath.app.http.problems import problem_of, reported
 
-    return Refused(json_document(problem_of(error, request_id or new_id())), of_error(error))
+    document = json_document(problem_of(error, request_id or new_id()))
+    return Refused(document, of_error(error), reported(error).remedy)
 
 
 def compile_kernel_of(robot_name: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from joulepath.app.cli.answer import FILE, OUTPUT
+from joulepath.app.cli.answer import FILE, OUTPUT, content_of
 from joulepath.app.cli.search import proof, search
 
 
@@ -27,7 +27,7 @@ def cycle(file: str, output: Path | None) -> None:
     from joulepath.app.api.cycle.request import CycleRequest
     from joulepath.app.api.cycle.task import CycleTask
 
-    search(CycleRequest, CycleTask, file, output, summary_of)
+    search(CycleRequest, CycleTask, content_of(file), output, summary_of)
 
 
 def summary_of(answer: dict[str, Any]) -> dict[str, str]:

@@ -9,19 +9,25 @@ import click
 from joulepath import __version__
 from joulepath.app.cli.answer import Refused
 from joulepath.app.cli.cluster_worker import cluster_worker
+from joulepath.app.cli.compare import compare
 from joulepath.app.cli.cycle import cycle
 from joulepath.app.cli.evaluate import evaluate
+from joulepath.app.cli.excitation import excitation
 from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID
 from joulepath.app.cli.export import export
 from joulepath.app.cli.identify import identify
+from joulepath.app.cli.ik import ik
 from joulepath.app.cli.interrupts import interruptible
+from joulepath.app.cli.jobs import jobs
 from joulepath.app.cli.keys import keys
 from joulepath.app.cli.optimize import optimize
+from joulepath.app.cli.pareto import pareto
 from joulepath.app.cli.replay import replay
 from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
 from joulepath.app.cli.serve import serve
 from joulepath.app.cli.tools import tools
+from joulepath.app.cli.whatif import whatif
 
 
 @click.group(
@@ -35,26 +41,38 @@ Exit codes:
   141  the program that reads standard output has ended (SIGPIPE)
 
 \b
-Example:
-  joulepath optimize request.json > answer.json""",
+Examples:
+  joulepath optimize --robot ur10e --from '[0,-90,90,-90,-90,0]deg' --to 'p[.6,-.3,.4,2.22,-2.22,0]'
+  joulepath optimize request.json > answer.json
+
+\b
+Completion of commands and options, for bash (zsh and fish likewise):
+  source <(_JOULEPATH_COMPLETE=bash_source joulepath)""",
 )
 @click.version_option(__version__, prog_name="joulepath")
 def joulepath() -> None:
     """Finds the motion of least energy of a robot arm, with its energy breakdown and a certificate.
 
     Requests and answers are the same as in the HTTP service. SI units throughout: m, rad, s, kg,
-    N·m, W, J. A request that fails writes its problem (RFC 9457) to standard error.
+    N·m, W, J. A request that fails writes its problem to standard error: in
+    words on a terminal, else as JSON (RFC 9457).
     """
 
 
 for command in (
     serve,
     optimize,
+    pareto,
+    compare,
     cycle,
     evaluate,
+    whatif,
+    ik,
     export,
-    identify,
     replay,
+    excitation,
+    identify,
+    jobs,
     report,
     check,
     robots,
@@ -71,7 +89,7 @@ def main() -> None:
         with interruptible():
             code = joulepath.main(prog_name="joulepath", standalone_mode=False) or ANSWERED
     except Refused as refusal:
-        click.echo(refusal.problem, err=True)
+        click.echo(refusal.shown(), err=True)
         code = refusal.exit_code
     except click.ClickException as error:
         error.show()

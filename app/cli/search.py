@@ -1,48 +1,103 @@
-"""Common parts of the searching commands: from a file to the answer, and its summary."""
+"""Common parts of the searching commands: from a request to the answer, and its summary."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
+
+import click
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import (
-    answered,
     compile_kernel_of,
-    content_of,
     new_id,
     parsed,
+    result_of,
     validated,
     write,
 )
 
 if TYPE_CHECKING:
-    from joulepath.app.api.cycle.request import CycleRequest
+    from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
-    from joulepath.app.schemas.request import OptimizeRequest
+    from joulepath.app.schemas.common import Request
 
 Summary = Callable[[dict[str, Any]], dict[str, str]]
 
+FORMAT: Callable[[Any], Any] = click.option(
+    "--format",
+    "wanted",
+    type=click.Choice(["json", "csv"]),
+    default="json",
+    help="Kind of the answer. Default: json.",
+)
+ANSWERS: Callable[[Any], Any] = click.option(
+    "--answers",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Write the complete answers that the answer refers to into this folder, as ID.json.",
+)
+
+
+class _Timed(Protocol):
+    """A request with a deadline."""
+
+    deadline: float
+
 
 def search(
-    model: type[OptimizeRequest | CycleRequest],
+    model: type[Request],
     task: Callable[[Any, str], Task],
-    file: str,
+    body: bytes,
     output: Path | None,
     summary_of: Summary,
+    answers: Path | None = None,
 ) -> None:
-    """Writes the answer of a `task` for the request in a file, and its summary to a terminal.
-    Raises Refused.
+    """Writes the answer of a `task` for a request, and its summary to a terminal.
+
+    Args:
+        model: class of the request.
+        task: the task of a request and its id.
+        body: JSON of the request.
+        output: file of the answer; None for standard output.
+        summary_of: the lines of the summary of an answer.
+        answers: folder for the complete answers that the answer refers to.
+
+    Raises:
+        Refused: there is no answer.
     """
     request_id = new_id()
-    request = validated(model, content_of(file), request_id)
+    request: Any = validated(model, body, request_id)
+    timed: _Timed = request
     with terminal.progress("Loading the compiled kernel of the robot"):
-        compile_kernel_of(request.robot)
-    with terminal.progress(f"Optimising for at most {request.deadline:g} s"):
-        answer = answered(task(request, request_id), request.deadline, request_id)
-    write(answer, output)
-    terminal.summary(lambda: summary_of(parsed(answer)))
+        compile_kernel_of(robot_in(request))
+    with terminal.progress(f"Optimising for at most {timed.deadline:g} s"):
+        result = result_of(task(request, request_id), timed.deadline, request_id)
+    if result.kept_as is not None:
+        result = result.not_kept()
+    if answers is not None:
+        write_answers(result, answers)
+    write(result.document, output)
+    if result.media_type == "application/json":
+        terminal.summary(lambda: summary_of(parsed(result.document)))
+
+
+def robot_in(request: Any) -> str:
+    """Name of the robot in a request: its own, or that of the base of a what-if."""
+    for base in ("optimize", "evaluate"):
+        request = getattr(request, base, None) or request
+    name: str = request.robot
+    return name
+
+
+def write_answers(result: TaskResult, folder: Path) -> None:
+    """Writes the complete answers that a result refers to. Raises click.FileError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise click.FileError(str(folder), error.strerror or "") from None
+    for each in result.stored:
+        write(each.body, folder / f"{each.id}.json")
 
 
 def proof(answer: dict[str, Any]) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 @contextmanager
@@ -23,6 +24,37 @@ def progress(description: str) -> Iterator[None]:
         # brackets in a description are text, not markup
         shown.add_task(description.replace("[", r"\["), total=None)
         yield
+
+
+@contextmanager
+def fraction(description: str) -> Iterator[Callable[[float], object]]:
+    """Shows a bar while the body runs, if standard error is a terminal.
+
+    Yields a function that takes the share that is done.
+    """
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as shown:
+        bar = shown.add_task(description, total=1.0)
+        yield lambda share: shown.update(bar, completed=share)
+
+
+def problem(document: dict[str, Any], remedy: str) -> str:
+    """A problem document in words, with each field that is wrong and what to do."""
+    lines = [f"{document['title']}: {document['detail']}"]
+    lines += [f"  {_place(each['loc'])}: {each['msg']}" for each in document.get("errors", [])]
+    return "\n".join([*lines, *([remedy] if remedy else [])])
+
+
+def _place(loc: list[str | int]) -> str:
+    """The name of a field: `start.q.1` of `["body", "start", "q", 1]`."""
+    inner = loc[1:] if loc[:1] in (["body"], ["query"]) else loc
+    return ".".join(map(str, inner)) or "the request"
 
 
 def summary(lines: Callable[[], dict[str, str]]) -> None:

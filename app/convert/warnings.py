@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from joulepath.optimizer.collision.close_pass import CLOSE_PASS
 from joulepath.optimizer.collision.stand_ins import StandInSettings
-from joulepath.optimizer.evaluate.evaluate import Evaluation
+from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.problem.arm import PAYLOAD, TOOL
 from joulepath.optimizer.replay.outcome import Outcome
 from joulepath.optimizer.replay.planned import PlannedMotion

@@ -18,11 +18,12 @@ from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions.access import CrossSite, RoleTooLow, Unauthenticated, WrongHost
 from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.queue import Busy, TooManyRequests
 from joulepath.app.exceptions.transport import HeadTooLarge
 from joulepath.app.http.answer_examples import add_examples
 from joulepath.app.http.authentication import SCHEME
-from joulepath.app.http.problems import model_of_problem, path_of, problem_of, types_of_error
+from joulepath.app.http.problems import model_of_problem, path_of, problem_of
 from joulepath.app.http.sites import PROBES
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from joulepath.app.schemas.examples.bodies import BODY_EXAMPLES

@@ -2,51 +2,23 @@
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import islice
 from typing import Any, Literal
 
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field, ValidationError, create_model
 
-from joulepath.app.answers.declared import model_of, shown_fields
+from joulepath.app.answers.declared import model_of
 from joulepath.app.convert.fields import location
-from joulepath.app.exceptions import access, base, queue, report, stored, transport
 from joulepath.app.exceptions.base import FieldError, InternalError, InvalidRequest
 from joulepath.app.http.validation_messages import told
 from joulepath.app.schemas.problem_details import ProblemDetails
-from joulepath.optimizer import exceptions as library
-from joulepath.optimizer.cycle import errors as sequence
-from joulepath.optimizer.evaluate import errors as given_motions
 from joulepath.optimizer.exceptions import DeclaredError, InvalidProblem
-from joulepath.optimizer.excitation import errors as excitation
-from joulepath.optimizer.export import errors as exports
-from joulepath.optimizer.identify import errors as identification
-from joulepath.optimizer.identify.logs import log_errors as logs
-from joulepath.optimizer.search import errors as search
+from joulepath.optimizer.presentation.declared_fields import shown_fields
 
 PREFIX = "/problems/"
 MOST_ERRORS = 20
 """Most errors listed by an `invalid-request` problem; a body can have thousands."""
-
-_MODULES = (
-    *(base, library, search, sequence, given_motions, exports, logs, identification, excitation),
-    *(stored, queue, access, transport, report),
-)
-"""Modules with declared errors, in the order of the reference."""
-
-
-@cache
-def types_of_error() -> tuple[type[DeclaredError], ...]:
-    """All types of errors in answers of the service."""
-    classes = (
-        each for module in _MODULES for each in vars(module).values() if isinstance(each, type)
-    )
-    declared = (
-        each for each in classes if issubclass(each, DeclaredError) and "title" in vars(each)
-    )
-    # Modules also contain imported classes.
-    return tuple(dict.fromkeys(declared))
 
 
 def reported(error: Exception) -> DeclaredError:

@@ -10,7 +10,10 @@ function licences(): Plugin {
     name: "licences",
     generateBundle() {
       const texts = BUNDLED.map((name) => {
-        const text = readFileSync(new URL(`node_modules/${name}/LICENSE`, import.meta.url), "utf-8");
+        const text = readFileSync(
+          new URL(`node_modules/${name}/LICENSE`, import.meta.url),
+          "utf-8",
+        );
         return `${name}\n\n${text.trim()}\n`;
       });
       this.emitFile({ type: "asset", fileName: "licences.txt", source: texts.join("\n\n") });

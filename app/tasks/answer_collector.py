@@ -5,10 +5,10 @@ from __future__ import annotations
 import uuid
 from dataclasses import replace
 
-from joulepath.app.answers.declared import shown_fields
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.engine.result import StoredAnswer, json_document
 from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.optimizer.presentation.declared_fields import shown_fields
 
 MOST_BYTES = 1 << 26
 """Largest total size [byte] of the answers of one result, before compression."""

@@ -26,8 +26,9 @@ from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import is_given_order_allowed
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
-from joulepath.optimizer.result.solution import Baseline, Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import baselines, nearest, saving
 
 

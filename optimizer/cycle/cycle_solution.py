@@ -1,6 +1,4 @@
-"""The solution of a cycle: its moves, energy, lower bound, baselines and certificate, in SI
-units.
-"""
+"""The solution of a cycle: moves, energy, lower bound, baselines and certificate in SI units."""
 
 from __future__ import annotations
 
@@ -9,117 +7,35 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
 from itertools import chain, pairwise
 from operator import add
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from joulepath.optimizer.declared import Internal, Joules, Ratio, Seconds
+from joulepath.optimizer.cycle.cycle_move import CycleMove
+from joulepath.optimizer.declared import Internal, Joules, NotEmpty, Ratio, Seconds, Watts
 from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
-from joulepath.optimizer.problem.stops import PlannedMove
+from joulepath.optimizer.presentation.chart import Chart, joint_curves
+from joulepath.optimizer.presentation.files import Saved
+from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.result.cycle import (
     CycleCertificate,
     CycleClearance,
     CycleSearchReport,
     LegReport,
-    Pass,
-    StopConfiguration,
 )
 from joulepath.optimizer.result.energy import (
     ElectricalEnergy,
     Energy,
+    EnergyAndBound,
     JointEnergy,
     MechanicalEnergy,
     Objective,
     SavingInterval,
-    Sensitivity,
     StorageUse,
+    energy_text,
+    optimality_gap,
 )
 from joulepath.optimizer.result.solution import Solution
-
-
-@dataclass(frozen=True)
-class CycleMove:
-    """A move of the cycle with the rests after it.
-
-    Attributes:
-        planned: the move as planned.
-        solution: its motion.
-        t0: start of the move in the cycle [s].
-        dwell_energy: energy of the dwell after the move [J].
-        wait: duration of the wait after the dwell [s].
-        wait_energy: energy of the wait [J].
-        pairs: number of possible pairs of configurations.
-        kinds: number of kinds of pairs.
-        solved: number of kinds with an attempted motion.
-        sensitivity: sensitivity of the energy of move, dwell and wait.
-        passes: stops passed by the move.
-        charges: charge of the energy storage before the move, after it, after the dwell and after
-            the wait [J]; empty without storage.
-    """
-
-    planned: PlannedMove
-    solution: Solution
-    t0: float
-    dwell_energy: float
-    wait: float
-    wait_energy: float
-    pairs: int
-    kinds: int
-    solved: int
-    sensitivity: Sensitivity = field(repr=False)
-    passes: list[Pass]
-    charges: tuple[float, ...] = ()
-
-    @property
-    def duration(self) -> float:
-        """Duration [s] of the move, the dwell and the wait."""
-        return self.solution.duration + self.planned.dwell + self.wait
-
-    @property
-    def energy(self) -> float:
-        """Electrical energy [J] of the move, the dwell and the wait."""
-        return self.solution.energy.electrical.total + self.dwell_energy + self.wait_energy
-
-    def legs(self, objective: Objective) -> list[LegReport]:
-        """The move, and its dwell and wait if they have a duration."""
-        solution, planned = self.solution, self.planned
-        goal = StopConfiguration.at(solution.goal, planned.goal)
-        move = LegReport(
-            kind=planned.kind,
-            start=StopConfiguration.at(solution.start, planned.start),
-            goal=goal,
-            passes=self.passes,
-            t0=self.t0,
-            duration=solution.duration,
-            electrical=solution.energy.electrical.total,
-            mechanical=solution.energy.mechanical.total,
-            lower_bound=solution.lower_bound,
-            payload_mass=planned.arm.payload.mass,
-            charge=self.charges[1] if self.charges else None,
-        )
-        dwell = replace(
-            move,
-            kind="dwell",
-            start=goal,
-            passes=[],
-            t0=self.t0 + solution.duration,
-            duration=planned.dwell,
-            electrical=self.dwell_energy,
-            mechanical=0.0,
-            lower_bound=self.dwell_energy if objective == "electrical" else 0.0,
-            payload_mass=planned.arm_after.payload.mass,
-            charge=self.charges[2] if self.charges else None,
-        )
-        wait = replace(
-            dwell,
-            kind="wait",
-            t0=dwell.t0 + dwell.duration,
-            duration=self.wait,
-            electrical=self.wait_energy,
-            lower_bound=self.wait_energy if objective == "electrical" else 0.0,
-            charge=self.charges[3] if self.charges else None,
-        )
-        return [move, *(rest for rest in (dwell, wait) if rest.duration > 0)]
 
 
 @dataclass(frozen=True)
@@ -134,6 +50,15 @@ class CycleEnergies:
     def of(self, objective: Objective) -> float:
         """The energy that an objective minimises [J]."""
         return self.electrical.energy if objective == "electrical" else self.mechanical
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleEnergy(EnergyAndBound):
+    """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
+
+    lower_bound: Joules
+    """Lower bound of the objective: no cycle with these stops and passes, of any configurations,
+    shapes and durations, needs less."""
 
 
 CycleBaselineName = Literal[
@@ -190,8 +115,38 @@ class CycleBaseline:
         object.__setattr__(self, "mechanical", self.energies.mechanical)
 
 
-@dataclass(frozen=True)
-class CycleSolution:
+@dataclass(frozen=True, kw_only=True)
+class SolvedCycle:
+    """The cycle of least energy, its moves, and its certificate."""
+
+    objective: Objective
+    """The minimised energy."""
+    order: list[str]
+    """Names of the stops, as they are visited."""
+    duration: Seconds
+    """Duration of the cycle, dwells and waiting included."""
+    status: Literal["optimal", "feasible"]
+    """`optimal`: every move converged, and no other chain of arm configurations has a lower bound
+    below the energy of this cycle. A better cycle may still exist: see `optimality_gap`.
+    `feasible`: the cycle is certified, but the search was incomplete, or arm configurations may
+    have been missed."""
+    price_of_time: Watts
+    """Saving of one more second; negative if it would cost energy. 0 if the cycle takes its own
+    time."""
+    energy: CycleEnergy
+    """Energy and power of the cycle."""
+    legs: Annotated[Sequence[LegReport], NotEmpty]
+    """Moves and dwells in their order."""
+    baselines: list[CycleBaseline]
+    """The same cycle in other ways, as far as they were found in time."""
+    certificate: CycleCertificate
+    """Independent check of all moves."""
+    search: CycleSearchReport
+    """Size and effort of the search for the cycle."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CycleSolution(Saved, Result):
     """The cycle of least energy.
 
     `lower_bound` [J] bounds the objective of every cycle over these stops, of any configurations
@@ -293,6 +248,68 @@ class CycleSolution:
             solved=sum(move.solved for move in self.moves),
             wall_time=self.wall_time,
         )
+
+    def legs(self) -> list[LegReport]:
+        """All moves, dwells and waits in order."""
+        return [leg for move in self.moves for leg in move.legs(self.objective)]
+
+    def solved_cycle(self) -> SolvedCycle:
+        """The fields of an answer of the service."""
+        return SolvedCycle(
+            objective=self.objective,
+            order=self.order,
+            duration=self.duration,
+            status=self.status,
+            price_of_time=self.price_of_time,
+            energy=CycleEnergy.bounded(self.energy, self.lower_bound, self.objective),
+            legs=self.legs(),
+            baselines=self.baselines,
+            certificate=self.certificate,
+            search=self.search,
+        )
+
+    def _headline(self) -> str:
+        gap = optimality_gap(self.lower_bound, self.energy.of(self.objective))
+        return (
+            f"{' → '.join(self.order)}, {energy_text(self.energy, self.objective)}, "
+            f"{self.duration:.4g} s, {self.status}, gap {gap:.1%}"
+        )
+
+    def _rows(self) -> Rows:
+        rows = (
+            (each.kind, each.start.stop, each.goal.stop, *_texts(each.duration, each.electrical))
+            for each in self.legs()
+        )
+        return [
+            ("leg", "start", "goal", "duration [s]", "electrical [J]"),
+            *rows,
+            ("cycle", "", "", *_texts(self.duration, self.energy.electrical.total)),
+        ]
+
+    def _shown(self) -> Any:
+        return self.solved_cycle()
+
+    def _columns(self) -> dict[str, Any]:
+        """One row per leg."""
+        legs = self.legs()
+        figures = ("t0", "duration", "electrical", "mechanical", "lower_bound", "payload_mass")
+        return {
+            "kind": [each.kind for each in legs],
+            "start": [each.start.stop for each in legs],
+            "goal": [each.goal.stop for each in legs],
+            **{name: [getattr(each, name) for each in legs] for name in figures},
+        }
+
+    def _charts(self) -> Sequence[Chart]:
+        """Joint positions over the cycle; they stay where the arm rests."""
+        motions = [(move.t0, move.solution.trajectory) for move in self.moves]
+        t = np.concatenate([t0 + each.t for t0, each in motions])
+        q = np.concatenate([each.q for _, each in motions])
+        return [Chart(t, "t [s]", "q [rad]", joint_curves(q))]
+
+
+def _texts(*figures: float) -> list[str]:
+    return [f"{figure:.4g}" for figure in figures]
 
 
 def energies_of(moves: Sequence[CycleMove]) -> CycleEnergies:

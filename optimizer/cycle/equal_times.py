@@ -8,20 +8,17 @@ from typing import Literal
 import numpy as np
 
 from joulepath.optimizer.cycle.cycle_baselines import cycle_baseline
-from joulepath.optimizer.cycle.cycle_solution import (
-    CycleBaseline,
-    CycleEnergies,
-    CycleMove,
-    CycleSolution,
-)
+from joulepath.optimizer.cycle.cycle_move import CycleMove
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleEnergies, CycleSolution
 from joulepath.optimizer.cycle.rest_energy import rest_energy, rest_sensitivity
 from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
-from joulepath.optimizer.result.solution import Baseline, Solution
+from joulepath.optimizer.result.solution import Solution
 
 OTHER_MOTIONS: tuple[Literal["ruckig_slowed", "straight"], ...] = ("ruckig_slowed", "straight")
 

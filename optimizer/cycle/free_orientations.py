@@ -21,7 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.optimizer.cycle.cycle_baselines import recompared
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleMove, CycleSolution
+from joulepath.optimizer.cycle.cycle_move import CycleMove
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
 from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.known_motions import knowing, known_motions
 from joulepath.optimizer.cycle.move_problem import MOVE

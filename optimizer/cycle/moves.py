@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleMove
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.passing_leg import passes_of
 from joulepath.optimizer.cycle.rest_energy import dwell_energies, rest_sensitivity

@@ -11,13 +11,9 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_baselines import cycle_baseline
+from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import (
-    CycleBaseline,
-    CycleEnergies,
-    CycleMove,
-    CycleSolution,
-)
+from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleEnergies, CycleSolution
 from joulepath.optimizer.cycle.layers import Layer
 from joulepath.optimizer.cycle.moves import Wait
 from joulepath.optimizer.cycle.passing_leg import PassingLeg

@@ -15,11 +15,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from joulepath.optimizer.cycle.cycle_baselines import cycle_baseline
+from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_solution import (
     CycleBaseline,
     CycleBaselineName,
     CycleEnergies,
-    CycleMove,
     CycleSolution,
     energies_of,
 )

@@ -22,9 +22,10 @@ from joulepath.optimizer.dynamics.interval import arm_spread, with_interval
 from joulepath.optimizer.dynamics.losses import breakdown, power_flow
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.dynamics.sensitivity import energy_sensitivity
+from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy, join_intervals
-from joulepath.optimizer.evaluate.limit_report import LimitMonitor, LimitReport
-from joulepath.optimizer.evaluate.nearest_contact import ClearanceMonitor, LeastClearance
+from joulepath.optimizer.evaluate.limit_report import LimitMonitor
+from joulepath.optimizer.evaluate.nearest_contact import ClearanceMonitor
 from joulepath.optimizer.evaluate.piecewise_motion import (
     Indices,
     Motion,
@@ -38,9 +39,11 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.quadrature import lobatto_panels
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.result.certificate import Clearance
-from joulepath.optimizer.result.energy import Energy, Sensitivity
-from joulepath.optimizer.result.solution import Samples, Solution
+from joulepath.optimizer.result.energy import (
+    Energy,
+    Sensitivity,
+)
+from joulepath.optimizer.result.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -56,29 +59,6 @@ class QuadratureSettings:
 
 
 QUADRATURE = QuadratureSettings()
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """Energy of a given motion, and its use of the limits.
-
-    Attributes:
-        segments: energy of each segment; empty if there are more than are listed.
-        speed_jumps: number of velocity steps inside the motion.
-        nearest: least clearance with margins subtracted; None if collisions are not checked.
-        close_pass: least distance without margins; None unless it is below 2 mm.
-        unmodelled: as of a `Solution`.
-    """
-
-    total: IntervalEnergy
-    segments: list[IntervalEnergy]
-    segment_count: int
-    speed_jumps: int
-    limits: list[LimitReport]
-    samples: Samples | None
-    nearest: LeastClearance | None
-    close_pass: LeastClearance | None
-    unmodelled: list[Clearance]
 
 
 @one_thread()

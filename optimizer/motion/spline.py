@@ -14,6 +14,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Axes, Count, Unit
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.quadrature import quadrature
+from joulepath.optimizer.presentation.equality import Comparable
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class SamplingSettings:
 SAMPLING = SamplingSettings()
 
 
-@dataclass(frozen=True)
-class Spline:
+@dataclass(frozen=True, eq=False)
+class Spline(Comparable):
     """Clamped B-spline of the joint positions over time."""
 
     degree: Count
@@ -45,6 +46,13 @@ class Spline:
     """Knots."""
     control_points: Annotated[Array, Axes(("point", "joint")), Unit("rad")]
     """Control points, [point][joint]."""
+
+    def __repr__(self) -> str:
+        points, joints = self.control_points.shape
+        return (
+            f"Spline({joints} joints, {self.duration:.4g} s, degree {self.degree}, "
+            f"{points} control points)"
+        )
 
     @property
     def duration(self) -> float:

@@ -25,7 +25,7 @@ from joulepath.optimizer.motion.time_scalings import (
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.planned import PlannedBaseline
 from joulepath.optimizer.replay.reference import Course, course_of, reference
-from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.result.baseline import BaselineName
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from joulepath.models.robot import Array
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.replay.reference import Course
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.result.energy import Objective
-from joulepath.optimizer.result.solution import BaselineName
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ from joulepath.optimizer.replay.planned import PlannedMotion
 from joulepath.optimizer.replay.play import Played, play
 from joulepath.optimizer.replay.reference import Reference, reference
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
-from joulepath.optimizer.result.solution import BaselineName, Solution
+from joulepath.optimizer.result.baseline import BaselineName
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import saving
 
 Quantity = Literal["payload", "friction"]

@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Literal, Self
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
+from joulepath.optimizer.presentation.equality import Comparable
 
 # minimised quantity: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
 
+ENERGY_PARTS = (
+    "idle",
+    "potential",
+    "kinetic",
+    "friction",
+    "copper",
+    "inverter",
+    "braking",
+    "recovered",
+    "storage_loss",
+    "dwell",
+)
+"""Names of the parts of an electrical energy, in the order of its sum."""
+
 JointJoules = Annotated[PerJoint, Unit("J")]
 
 
-@dataclass(frozen=True)
-class Sensitivity:
+@dataclass(frozen=True, eq=False)
+class Sensitivity(Comparable):
     """Dependence of an electrical energy on the figures of the arm.
 
     Attributes:
@@ -93,24 +108,18 @@ class ElectricalEnergy:
     version."""
 
     @property
+    def parts(self) -> dict[str, float]:
+        """The parts [J] by their names."""
+        return {name: getattr(self, name) for name in ENERGY_PARTS}
+
+    @property
     def parts_sum(self) -> float:
         """Sum of the parts [J]; equal to `total` up to quadrature."""
-        return (
-            self.idle
-            + self.potential
-            + self.kinetic
-            + self.friction
-            + self.copper
-            + self.inverter
-            + self.braking
-            + self.recovered
-            + self.storage_loss
-            + self.dwell
-        )
+        return sum(self.parts.values())
 
 
-@dataclass(frozen=True)
-class MechanicalEnergy:
+@dataclass(frozen=True, eq=False)
+class MechanicalEnergy(Comparable):
     """Mechanical work of the joints, in absolute value and without friction."""
 
     total: Joules
@@ -119,8 +128,8 @@ class MechanicalEnergy:
     """∫ |tau_j v_j| dt of each joint j."""
 
 
-@dataclass(frozen=True)
-class JointEnergy:
+@dataclass(frozen=True, eq=False)
+class JointEnergy(Comparable):
     """Energies per joint, in the order from base to flange."""
 
     friction: JointJoules
@@ -175,3 +184,48 @@ class Energy:
         return replace(
             self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell)
         )
+
+
+def optimality_gap(bound: float, energy: float) -> float:
+    """1 - bound / energy; 0 if the energy is not positive."""
+    return 1 - bound / energy if energy > 0 else 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyAndBound(Energy):
+    """Energy and power of the motion, and the possible saving of other motions."""
+
+    lower_bound: Joules
+    """Lower bound of the objective: no motion of any shape and any allowed duration between these
+    targets needs less."""
+    optimality_gap: Ratio
+    """1 - lower_bound / energy of the objective; 0 if this energy is not positive."""
+
+    @classmethod
+    def bounded(cls, energy: Energy, lower_bound: float, objective: Objective) -> Self:
+        """An energy, and the lower bound of its minimised part [J]."""
+        parts = {part.name: getattr(energy, part.name) for part in fields(Energy)}
+        gap = optimality_gap(lower_bound, energy.of(objective))
+        return cls(**parts, lower_bound=lower_bound, optimality_gap=gap)
+
+
+def energy_text(energy: Energy, objective: Objective) -> str:
+    """An energy with its objective: `74.4 J electrical`."""
+    return f"{energy.of(objective):.4g} J {objective}"
+
+
+def energy_rows(energy: Energy) -> list[tuple[str, str, str]]:
+    """The parts of an electrical energy that are not zero, with their shares, and the mechanical
+    work."""
+    total = energy.electrical.total
+    parts = {name: part for name, part in energy.electrical.parts.items() if part}
+    return [
+        ("part", "energy [J]", "share"),
+        *((name, f"{part:.4g}", _share(part, total)) for name, part in parts.items()),
+        ("electrical", f"{total:.4g}", _share(total, total)),
+        ("mechanical work", f"{energy.mechanical.total:.4g}", ""),
+    ]
+
+
+def _share(part: float, total: float) -> str:
+    return f"{part / total:.1%}" if total > 0 else ""

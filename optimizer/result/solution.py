@@ -2,33 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from joulepath.models.robot import Limits
 from joulepath.optimizer.declared import (
     Count,
-    Internal,
-    Joules,
     MetresPerSecond,
+    NotEmpty,
     NullIfInfinite,
     PerJoint,
     PerSample,
     PerSampleAndJoint,
-    Ratio,
     Seconds,
     Unit,
 )
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.result.candidates import CandidateReport, UnreachableTarget
+from joulepath.optimizer.presentation.chart import Chart, joint_curves
+from joulepath.optimizer.presentation.equality import Comparable
+from joulepath.optimizer.presentation.files import Saved
+from joulepath.optimizer.presentation.result import Result, Rows, per_joint
+from joulepath.optimizer.result.baseline import Baseline
+from joulepath.optimizer.result.candidates import (
+    CandidateCounts,
+    CandidateReport,
+    UnreachableTarget,
+    count_by_status,
+)
 from joulepath.optimizer.result.certificate import Certificate, Clearance
-from joulepath.optimizer.result.energy import Energy, SavingInterval, Sensitivity
+from joulepath.optimizer.result.energy import (
+    Energy,
+    EnergyAndBound,
+    Objective,
+    Sensitivity,
+    energy_rows,
+    energy_text,
+    optimality_gap,
+)
 
 JointTorques = Annotated[PerSampleAndJoint, Unit("N·m")]
 
 
-@dataclass(frozen=True)
-class Samples:
+@dataclass(frozen=True, eq=False)
+class Samples(Comparable):
     """Samples of a motion; arrays are [sample][joint]."""
 
     t: Annotated[PerSample, Unit("s")]
@@ -49,7 +66,7 @@ class Samples:
     """Charge of the energy storage on the bus; null without one."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory(Samples):
     """The motion: its spline, and samples of it; arrays are [sample][joint]."""
 
@@ -57,8 +74,8 @@ class Trajectory(Samples):
     """The motion itself; all samples follow from it."""
 
 
-@dataclass(frozen=True)
-class Configuration:
+@dataclass(frozen=True, eq=False)
+class Configuration(Comparable):
     """One arm configuration."""
 
     label: str
@@ -69,66 +86,8 @@ class Configuration:
     """Index in `any_of` of the reached target, from 0; 0 for a single target."""
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Arm at rest at q (nq,) [rad] with motor torques tau (nq,) [N·m] and a total power of `power`
-    [W].
-    """
-
-    q: Annotated[PerJoint, Unit("rad")]
-    tau: Annotated[PerJoint, Unit("N·m")]
-    power: float
-
-
-BaselineName = Literal[
-    "trapezoid", "quintic", "ruckig", "ruckig_slowed", "straight", "controller_default"
-]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Baseline:
-    """The energy of another planner's motion from the same start to the nearest goal
-    configuration."""
-
-    name: BaselineName
-    """`trapezoid`: trapezoidal velocity, in the duration of the answer. `quintic`: polynomial of
-    degree 5, in the duration of the answer. `ruckig`: time-optimal within the velocity,
-    acceleration and jerk limits. `ruckig_slowed`: the same motion, uniformly slowed down to the
-    duration of the answer. `straight`: the fastest motion within the same limits along the straight
-    line in joints, all joints in step, slowed down to the duration of the answer.
-    `controller_default`: the robot's own controller with its default speed
-    and acceleration."""
-    duration: Seconds
-    """Duration of this motion."""
-    electrical: Joules
-    """Electrical energy of this motion, drawn from the supply; with a `dwell`, also of the wait
-    after it."""
-    mechanical: Joules
-    """Mechanical work of this motion."""
-    within_limits: bool = field(init=False)
-    """Whether this motion is within every limit; collisions are checked at sample points."""
-    reason: str | None
-    """Limits that this motion breaks, and the two bodies closer than allowed, with the amount. Null
-    if it is within every limit.
-    """
-    saving: Ratio | None
-    """1 - energy of the answer / energy of this motion, of the objective, in the same cycle time:
-    the shorter motion also waits at its goal, held by the motors, until the longer one ends. Null
-    if this motion is not within every limit, since it is then no valid comparison.
-    """
-    sensitivity: Annotated[Sensitivity, Internal] = field(repr=False)
-    """Sensitivity of the electrical energy."""
-    at_goal: Annotated[Standing, Internal] = field(repr=False)
-    """Arm at rest at the goal of this motion."""
-    saving_interval: SavingInterval | None = None
-    """Uncertainty of the saving. Null without a saving, and for the objective `mechanical`."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "within_limits", self.reason is None)
-
-
-@dataclass(frozen=True)
-class LimitsInForce:
+@dataclass(frozen=True, eq=False)
+class LimitsInForce(Comparable):
     """Limits of the motion: the robot's, or the tighter limits of the request. Lists are per joint,
     from base to flange; null: no limit.
     """
@@ -176,7 +135,54 @@ class SolverReport:
 
 
 @dataclass(frozen=True)
-class Solution:
+class Branches:
+    """The chosen pair of arm configurations."""
+
+    start: Configuration
+    """At the start."""
+    goal: Configuration
+    """At the goal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolvedMotion:
+    """The motion of least energy, its energy with all parts, and a certificate."""
+
+    objective: Objective
+    """Energy that was minimised: electrical energy drawn from the supply, or mechanical work."""
+    duration: Seconds
+    """Duration of the motion."""
+    status: Literal["optimal", "feasible"]
+    """`optimal`: the method converged, and every other candidate was solved, is infeasible, or was
+    ruled out by its lower bound or its energy; for mechanical work, `optimality_gap` is at most
+    0.01, too. It does not say that no better motion exists: see `optimality_gap`. `feasible`: the
+    motion is certified, but the search was not complete, or arm configurations may have been
+    missed."""
+    branch: Branches
+    """Arm configurations of the chosen candidate."""
+    trajectory: Trajectory
+    """The motion."""
+    energy: EnergyAndBound
+    """Energy and power of the motion."""
+    limits: LimitsInForce
+    """The limits that the motion was held to."""
+    baselines: Annotated[list[Baseline], NotEmpty]
+    """The same task by other planners."""
+    candidates: list[CandidateReport]
+    """Pairs of a start and a goal configuration, with their results, as `candidates` of the request
+    asks."""
+    candidate_counts: CandidateCounts
+    """Number of all candidates by status."""
+    unreachable: list[UnreachableTarget]
+    """Targets of an `any_of` without candidates, each with the cause."""
+    certificate: Certificate
+    """Independent check of the motion."""
+    solver: SolverReport
+    """Effort of the computation."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Saved, Result):
     """The motion of least energy, with its lower bound and certificate.
 
     Attributes:
@@ -198,6 +204,7 @@ class Solution:
         solver: effort.
         complete: whether all configurations at start and goal were found. If not, `status` is
             `feasible`.
+        objective: the energy that was minimised.
     """
 
     status: Literal["optimal", "feasible"]
@@ -215,8 +222,64 @@ class Solution:
     unmodelled: list[Clearance]
     solver: SolverReport
     complete: bool
+    objective: Objective = "electrical"
 
     @property
     def duration(self) -> float:
         """Duration of the motion [s]."""
         return self.trajectory.spline.duration
+
+    def solved_motion(self) -> SolvedMotion:
+        """The fields of an answer of the service, with all candidates."""
+        return SolvedMotion(
+            objective=self.objective,
+            duration=self.duration,
+            status=self.status,
+            branch=Branches(self.start, self.goal),
+            trajectory=self.trajectory,
+            energy=EnergyAndBound.bounded(self.energy, self.lower_bound, self.objective),
+            limits=self.limits,
+            baselines=self.baselines,
+            candidates=self.candidates,
+            candidate_counts=count_by_status(self.candidates),
+            unreachable=self.unreachable,
+            certificate=self.certificate,
+            solver=self.solver,
+        )
+
+    def _headline(self) -> str:
+        gap = optimality_gap(self.lower_bound, self.energy.of(self.objective))
+        return (
+            f"{energy_text(self.energy, self.objective)}, {self.duration:.4g} s, {self.status}, "
+            f"gap {gap:.1%}"
+        )
+
+    def _rows(self) -> Rows:
+        return energy_rows(self.energy)
+
+    def _shown(self) -> Any:
+        return self.solved_motion()
+
+    def _columns(self) -> dict[str, Any]:
+        return sample_columns(self.trajectory)
+
+    def _charts(self) -> Sequence[Chart]:
+        return sample_charts(self.trajectory)
+
+
+def sample_columns(samples: Samples) -> dict[str, Any]:
+    """The samples as columns of a table, one row per sample."""
+    arrays = {name: getattr(samples, name) for name in ("q", "v", "a", "tau", "tau_motor")}
+    columns: dict[str, Any] = {"t": samples.t}
+    for name, values in arrays.items():
+        columns |= per_joint(name, values)
+    charge = {} if samples.charge is None else {"charge": samples.charge}
+    return columns | {"power": samples.power} | charge
+
+
+def sample_charts(samples: Samples) -> list[Chart]:
+    """Joint positions and power over time."""
+    return [
+        Chart(samples.t, "t [s]", "q [rad]", joint_curves(samples.q)),
+        Chart(samples.t, "t [s]", "power [W]", {"supply": samples.power}),
+    ]

@@ -6,13 +6,8 @@ from joulepath.optimizer.bounds.missed_branches import all_branches_known
 from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.progress import Improved
-from joulepath.optimizer.result.solution import (
-    Baseline,
-    Configuration,
-    LimitsInForce,
-    Solution,
-    SolverReport,
-)
+from joulepath.optimizer.result.baseline import Baseline
+from joulepath.optimizer.result.solution import Configuration, LimitsInForce, Solution, SolverReport
 from joulepath.optimizer.search.baselines import standing, with_savings
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.final_bound import final_bound
@@ -64,6 +59,7 @@ def answer(state: SearchState, best: Candidate, baselines: list[Baseline]) -> So
         trajectory=trajectory,
         energy=with_interval(energy, sensitivity, spline.duration, arm),
         sensitivity=sensitivity,
+        objective=problem.objective,
         lower_bound=bound,
         limits=LimitsInForce.of(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
         complete=all_branches_known(problem),

@@ -11,7 +11,7 @@ from joulepath.optimizer.deadline import DeadlinePassed, watch
 from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.motion.spline import Spline, least_time_scale, retimed
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.result.solution import Baseline, BaselineName
+from joulepath.optimizer.result.baseline import Baseline, BaselineName
 from joulepath.optimizer.search.attempts import solve_from
 from joulepath.optimizer.search.baselines import baselines, guesses, nearest
 from joulepath.optimizer.search.candidates import Candidate

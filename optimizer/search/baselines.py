@@ -46,8 +46,8 @@ from joulepath.optimizer.motion.time_scalings import (
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.baseline import Baseline, BaselineName, Standing
 from joulepath.optimizer.result.energy import Energy, SavingInterval
-from joulepath.optimizer.result.solution import Baseline, BaselineName, Standing
 
 Torques = Callable[[Array, Array, Array], Array]
 Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]

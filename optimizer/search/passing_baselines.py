@@ -13,7 +13,7 @@ from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
-from joulepath.optimizer.result.solution import Baseline
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.search.baselines import baselines, saving
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import SampledMotion, even_speed
-from joulepath.optimizer.result.solution import Baseline
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.search.baselines import compared, standing
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.state import SearchState

@@ -22,10 +22,11 @@ from joulepath.optimizer.progress import (
     Tell,
     no_listener,
 )
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.candidates import CandidateStatus, UnreachableTarget
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
-from joulepath.optimizer.result.solution import Baseline, Solution
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import Candidate, Reason
 from joulepath.optimizer.search.finishing_time import finishing_time
 from joulepath.optimizer.solve.methods import method_of

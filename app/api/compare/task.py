@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from joulepath.app.answers.bounded_energy import optimality_gap
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm_fields import arm_fields
@@ -23,8 +22,9 @@ from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.compare import Compared, Comparison, compare
 from joulepath.optimizer.declared import Count, Joules, NotEmpty, Ratio, Seconds
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.result.energy import Objective
-from joulepath.optimizer.result.solution import Baseline, Solution
+from joulepath.optimizer.result.baseline import Baseline
+from joulepath.optimizer.result.energy import Objective, optimality_gap
+from joulepath.optimizer.result.solution import Solution
 
 ALL: list[MethodName] = list(get_args(MethodName))
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 from io import StringIO
 
-from joulepath.optimizer.cycle.cycle_solution import CycleMove, CycleSolution
+from joulepath.optimizer.cycle.cycle_move import CycleMove
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.result.cycle import LegReport
 
 Row = list[float | str]

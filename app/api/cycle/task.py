@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal, Self
 
-from joulepath.app.answers.bounded_energy import EnergyAndBound
 from joulepath.app.answers.envelope import Answer, AnswerFigures
 from joulepath.app.api.cycle.arms import arms_of_moves
 from joulepath.app.api.cycle.problem import to_cycle
@@ -19,22 +18,12 @@ from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.app.tasks.certified import certified
-from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution, SolvedCycle
 from joulepath.optimizer.cycle.known_motions import knowing
-from joulepath.optimizer.declared import Joules, NotEmpty, Seconds, Watts
+from joulepath.optimizer.declared import NotEmpty
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.result.cycle import CycleCertificate, CycleSearchReport, LegReport
-from joulepath.optimizer.result.energy import Objective
-
-
-@dataclass(frozen=True, kw_only=True)
-class CycleEnergy(EnergyAndBound):
-    """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
-
-    lower_bound: Joules
-    """Lower bound of the objective: no cycle with these stops and passes, of any configurations,
-    shapes and durations, needs less."""
+from joulepath.optimizer.result.cycle import LegReport
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,38 +35,16 @@ class CycleLeg(LegReport):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CycleAnswer(Answer):
+class CycleAnswer(SolvedCycle, Answer):
     """The cycle of least energy, its moves, and its certificate."""
 
     method: MethodName
     """How the moves are parametrised."""
-    objective: Objective
-    """The minimised energy."""
-    order: list[str]
-    """Names of the stops, as they are visited."""
-    duration: Seconds
-    """Duration of the cycle, dwells and waiting included."""
-    status: Literal["optimal", "feasible"]
-    """`optimal`: every move converged, and no other chain of arm configurations has a lower bound
-    below the energy of this cycle. A better cycle may still exist: see `optimality_gap`.
-    `feasible`: the cycle is certified, but the search was incomplete, or arm configurations may
-    have been missed."""
-    price_of_time: Watts
-    """Saving of one more second; negative if it would cost energy. 0 if the cycle takes its own
-    time."""
-    energy: CycleEnergy
-    """Energy and power of the cycle."""
     legs: Annotated[list[CycleLeg], NotEmpty]
     """Moves and dwells in their order."""
-    baselines: list[CycleBaseline]
-    """The same cycle in other ways, as far as they were found in time."""
-    certificate: CycleCertificate
-    """Independent check of all moves."""
     warnings: list[str]
     """Remarks on the cycle and on its moves, as in `POST /optimize`, with the ends of the move.
     Empty if there are none."""
-    search: CycleSearchReport
-    """Size and effort of the search for the cycle."""
     answer: str | None = None
     """Path of this answer: `GET` returns it again. Null if it could not be kept."""
 
@@ -86,21 +53,13 @@ class CycleAnswer(Answer):
         cls, request: CycleRequest, request_id: str, found: CycleSolution, legs: list[CycleLeg]
     ) -> Self:
         """The answer to a request, not kept yet; `legs` name the answers of their moves."""
+        cycle = vars(found.solved_cycle()) | {"legs": legs}
         return cls(
             request=request_id,
             robot=request.robot,
             method=request.method,
-            objective=request.objective,
-            order=found.order,
-            duration=found.duration,
-            status=found.status,
-            price_of_time=found.price_of_time,
-            energy=CycleEnergy.bounded(found.energy, found.lower_bound, found.objective),
-            legs=legs,
-            baselines=found.baselines,
-            certificate=found.certificate,
             warnings=_warnings(found),
-            search=found.search,
+            **cycle,
         )
 
     @property

@@ -31,16 +31,14 @@ from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.csv_table import FIRST_ROW
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.declared import Count, Ratio, Seconds
-from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
+from joulepath.optimizer.declared import Ratio
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.evaluation import EvaluatedMotion, Evaluation
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
-from joulepath.optimizer.evaluate.limit_report import LimitReport
-from joulepath.optimizer.evaluate.nearest_contact import LeastClearance
 from joulepath.optimizer.evaluate.recording import Recording, Waypoints
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.reading import LogReading
 from joulepath.optimizer.identify.logs.recorded import MeasuredEnergy, measured
-from joulepath.optimizer.result.solution import Samples
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 
@@ -97,57 +95,35 @@ class Evaluated:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluateAnswer(MotionAnswer):
+class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
     """The energy of a given motion, and its violated limits."""
 
-    duration: Seconds
-    """Duration of the motion."""
     total: EvaluatedInterval
     """The whole motion."""
     segments: list[EvaluatedInterval]
     """Segments between configurations. A trajectory is one segment, and a log has one per move and
     rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
     electrical energies."""
-    segment_count: Count
-    """Number of segments."""
-    speed_jumps: Count
-    """Number of velocity steps inside the motion. A step contributes no energy, because its power
-    is not defined."""
-    within_limits: bool
-    """Whether the motion is within every limit; collisions are in `collides`."""
-    limits: list[LimitReport]
-    """One entry per limit."""
-    collides: bool | None
-    """Whether a clearance is negative at a sample; null if `collisions` is false."""
-    nearest: LeastClearance | None
-    """Smallest clearance at sample points; null if `collisions` is false."""
     warnings: list[str]
     """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
     mm, one names them, their distance without margins, and the time. Others report possibly missed
     arm configurations, omitted baselines, or contacts of a tool or payload without a shape. A log
     also has the remarks of `POST /logs`."""
-    samples: Samples | None
-    """Samples of the motion; null without `sample_period`."""
 
     @classmethod
     def of(cls, request_id: str, found: Evaluated) -> Self:
         """The answer for the motion of the arm asked about."""
         asked, result = found.asked, found.result
+        motion = vars(result.evaluated_motion()) | {
+            "total": found.total,
+            "segments": found.segments,
+        }
         return cls(
             request=request_id,
             robot=asked.robot,
             arm=arm_fields(asked),
-            duration=result.total.duration,
-            total=found.total,
-            segments=found.segments,
-            segment_count=result.segment_count,
-            speed_jumps=result.speed_jumps,
-            within_limits=all(report.held for report in result.limits),
-            limits=result.limits,
-            collides=None if result.nearest is None else result.nearest.distance < 0,
-            nearest=result.nearest,
             warnings=[*found.remarks, *sampled_warnings(result)],
-            samples=result.samples,
+            **motion,
         )
 
     @property

@@ -8,7 +8,7 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.ik.task import IKAnswer, IKRequest, IKTask
 from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import deadline_of
+from joulepath.app.api.shared.parameters import WantedFormat, deadline_of
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
@@ -16,22 +16,30 @@ from joulepath.app.http.openapi import problem_responses
 from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
+_CSV = "q1,q2,q3,q4,q5,q6\n0.0,-1.57,1.57,-1.57,-1.57,0.0\n"
 
 
 @router.post(
     "/ik",
     summary="Every arm configuration that reaches a pose",
     response_model=model_of(IKAnswer),
-    responses=problem_responses(
-        *WORKER_PROBLEMS, UnreachablePose, NoConfigurationFound, SingularPose
-    ),
+    responses={
+        200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _CSV}}},
+        **problem_responses(*WORKER_PROBLEMS, UnreachablePose, NoConfigurationFound, SingularPose),
+    },
 )
 async def solve(
-    request: Request, body: IKRequest, settings: ServiceSettings, engine: ServiceArmEngine
+    request: Request,
+    body: IKRequest,
+    wanted: WantedFormat,
+    settings: ServiceSettings,
+    engine: ServiceArmEngine,
 ) -> Response:
     """All solutions within the joint ranges, with branch, distance to the limits and smallest
     singular value. A pose with infinitely many configurations (stretched wrist) has some of them,
     with the `free` joints. Every solution has its nearest or colliding pair of bodies: links, tool,
-    payload and obstacles."""
-    work = engine.run(IKTask(body, request.state.id), deadline_of(body, settings.max_deadline))
+    payload and obstacles. `Accept: text/csv` returns the joint positions as a table for
+    `/evaluate`."""
+    task = IKTask(body, request.state.id, wanted)
+    work = engine.run(task, deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))

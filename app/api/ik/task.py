@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
+from io import StringIO
+from typing import Literal
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.convert.arm import robot_named
@@ -16,7 +19,7 @@ from joulepath.app.schemas.examples.values import BOX
 from joulepath.app.schemas.scene import CarriedBody, CellRequest
 from joulepath.models.robot import Robot
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.inverse_kinematics import IKSolution, inverse_kinematics
+from joulepath.optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.problem import DURATIONS
 
@@ -65,10 +68,11 @@ class IKAnswer(Answer):
 
 @dataclass(frozen=True)
 class IKTask:
-    """A validated request and its id."""
+    """A validated request and its id; the media type of the answer is `wanted`."""
 
     request: IKRequest
     request_id: str
+    wanted: Literal["json", "csv"] = "json"
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /ik`, within about `deadline` seconds. Raises DeadlineExceeded."""
@@ -77,6 +81,8 @@ class IKTask:
             robot = robot_named(request.robot)
             arm, pose = to_ik_arm(request, robot), to_base_pose(request.pose, robot)
         found = inverse_kinematics(arm, pose, request.windings, end.left)
+        if self.wanted == "csv":
+            return TaskResult.of_csv(_table(found, robot.nq))
         answer = IKAnswer(
             request=self.request_id,
             robot=request.robot,
@@ -84,6 +90,15 @@ class IKTask:
             complete=found.complete,
         )
         return TaskResult.of_json(answer)
+
+
+def _table(found: IKSolutions, nq: int) -> str:
+    """CSV with the columns q1 … qn [rad] and one line per configuration, for `POST /evaluate`."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([f"q{joint}" for joint in range(1, nq + 1)])
+    writer.writerows(each.q.tolist() for each in found)
+    return text.getvalue()
 
 
 def to_ik_arm(request: IKRequest, robot: Robot) -> Arm:

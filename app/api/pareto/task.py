@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import Annotated, Literal, Self
 
-from joulepath.app.answers.declared import as_json, shown_fields
+from joulepath.app.answers.declared import as_json
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm_fields import arm_fields
@@ -20,6 +20,7 @@ from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.optimizer.declared import Joules, NotEmpty, Ratio, Seconds, Watts
 from joulepath.optimizer.pareto import PARETO, pareto
+from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.front import Dropped, FrontSolver

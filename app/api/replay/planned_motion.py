@@ -13,8 +13,8 @@ from joulepath.optimizer.export.program import Move
 from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import course_of
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.result.energy import Objective
-from joulepath.optimizer.result.solution import BaselineName
 
 
 class _Electrical(Part):

@@ -37,7 +37,8 @@ from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.deadline import Deadline, DeadlineShares
-from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
     InvalidProblem,

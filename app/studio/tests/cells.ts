@@ -6,5 +6,9 @@ export const MOVE: ApiRequest = {
   start: { q: [0, -1.5, 1.5, -1.5, -1.5, 0] },
   goal: { pose: { position: [-0.35, -0.52, 0.45], rpy: [Math.PI / 2, 0, 0] } },
   payload: { mass: 0.8, com: [0, 0, 0.05] },
-  scene: { obstacles: [{ name: "table", shape: "half_space", pose: { position: [0, 0, -0.02], rotvec: [0, 0, 0] } }] },
+  scene: {
+    obstacles: [
+      { name: "table", shape: "half_space", pose: { position: [0, 0, -0.02], rotvec: [0, 0, 0] } },
+    ],
+  },
 };

@@ -5,21 +5,47 @@ import { atMost, figure, parseNumber, shown, typedValue } from "../src/store/uni
 import { MOVE } from "./cells";
 
 it("numbers are read as people type them", () => {
-  expect([parseNumber("−4,5"), parseNumber(" 1e-3 "), parseNumber("4 kg"), parseNumber("")]).toEqual([-4.5, 0.001, null, null]);
-  expect([typedValue("450", "mm"), typedValue("90", "deg")]).toEqual([0.45, expect.closeTo(Math.PI / 2)]);
-  expect([shown(-0.00001, "mm"), shown(0.4567, "mm"), shown("x", "mm")]).toEqual(["0.0", "456.7", ""]);
+  expect([
+    parseNumber("−4,5"),
+    parseNumber(" 1e-3 "),
+    parseNumber("4 kg"),
+    parseNumber(""),
+  ]).toEqual([-4.5, 0.001, null, null]);
+  expect([typedValue("450", "mm"), typedValue("90", "deg")]).toEqual([
+    0.45,
+    expect.closeTo(Math.PI / 2),
+  ]);
+  expect([shown(-0.00001, "mm"), shown(0.4567, "mm"), shown("x", "mm")]).toEqual([
+    "0.0",
+    "456.7",
+    "",
+  ]);
 });
 
 it("bounds from above are never below", () => {
-  expect([atMost(0.0851), atMost(0.085), atMost(0.104), atMost(0)]).toEqual(["8.6 %", "8.5 %", "11 %", "0.0 %"]);
+  expect([atMost(0.0851), atMost(0.085), atMost(0.104), atMost(0)]).toEqual([
+    "8.6 %",
+    "8.5 %",
+    "11 %",
+    "0.0 %",
+  ]);
 });
 
 it("figures have three digits and no exponents", () => {
-  expect([figure(74.3189), figure(1239.3), figure(0.0608), figure(null), figure(-2)]).toEqual(["74.3", "1,239", "0.0608", "–", "−2.00"]);
+  expect([figure(74.3189), figure(1239.3), figure(0.0608), figure(null), figure(-2)]).toEqual([
+    "74.3",
+    "1,239",
+    "0.0608",
+    "–",
+    "−2.00",
+  ]);
 });
 
 it("costs are those of whole cycles in a shift", () => {
-  const parts = [{ name: "The move", joules: 74.4 }, { name: "Waiting", joules: 208.9 }];
+  const parts = [
+    { name: "The move", joules: 74.4 },
+    { name: "Waiting", joules: 208.9 },
+  ];
   const costs = costsOf(parts, 0.871, { ...DEFAULT_ECONOMICS, cycle: 6 });
   expect(costs.cyclesPerShift).toBe(4800);
   expect(costs.total.shift).toBeCloseTo((283.3 * 4800) / 3.6e6);
@@ -28,14 +54,20 @@ it("costs are those of whole cycles in a shift", () => {
 });
 
 it("the control box counts once a reading is given", () => {
-  const costs = costsOf([{ name: "The move", joules: 10 }], 2, { ...DEFAULT_ECONOMICS, box: { value: 50, source: "yours" } });
+  const costs = costsOf([{ name: "The move", joules: 10 }], 2, {
+    ...DEFAULT_ECONOMICS,
+    box: { value: 50, source: "yours" },
+  });
   expect(costs.rows.map(({ joules }) => joules)).toEqual([10, 100]);
 });
 
 const HEAD = "from;to;kg;x mm;y;z;rx rad;ry;rz;x;y;z;rx;ry;rz";
 
 it("a table of moves becomes requests of the cell", () => {
-  const read = parseMoves(`${HEAD}\nbin;shelf;1,5;-420;280;100;0;3.142;0;-350;-520;450;1.571;0;0`.replace("1,5", "1.5"), 6);
+  const read = parseMoves(
+    `${HEAD}\nbin;shelf;1,5;-420;280;100;0;3.142;0;-350;-520;450;1.571;0;0`.replace("1,5", "1.5"),
+    6,
+  );
   if ("why" in read) throw new Error(read.why);
   expect(read.readings).toHaveLength(1);
   const [request] = requestsOf(read.moves, read.readings[0]!, { ...MOVE, duration: 3 }, 6);
@@ -54,10 +86,14 @@ it("targets in rows are moves from each to the next", () => {
   if ("why" in read) throw new Error(read.why);
   expect(read.moves.map(({ from, to }) => `${from}-${to}`)).toEqual(["a-b", "b-c"]);
   const joints = read.readings.find(({ kind }) => kind === "joints")!;
-  expect(requestsOf(read.moves, joints, {}, 6)[1]!.goal).toEqual({ q: [60, -90, 90, -90, -90, 0].map((x) => (x * Math.PI) / 180) });
+  expect(requestsOf(read.moves, joints, {}, 6)[1]!.goal).toEqual({
+    q: [60, -90, 90, -90, -90, 0].map((x) => (x * Math.PI) / 180),
+  });
 });
 
 it("rows that do not fit are named", () => {
   expect(parseMoves("1;2;3", 6)).toHaveProperty("why");
-  expect(parseMoves(`${HEAD}\n${Array(12).fill(1).join(";")}\n1;2`, 6)).toEqual({ why: "Row 2 has 2 numbers, the first one 11." });
+  expect(parseMoves(`${HEAD}\n${Array(12).fill(1).join(";")}\n1;2`, 6)).toEqual({
+    why: "Row 2 has 2 numbers, the first one 11.",
+  });
 });

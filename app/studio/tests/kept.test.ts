@@ -1,6 +1,14 @@
 import "fake-indexeddb/auto";
 import { beforeAll, expect, it, vi } from "vitest";
-import { askedFor, deleteProject, followChanges, jobNotes, keepJob, projects, saveNow } from "../src/store/persist";
+import {
+  askedFor,
+  deleteProject,
+  followChanges,
+  jobNotes,
+  keepJob,
+  projects,
+  saveNow,
+} from "../src/store/persist";
 import { cellOf, link, presentCell, shared } from "../src/store/share";
 import { answered, replaceCell, saved, write, type Answered } from "../src/store/state";
 import { MOVE } from "./cells";
@@ -15,7 +23,12 @@ it("a project is saved by itself, as it was typed", async () => {
   write("/payload/mass", 1.6, "1,60");
   await vi.waitFor(() => expect(saved.value).toBe("saved"), 3000);
   const [project] = await projects();
-  expect(project).toMatchObject({ id: "a", name: "bin", typed: { "/payload/mass": "1,60" }, request: { payload: { mass: 1.6 } } });
+  expect(project).toMatchObject({
+    id: "a",
+    name: "bin",
+    typed: { "/payload/mass": "1,60" },
+    request: { payload: { mass: 1.6 } },
+  });
   await deleteProject("a");
   expect(await projects()).toEqual([]);
 });
@@ -23,8 +36,16 @@ it("a project is saved by itself, as it was typed", async () => {
 it("the request of an answer is known again by its id", async () => {
   replaceCell({ project: { id: "b", name: "b" }, request: MOVE });
   write("/payload/mass", 2, "2,0");
-  answered.value = { asked: { ...MOVE, payload: { mass: 2 } }, solution: { id: "answer-1" } } as Answered;
-  await vi.waitFor(async () => expect(await askedFor("answer-1")).toMatchObject({ request: { payload: { mass: 2 } }, typed: { "/payload/mass": "2,0" } }));
+  answered.value = {
+    asked: { ...MOVE, payload: { mass: 2 } },
+    solution: { id: "answer-1" },
+  } as Answered;
+  await vi.waitFor(async () =>
+    expect(await askedFor("answer-1")).toMatchObject({
+      request: { payload: { mass: 2 } },
+      typed: { "/payload/mass": "2,0" },
+    }),
+  );
   expect(await askedFor("answer-2")).toBeNull();
   await saveNow();
   expect((await projects())[0]).toMatchObject({ answer: "answer-1" });
@@ -32,7 +53,12 @@ it("the request of an answer is known again by its id", async () => {
 });
 
 it("names of the moves of a job are kept", async () => {
-  await keepJob({ id: "j", source: "moves.csv", moves: [{ from: "a", to: "b", mass: null }], requests: [MOVE] });
+  await keepJob({
+    id: "j",
+    source: "moves.csv",
+    moves: [{ from: "a", to: "b", mass: null }],
+    requests: [MOVE],
+  });
   expect((await jobNotes("j"))?.moves[0]?.from).toBe("a");
 });
 
@@ -41,7 +67,9 @@ it("a link brings the whole cell back", async () => {
   write("/goal/pose/position/2", 0.5, "500,0");
   const address = await link(presentCell(), "http://cell/studio");
   expect((await shared(new URL(address).hash)).cell).toEqual(presentCell());
-  await expect(shared(new URL(address.slice(0, -20)).hash)).rejects.toThrow("A part of it is missing");
+  await expect(shared(new URL(address.slice(0, -20)).hash)).rejects.toThrow(
+    "A part of it is missing",
+  );
   expect(await shared("#answer=x")).toEqual({ answer: "x" });
   expect(await shared("")).toEqual({});
 });

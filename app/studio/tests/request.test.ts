@@ -5,9 +5,14 @@ import { kindOf, lackOf, rowsOf, sixOf, targetAt, withNumber } from "../src/stor
 import type { ApiRequest, Pose } from "../src/store/types";
 import { MOVE } from "./cells";
 
-const round = withStop(withStop(asKind(MOVE, "round"), { q: [1, 2, 3, 4, 5, 6] }, "pick"), null, "pick");
+const round = withStop(
+  withStop(asKind(MOVE, "round"), { q: [1, 2, 3, 4, 5, 6] }, "pick"),
+  null,
+  "pick",
+);
 const names = (request: ApiRequest) => rowsOf(request).map(({ name }) => name);
-const row = (request: ApiRequest, name: string) => rowsOf(request).find((each) => each.name === name)!;
+const row = (request: ApiRequest, name: string) =>
+  rowsOf(request).find((each) => each.name === name)!;
 
 describe("kinds", () => {
   it("a move with a stop becomes a round that ends in it", () => {
@@ -28,10 +33,21 @@ describe("kinds", () => {
 
 describe("stops", () => {
   it("are duplicated under names of their own", () => {
-    expect(names(duplicated(round, row(round, "pick 1")))).toEqual(["Start", "goal", "pick 1", "pick 3", "pick 2"]);
+    expect(names(duplicated(round, row(round, "pick 1")))).toEqual([
+      "Start",
+      "goal",
+      "pick 1",
+      "pick 3",
+      "pick 2",
+    ]);
   });
   it("are moved and deleted", () => {
-    expect(names(moved(round, row(round, "pick 2"), -1))).toEqual(["Start", "goal", "pick 2", "pick 1"]);
+    expect(names(moved(round, row(round, "pick 2"), -1))).toEqual([
+      "Start",
+      "goal",
+      "pick 2",
+      "pick 1",
+    ]);
     expect(moved(round, row(round, "goal"), -1).stops).toEqual(round.stops);
     expect(names(withoutRow(round, row(round, "goal")))).toEqual(["Start", "pick 1", "pick 2"]);
   });
@@ -49,7 +65,10 @@ describe("poses", () => {
   });
   it("keep the form of their orientation until it is edited", () => {
     expect(withNumber(pose, 2, 0.5)).toEqual({ ...pose, position: [-0.35, -0.52, 0.5] });
-    expect(withNumber(pose, 4, 0.1)).toEqual({ position: pose.position, rotvec: [expect.closeTo(Math.PI / 2), 0.1, 0] });
+    expect(withNumber(pose, 4, 0.1)).toEqual({
+      position: pose.position,
+      rotvec: [expect.closeTo(Math.PI / 2), 0.1, 0],
+    });
   });
 });
 
@@ -70,8 +89,12 @@ it("pointers set and delete without changing what was", () => {
 
 it("errors are located at the field that a request has", () => {
   expect(located(MOVE, ["body", "payload", "mass"])).toBe("/payload/mass");
-  expect(located(MOVE, ["body", "goal", "pose", "rpy", "position", 2])).toBe("/goal/pose/position/2");
-  expect(located(MOVE, ["body", "goal", "PoseTarget", "pose", "position", 1])).toBe("/goal/pose/position/1");
+  expect(located(MOVE, ["body", "goal", "pose", "rpy", "position", 2])).toBe(
+    "/goal/pose/position/2",
+  );
+  expect(located(MOVE, ["body", "goal", "PoseTarget", "pose", "position", 1])).toBe(
+    "/goal/pose/position/1",
+  );
   expect(located(MOVE, ["body", "payload", "inertia"])).toBe("/payload/inertia");
 });
 

@@ -1,7 +1,22 @@
 import { beforeEach, expect, it } from "vitest";
 import { diff } from "../src/store/diff";
 import { put } from "../src/store/pointer";
-import { answered, canRedo, canUndo, changes, edit, redo, replaceCell, request, revert, stale, typed, undo, write, type Answered } from "../src/store/state";
+import {
+  answered,
+  canRedo,
+  canUndo,
+  changes,
+  edit,
+  redo,
+  replaceCell,
+  request,
+  revert,
+  stale,
+  typed,
+  undo,
+  write,
+  type Answered,
+} from "../src/store/state";
 import { MOVE } from "./cells";
 
 beforeEach(() => replaceCell({ project: { id: "1", name: "test" }, request: MOVE }));
@@ -67,6 +82,8 @@ it("differences are named as the page names them", () => {
   const names = (next: typeof MOVE) => diff(MOVE, next).map(({ name }) => name);
   expect(names(put(MOVE, "/start/q/1", 0))).toEqual(["Start joint 2"]);
   expect(names(put(MOVE, "/scene/obstacles/0/pose/position/2", 0))).toEqual(["table Z"]);
-  expect(names(put(MOVE, "/goal/pose", { position: [-0.35, -0.52, 0.45], rotvec: [1.57, 0, 0] }))).toEqual(["Goal orientation"]);
+  expect(
+    names(put(MOVE, "/goal/pose", { position: [-0.35, -0.52, 0.45], rotvec: [1.57, 0, 0] })),
+  ).toEqual(["Goal orientation"]);
   expect(names({ ...MOVE })).toEqual([]);
 });

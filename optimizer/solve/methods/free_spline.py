@@ -17,7 +17,7 @@ from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.ruckig_motion import time_optimal
 from joulepath.optimizer.motion.spline import Spline, spline_of
 from joulepath.optimizer.problem.problem import DURATIONS
-from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.method import above
 from joulepath.optimizer.solve.methods.solve_result import (

@@ -15,7 +15,7 @@ from joulepath.optimizer.motion.polynomial import polynomials
 from joulepath.optimizer.motion.ruckig_motion import time_optimal
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import quintic
-from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.limit_repair import sampled_overshoot
 from joulepath.optimizer.solve.methods.planned_paths import no_polynomial_around

@@ -10,7 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.spline import Spline, sampled
-from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.sqp_state import SQP

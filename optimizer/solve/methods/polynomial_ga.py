@@ -22,7 +22,7 @@ from joulepath.optimizer.collision.planner.state_validity import StateValidityCh
 from joulepath.optimizer.motion import quintic
 from joulepath.optimizer.motion.polynomial import PolynomialBasis, polynomials
 from joulepath.optimizer.motion.spline import least_time_scale, retimed, spline_of, time_scales
-from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks
 from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.planned_paths import (

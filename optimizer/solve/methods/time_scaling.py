@@ -14,8 +14,8 @@ from joulepath.optimizer.motion import bspline, seven_segment
 from joulepath.optimizer.motion.bspline import Basis
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import quintic_spline
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.result.certificate import Clearance
-from joulepath.optimizer.result.solution import BaselineName
 from joulepath.optimizer.solve.methods.around_obstacles import along_path, around_obstacles
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.guess import Guess

@@ -20,7 +20,7 @@ from joulepath.optimizer.dynamics.limited_torque import limited_torque
 from joulepath.optimizer.motion.quadrature import grid
 from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.motion.spline import Spline, lasting, least_time_scale, sample
-from joulepath.optimizer.result.solution import BaselineName
+from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.solve.methods.around_obstacles import around_obstacles
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.limit_repair import torque_peaks

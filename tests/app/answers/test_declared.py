@@ -15,7 +15,7 @@ import orjson
 import pytest
 from pydantic import ValidationError
 
-from joulepath.app.answers.declared import as_json, model_of, shown_fields, texts_of
+from joulepath.app.answers.declared import as_json, model_of, texts_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.engine.result import json_document
 from joulepath.optimizer.collision.close_pass import CLOSE_PASS
@@ -29,8 +29,9 @@ from joulepath.optimizer.declared import (
     PerJoint,
     Unit,
 )
+from joulepath.optimizer.presentation.declared_fields import shown_fields
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.certificate import Certificate, Clearance
-from joulepath.optimizer.result.solution import Baseline
 from tests.app.live import ROOT
 
 
@@ -174,7 +175,7 @@ def test_the_text_of_warnings_names_the_distance() -> None:
 def test_only_one_module_reads_the_markers() -> None:
     """Elsewhere they are written into types."""
     readers = set()
-    for path in (ROOT / "app").rglob("*.py"):
+    for path in [*(ROOT / "app").rglob("*.py"), *(ROOT / "optimizer").rglob("*.py")]:
         names = {
             node.id
             for node in ast.walk(ast.parse(path.read_text("utf-8")))
@@ -182,7 +183,7 @@ def test_only_one_module_reads_the_markers() -> None:
         }
         if names & {"get_type_hints"}:
             readers.add(path.relative_to(Path(ROOT)).as_posix())
-    assert readers == {"app/answers/declared.py"}
+    assert readers == {"optimizer/presentation/declared_fields.py"}
 
 
 def test_a_task_does_without_the_web_framework() -> None:

@@ -10,7 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath import __version__
-from joulepath.app.http.problems import types_of_error
+from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
 

@@ -15,8 +15,9 @@ import pytest
 from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions.access import Unauthenticated, WrongKey
 from joulepath.app.exceptions.base import InternalError, InvalidRequest
+from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.stored import PartsNeeded, StoreFault, StoreUnavailable, UnknownAnswer
-from joulepath.app.http.problems import path_of, problem_of, types_of_error
+from joulepath.app.http.problems import path_of, problem_of
 from joulepath.app.schemas.examples.problems import example_of
 from joulepath.optimizer.exceptions import (
     MOST_LISTED,

@@ -11,9 +11,10 @@ from starlette.testclient import TestClient
 
 from joulepath.app.api.ik.task import IKRequest, IKTask
 from joulepath.app.exceptions.base import InternalError
+from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.queue import NotReady
 from joulepath.app.exceptions.transport import BodyTooLarge, MethodNotAllowed, NotFound
-from joulepath.app.http.problems import own_fields, path_of, problem_of, types_of_error
+from joulepath.app.http.problems import own_fields, path_of, problem_of
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
 from joulepath.models.registry import robot_names

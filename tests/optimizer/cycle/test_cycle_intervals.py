@@ -9,7 +9,7 @@ import pytest
 
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.spread import spread_of
-from joulepath.optimizer.cycle.cycle_solution import CycleMove
+from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.dynamics.plant import REPORT

@@ -13,7 +13,8 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.evaluate.evaluate import Evaluation, evaluate
+from joulepath.optimizer.evaluate.evaluate import evaluate
+from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, RecordedRows, Recording, Waypoints
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model

@@ -19,8 +19,8 @@ from joulepath.optimizer.motion.time_scalings import (
 )
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
-from joulepath.optimizer.result.solution import Baseline
 from joulepath.optimizer.search.baselines import (
     Broken,
     baselines,

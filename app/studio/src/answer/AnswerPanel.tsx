@@ -13,7 +13,12 @@ import { StaleBanner } from "./StaleBanner";
 /** The answer: the figure, what to do about it, what it costs, how it compares. */
 export function AnswerPanel() {
   return (
-    <aside class={`answer${stale.value ? " is-stale" : ""}`} id="answer" aria-label="Answer" tabIndex={0}>
+    <aside
+      class={`answer${stale.value ? " is-stale" : ""}`}
+      id="answer"
+      aria-label="Answer"
+      tabIndex={0}
+    >
       {answered.value ? (
         <>
           <StaleBanner />
@@ -27,7 +32,9 @@ export function AnswerPanel() {
           {!alone && <Branches />}
         </>
       ) : (
-        <p class="empty">{run.value ? "Computing …" : "No answer yet: fill in the task, then optimise."}</p>
+        <p class="empty">
+          {run.value ? "Computing …" : "No answer yet: fill in the task, then optimise."}
+        </p>
       )}
     </aside>
   );

@@ -8,7 +8,9 @@ import { baselineName, energyOf, nounOf } from "../store/facts";
 
 const FEW = 1; // of those that break a limit, which are shown at once
 
-/** The same task in the usual ways. A saving is claimed only against those that keep every limit. */
+/**
+ * The same task in the usual ways. A saving is claimed only against those that keep every limit.
+ */
 export function Baselines() {
   const shown = answered.value;
   const [all, setAll] = useState(false);
@@ -32,7 +34,12 @@ export function Baselines() {
     <Section title="Against the usual ways" id="baselines">
       <table class={stale.value ? "stale" : undefined}>
         <thead>
-          <tr><td /><th scope="col">time</th><th scope="col">J a {nounOf(shown)}</th><th scope="col">saves</th></tr>
+          <tr>
+            <td />
+            <th scope="col">time</th>
+            <th scope="col">J a {nounOf(shown)}</th>
+            <th scope="col">saves</th>
+          </tr>
         </thead>
         <tbody>
           <Own shown={shown} />
@@ -40,14 +47,26 @@ export function Baselines() {
           {first.map(row)}
         </tbody>
       </table>
-      {!kept.length && <p class="hint">No usual way that was computed keeps every limit, so no saving is claimed.</p>}
+      {!kept.length && (
+        <p class="hint">
+          No usual way that was computed keeps every limit, so no saving is claimed.
+        </p>
+      )}
       {broken.length > 0 && (
         <p class="hint">
           Hatched: breaks a limit, so no saving is claimed.{" "}
-          {first.filter(({ reason }) => reason).map(({ name, reason }) => (
-            <span class="reason" key={name}>{baselineName(name)}: {reason}. </span>
-          ))}
-          {broken.length > FEW && <Button kind="link" onClick={() => setAll(!all)}>{all ? "Fewer" : `${broken.length - FEW} more`}</Button>}
+          {first
+            .filter(({ reason }) => reason)
+            .map(({ name, reason }) => (
+              <span class="reason" key={name}>
+                {baselineName(name)}: {reason}.{" "}
+              </span>
+            ))}
+          {broken.length > FEW && (
+            <Button kind="link" onClick={() => setAll(!all)}>
+              {all ? "Fewer" : `${broken.length - FEW} more`}
+            </Button>
+          )}
         </p>
       )}
     </Section>
@@ -57,7 +76,10 @@ export function Baselines() {
 function Own({ shown }: { shown: Answered }) {
   return (
     <tr class="total">
-      <th scope="row"><i class="swatch own" />This {nounOf(shown)}</th>
+      <th scope="row">
+        <i class="swatch own" />
+        This {nounOf(shown)}
+      </th>
       <td>{figure(shown.solution.duration)} s</td>
       <td>{figure(energyOf(shown))}</td>
       <td />
@@ -67,6 +89,14 @@ function Own({ shown }: { shown: Answered }) {
 
 function Saving({ of: { saving, saving_interval: interval } }: { of: Baseline }) {
   if (saving === null) return <>–</>;
-  const likely = interval ? `likely ${percent(interval.p5)} to ${percent(interval.p95)}` : undefined;
-  return saving > 0 ? <b class="good" title={likely}>{percent(saving)}</b> : <span title={likely}>needs {percent(-saving)} less</span>;
+  const likely = interval
+    ? `likely ${percent(interval.p5)} to ${percent(interval.p95)}`
+    : undefined;
+  return saving > 0 ? (
+    <b class="good" title={likely}>
+      {percent(saving)}
+    </b>
+  ) : (
+    <span title={likely}>needs {percent(-saving)} less</span>
+  );
 }

@@ -20,17 +20,29 @@ export function Branches() {
   const { candidates, candidate_counts: given } = shown.solution;
   const counts = Object.entries(given).filter(([, count]) => count);
   const total = counts.reduce((sum, [, count]) => sum + count, 0);
-  const rows = candidates.filter(({ status }) => !filter.value || status === filter.value).sort((a, b) => (a.lower_bound ?? Infinity) - (b.lower_bound ?? Infinity));
+  const rows = candidates
+    .filter(({ status }) => !filter.value || status === filter.value)
+    .sort((a, b) => (a.lower_bound ?? Infinity) - (b.lower_bound ?? Infinity));
   return (
     <details class="section fold" id="branches">
       <summary>
-        <b>Branches of the search</b> <small>{counts.map(([status, count]) => `${count} ${status}`).join(", ")}</small>
+        <b>Branches of the search</b>{" "}
+        <small>{counts.map(([status, count]) => `${count} ${status}`).join(", ")}</small>
       </summary>
-      <p class="hint">A branch is a posture at both ends; the same one with a joint a full turn further is a branch of its own. Pruned: ruled out before it was solved.</p>
+      <p class="hint">
+        A branch is a posture at both ends; the same one with a joint a full turn further is a
+        branch of its own. Pruned: ruled out before it was solved.
+      </p>
       <div class="row">
-        <select aria-label="Candidates shown" value={filter.value} onChange={(event) => (filter.value = event.currentTarget.value)}>
+        <select
+          aria-label="Candidates shown"
+          value={filter.value}
+          onChange={(event) => (filter.value = event.currentTarget.value)}
+        >
           <option value="">all statuses</option>
-          {STATUSES.map((status) => <option key={status}>{status}</option>)}
+          {STATUSES.map((status) => (
+            <option key={status}>{status}</option>
+          ))}
         </select>
         {candidates.length < total && shown.asked && (
           <Button small onClick={trying(() => optimise({ ...shown.asked, candidates: "all" }))}>
@@ -41,9 +53,18 @@ export function Branches() {
       <Table
         label="Branches"
         head={["goal", "status", "bound J", "energy J", "time s", ""]}
-        rows={rows.slice(0, MOST_ROWS).map((each, k) => ({ key: k, title: each.reason, class: each.status, cells: cellsOf(each, shown.solution) }))}
+        rows={rows.slice(0, MOST_ROWS).map((each, k) => ({
+          key: k,
+          title: each.reason,
+          class: each.status,
+          cells: cellsOf(each, shown.solution),
+        }))}
       />
-      {rows.length > MOST_ROWS && <p class="hint">{MOST_ROWS} of {rows.length} are listed.</p>}
+      {rows.length > MOST_ROWS && (
+        <p class="hint">
+          {MOST_ROWS} of {rows.length} are listed.
+        </p>
+      )}
     </details>
   );
 }
@@ -51,14 +72,26 @@ export function Branches() {
 function cellsOf(each: Candidate, { branch }: Solution) {
   const same = (a: number[], b: number[]) => a.every((x, j) => Math.abs(x - b[j]!) < 1e-6);
   const best = same(each.q_goal, branch.goal.q) && same(each.q_start, branch.start.q);
-  const name = each.start === each.goal ? postureWords(each.goal) : `${postureWords(each.goal)} from ${postureWords(each.start)}`;
+  const name =
+    each.start === each.goal
+      ? postureWords(each.goal)
+      : `${postureWords(each.goal)} from ${postureWords(each.start)}`;
   const seen = ghosts.value.some(({ q }) => q === each.q_goal);
-  const look = () => (ghosts.value = seen ? ghosts.value.filter(({ q }) => q !== each.q_goal) : [...ghosts.value, { q: each.q_goal, colour: 0x4477aa }].slice(-4));
+  const look = () =>
+    (ghosts.value = seen
+      ? ghosts.value.filter(({ q }) => q !== each.q_goal)
+      : [...ghosts.value, { q: each.q_goal, colour: 0x4477aa }].slice(-4));
   const status = best ? "this motion" : each.refined === false ? "solved roughly" : each.status;
-  const acts = best ? "" : (
+  const acts = best ? (
+    ""
+  ) : (
     <>
-      <Button small kind="link" pressed={seen} onClick={look}>ghost</Button>{" "}
-      <Button small kind="link" onClick={() => beside(each, name).catch((error) => tell(error))}>compute</Button>
+      <Button small kind="link" pressed={seen} onClick={look}>
+        ghost
+      </Button>{" "}
+      <Button small kind="link" onClick={() => beside(each, name).catch((error) => tell(error))}>
+        compute
+      </Button>
     </>
   );
   return [name, status, each.lower_bound, each.energy, each.duration, acts];
@@ -67,6 +100,12 @@ function cellsOf(each: Candidate, { branch }: Solution) {
 /** Computes one branch, and lets its arm move beside the answer's. Throws Problem. */
 async function beside({ q_start, q_goal }: Candidate, name: string): Promise<void> {
   const { asked } = answered.value!;
-  const solution = (await compute("optimize", { ...asked, start: { q: q_start }, goal: { q: q_goal }, branch: null, windings: false })) as Solution | null;
+  const solution = (await compute("optimize", {
+    ...asked,
+    start: { q: q_start },
+    goal: { q: q_goal },
+    branch: null,
+    windings: false,
+  })) as Solution | null;
   if (solution) race({ name, solution, colour: 0 });
 }

@@ -13,12 +13,19 @@ export function Certificate() {
       {clearance && (
         <p>
           <button type="button" class="plain" onClick={() => goTo(clearance.time)}>
-            Clearance beyond the margins: proven {figure(clearance.min_clearance * 1000)} mm, sampled {figure(clearance.sampled * 1000)} mm ({clearance.pair.join(" – ")}).
+            Clearance beyond the margins: proven {figure(clearance.min_clearance * 1000)} mm,
+            sampled {figure(clearance.sampled * 1000)} mm ({clearance.pair.join(" – ")}).
           </button>
         </p>
       )}
       <p class="hint">
-        The goal is met within {figure(error.position * 1000, 2)} mm and {figure(error.rotation, 2)} rad. A second program, apart from the solver, replayed the motion. {shown.solution.id && <>Kept as <code>{shown.solution.id.slice(0, 8)}</code>.</>}
+        The goal is met within {figure(error.position * 1000, 2)} mm and {figure(error.rotation, 2)}{" "}
+        rad. A second program, apart from the solver, replayed the motion.{" "}
+        {shown.solution.id && (
+          <>
+            Kept as <code>{shown.solution.id.slice(0, 8)}</code>.
+          </>
+        )}
       </p>
     </Section>
   );

@@ -4,12 +4,16 @@ import { Section } from "../ui/Section";
 import { costsOf, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
 import { figure, fixed, parseNumber } from "../store/units";
-import { wait } from "./waits";
+import { wait, waitFailed } from "./waits";
 
 /** The parts of what one move or round costs. */
 function partsOf(shown: Answered): { name: string; joules: number }[] {
   const { total, dwell = 0 } = shown.solution.energy.electrical;
-  if (shown.cycle) return [{ name: "Moves", joules: total - dwell }, { name: "At the stops", joules: dwell }];
+  if (shown.cycle)
+    return [
+      { name: "Moves", joules: total - dwell },
+      { name: "At the stops", joules: dwell },
+    ];
   const move = { name: "The move", joules: total - dwell };
   const waiting = dwell || wait.value?.waiting || 0;
   return waiting ? [move, { name: "Waiting, motors on", joules: waiting }] : [move];
@@ -21,41 +25,84 @@ export function CostTable() {
   const [open, setOpen] = useState(false);
   if (!shown) return null;
   const given = economics.value;
-  const whole = shown.asked?.dwell && typeof (shown.asked.dwell as { time?: number }).time === "number" ? (shown.asked.dwell as { time: number }).time : shown.solution.duration;
+  const whole =
+    shown.asked?.dwell && typeof (shown.asked.dwell as { time?: number }).time === "number"
+      ? (shown.asked.dwell as { time: number }).time
+      : shown.solution.duration;
   const costs = costsOf(partsOf(shown), whole, given);
   const unpriced = given.cycle !== null && given.cycle > whole && !shown.cycle && !wait.value;
   const kwh = (value: number) => `${figure(value)} kWh`;
   return (
-    <Section title="What it costs" id="costs" action={<Button kind="link" onClick={() => setOpen(!open)}>Assumptions</Button>}>
+    <Section
+      title="What it costs"
+      id="costs"
+      action={
+        <Button kind="link" onClick={() => setOpen(!open)}>
+          Assumptions
+        </Button>
+      }
+    >
       <table class={stale.value ? "stale" : undefined}>
         <thead>
           <tr>
             <td />
-            <th scope="col"><b>{shown.cycle ? "round" : "cycle"}</b> {figure(costs.cycle)} s</th>
-            <th scope="col"><b>shift</b> {fixed(costs.cyclesPerShift, 0)}×</th>
-            <th scope="col"><b>year</b> {fixed(given.shiftsPerYear, 0)} shifts</th>
+            <th scope="col">
+              <b>{shown.cycle ? "round" : "cycle"}</b> {figure(costs.cycle)} s
+            </th>
+            <th scope="col">
+              <b>shift</b> {fixed(costs.cyclesPerShift, 0)}×
+            </th>
+            <th scope="col">
+              <b>year</b> {fixed(given.shiftsPerYear, 0)} shifts
+            </th>
           </tr>
         </thead>
         <tbody>
           {costs.rows.map((row) => (
-            <tr key={row.name}><th scope="row">{row.name}</th><td>{figure(row.joules)} J</td><td>{kwh(row.shift)}</td><td>{kwh(row.year)}</td></tr>
+            <tr key={row.name}>
+              <th scope="row">{row.name}</th>
+              <td>{figure(row.joules)} J</td>
+              <td>{kwh(row.shift)}</td>
+              <td>{kwh(row.year)}</td>
+            </tr>
           ))}
           {costs.rows.length > 1 && (
-            <tr class="total"><th scope="row">Together</th><td>{figure(costs.total.joules)} J</td><td>{kwh(costs.total.shift)}</td><td>{kwh(costs.total.year)}</td></tr>
+            <tr class="total">
+              <th scope="row">Together</th>
+              <td>{figure(costs.total.joules)} J</td>
+              <td>{kwh(costs.total.shift)}</td>
+              <td>{kwh(costs.total.year)}</td>
+            </tr>
           )}
           <tr class="sub">
-            <th scope="row">Money, CO₂e</th><td />
-            <td>{figure(costs.money.shift, 2)} €, {figure(costs.carbon.shift, 2)} kg</td>
-            <td>{figure(costs.money.year, 2)} €, {figure(costs.carbon.year, 2)} kg</td>
+            <th scope="row">Money, CO₂e</th>
+            <td />
+            <td>
+              {figure(costs.money.shift, 2)} €, {figure(costs.carbon.shift, 2)} kg
+            </td>
+            <td>
+              {figure(costs.money.year, 2)} €, {figure(costs.carbon.year, 2)} kg
+            </td>
           </tr>
         </tbody>
       </table>
       <p class="hint">
-        <span title={given.price.source}>{fixed(given.price.value, 2)} € a kWh ({short(given.price.source)})</span>,{" "}
-        <span title={given.carbon.source}>{fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon.source)})</span>.{" "}
-        {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
-        {given.cycle === null && !shown.cycle ? "Back to back: say how often the move comes to price the wait." : ""}
-        {unpriced ? "The wait is being priced." : ""}
+        <span title={given.price.source}>
+          {fixed(given.price.value, 2)} € a kWh ({short(given.price.source)})
+        </span>
+        ,{" "}
+        <span title={given.carbon.source}>
+          {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon.source)})
+        </span>
+        . {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
+        {given.cycle === null && !shown.cycle
+          ? "Back to back: say how often the move comes to price the wait."
+          : ""}
+        {unpriced
+          ? waitFailed.value
+            ? "The wait could not be computed."
+            : "The wait is being priced."
+          : ""}
       </p>
       {open && <Assumptions />}
     </Section>
@@ -69,7 +116,13 @@ const short = (source: string) => source.split(":")[0]!;
 function Assumptions() {
   const given = economics.value;
   const set = (next: Partial<Economics>) => (economics.value = { ...given, ...next });
-  const row = (text: string, unit: string, value: number | null, source: string, take: (value: number | null) => void) => (
+  const row = (
+    text: string,
+    unit: string,
+    value: number | null,
+    source: string,
+    take: (value: number | null) => void,
+  ) => (
     <label class="field" key={text}>
       <span>{text}</span>
       <input
@@ -91,11 +144,37 @@ function Assumptions() {
   const yours = (value: number): Sourced => ({ value, source: "yours" });
   return (
     <div class="fields" id="assumptions">
-      {row("Electricity", "€ per kWh", given.price.value, given.price.source, (value) => value !== null && set({ price: yours(value) }))}
-      {row("Carbon", "kg CO₂e per kWh", given.carbon.value, given.carbon.source, (value) => value !== null && set({ carbon: yours(value) }))}
+      {row(
+        "Electricity",
+        "€ per kWh",
+        given.price.value,
+        given.price.source,
+        (value) => value !== null && set({ price: yours(value) }),
+      )}
+      {row(
+        "Carbon",
+        "kg CO₂e per kWh",
+        given.carbon.value,
+        given.carbon.source,
+        (value) => value !== null && set({ carbon: yours(value) }),
+      )}
       {row("Shift", "h", given.shift, "", (value) => value !== null && set({ shift: value }))}
-      {row("Shifts a year", "shifts", given.shiftsPerYear, "two on 230 days", (value) => value !== null && set({ shiftsPerYear: value }))}
-      {row("Control box at the mains", "W", given.box?.value ?? null, given.box ? "yours" : "a wattmeter’s reading while the arm stands, less the arm’s own power", (value) => set({ box: value === null ? null : yours(value) }))}
+      {row(
+        "Shifts a year",
+        "shifts",
+        given.shiftsPerYear,
+        "two on 230 days",
+        (value) => value !== null && set({ shiftsPerYear: value }),
+      )}
+      {row(
+        "Control box at the mains",
+        "W",
+        given.box?.value ?? null,
+        given.box
+          ? "yours"
+          : "a wattmeter’s reading while the arm stands, less the arm’s own power",
+        (value) => set({ box: value === null ? null : yours(value) }),
+      )}
     </div>
   );
 }

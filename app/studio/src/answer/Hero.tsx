@@ -16,29 +16,61 @@ export function Hero() {
     <section class={`hero${stale.value ? " stale" : ""}`} aria-label="Energy">
       <div class="hero-head">
         <div>
-          <p class="hint">{solution.objective === "mechanical" ? "Mechanical work" : "Energy"} of this {nounOf(shown)}</p>
+          <p class="hint">
+            {solution.objective === "mechanical" ? "Mechanical work" : "Energy"} of this{" "}
+            {nounOf(shown)}
+          </p>
           <p class="big" id="joules">
             {stale.value ? <s>{figure(total)}</s> : figure(total)} <small>J</small>
           </p>
         </div>
         <div class="hero-side">
           {broken ? (
-            <span class="chip bad"><Icon name="alert" />Breaks a limit: {broken}</span>
+            <span class="chip bad">
+              <Icon name="alert" />
+              Breaks a limit: {broken}
+            </span>
           ) : (
-            <span class="chip good"><Icon name="circleCheck" />Keeps every limit</span>
+            <span class="chip good">
+              <Icon name="circleCheck" />
+              Keeps every limit
+            </span>
           )}
           <Interval shown={shown} />
         </div>
       </div>
       <dl class="facts" id="facts">
-        <div><dt>time</dt><dd>{figure(solution.duration)} s</dd></div>
-        <div><dt>mean</dt><dd>{figure(solution.energy.mean_power, 2)} W</dd></div>
-        <div><dt>peak</dt><dd>{figure(solution.energy.peak_power)} W</dd></div>
-        <div><dt>above the least possible</dt><dd id="gap">{gap === null ? "no bound" : `≤ ${atMost(gap)}`}</dd></div>
+        <div>
+          <dt>time</dt>
+          <dd>{figure(solution.duration)} s</dd>
+        </div>
+        <div>
+          <dt>mean</dt>
+          <dd>{figure(solution.energy.mean_power, 2)} W</dd>
+        </div>
+        <div>
+          <dt>peak</dt>
+          <dd>{figure(solution.energy.peak_power)} W</dd>
+        </div>
+        <div>
+          <dt>above the least possible</dt>
+          <dd id="gap">{gap === null ? "no bound" : `≤ ${atMost(gap)}`}</dd>
+        </div>
       </dl>
       <Parts electrical={solution.energy.electrical} />
-      <p class="hint trust" title={Object.entries(shown.robot.trust).map(([letter, text]) => `${letter}: ${text}`).join("\n")}>{shown.asked?.figures ? "Computed with figures of your own arm." : shown.robot.energy_trust}</p>
-      {solution.status !== "optimal" && <p class="warning-text">{capital(solution.status)}: the search ended before every posture was ruled out.</p>}
+      <p
+        class="hint trust"
+        title={Object.entries(shown.robot.trust)
+          .map(([letter, text]) => `${letter}: ${text}`)
+          .join("\n")}
+      >
+        {shown.asked?.figures ? "Computed with figures of your own arm." : shown.robot.energy_trust}
+      </p>
+      {solution.status !== "optimal" && (
+        <p class="warning-text">
+          {capital(solution.status)}: the search ended before every posture was ruled out.
+        </p>
+      )}
     </section>
   );
 }
@@ -54,10 +86,15 @@ function Interval({ shown }: { shown: Answered }) {
   return (
     <>
       <div class="interval" aria-hidden="true">
-        <i class="band" style={{ left: place(p5), right: `${100 - (100 * (p95 - from)) / (to - from)}%` }} />
+        <i
+          class="band"
+          style={{ left: place(p5), right: `${100 - (100 * (p95 - from)) / (to - from)}%` }}
+        />
         <i class="best" style={{ left: place(total) }} />
       </div>
-      <p class="hint" id="likely">likely {figure(p5, 2)} to {figure(p95, 2)} J</p>
+      <p class="hint" id="likely">
+        likely {figure(p5, 2)} to {figure(p95, 2)} J
+      </p>
     </>
   );
 }

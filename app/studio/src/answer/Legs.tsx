@@ -13,16 +13,34 @@ export function Legs() {
     <Section title="Legs" note="gap: at most so much above the least" id="legs">
       <table class={stale.value ? "stale" : undefined}>
         <thead>
-          <tr><td /><th scope="col">kg</th><th scope="col">s</th><th scope="col">J</th><th scope="col">gap</th></tr>
+          <tr>
+            <td />
+            <th scope="col">kg</th>
+            <th scope="col">s</th>
+            <th scope="col">J</th>
+            <th scope="col">gap</th>
+          </tr>
         </thead>
         <tbody>
           {cycle.legs.map((leg, k) => (
-            <tr key={k} class={leg.answer ? undefined : "rest"} data-now={k === now ? "" : undefined}>
-              <th scope="row"><button type="button" class="plain" onClick={() => goTo(leg.t0)}>{legName(leg)}</button></th>
+            <tr
+              key={k}
+              class={leg.answer ? undefined : "rest"}
+              data-now={k === now ? "" : undefined}
+            >
+              <th scope="row">
+                <button type="button" class="plain" onClick={() => goTo(leg.t0)}>
+                  {legName(leg)}
+                </button>
+              </th>
               <td>{leg.payload_mass ? figure(leg.payload_mass) : "–"}</td>
               <td>{figure(leg.duration)}</td>
               <td>{figure(leg.electrical)}</td>
-              <td>{leg.answer && leg.lower_bound > 0 ? atMost(leg.electrical / leg.lower_bound - 1) : "–"}</td>
+              <td>
+                {leg.answer && leg.lower_bound > 0
+                  ? atMost(leg.electrical / leg.lower_bound - 1)
+                  : "–"}
+              </td>
             </tr>
           ))}
         </tbody>

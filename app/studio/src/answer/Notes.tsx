@@ -3,10 +3,21 @@ import { Note } from "../ui/Note";
 import { goTo } from "../picture/clock";
 import { optimise } from "../store/run";
 import { put } from "../store/pointer";
-import { answered, edit, economics, request, show, stale, tab, typed, type Answered } from "../store/state";
+import {
+  answered,
+  edit,
+  economics,
+  request,
+  show,
+  stale,
+  tab,
+  typed,
+  type Answered,
+} from "../store/state";
 import { tell } from "../store/trouble";
 import { figure, percent } from "../store/units";
 import { plain } from "../store/facts";
+import { home } from "./home";
 import { wait } from "./waits";
 
 const MOST = 3;
@@ -16,7 +27,11 @@ const SPARE = 0.002; // clearance beyond the margins that is worth a note [m]
 export function Notes() {
   const shown = answered.value;
   if (!shown || stale.value) return null;
-  const notes = [<Waiting key="wait" />, <Close key="close" shown={shown} />];
+  const notes = [
+    <Waiting key="wait" />,
+    <WayHome key="home" />,
+    <Close key="close" shown={shown} />,
+  ];
   const warnings = shown.solution.warnings.map(plain);
   const first = warnings.slice(0, MOST - 1);
   const rest = warnings.slice(MOST - 1);
@@ -56,11 +71,57 @@ function Waiting() {
     optimise(next).catch((error) => tell(error, next));
   };
   return (
-    <Note kind="warning" action={less !== null && less > 0.001 && <Button small onClick={use}>Use whole cycle</Button>}>
+    <Note
+      kind="warning"
+      action={
+        less !== null &&
+        less > 0.001 && (
+          <Button small onClick={use}>
+            Use whole cycle
+          </Button>
+        )
+      }
+    >
       <b>
         {figure(now.waiting)} of {figure(together)} J a cycle is waiting.
       </b>
-      {less !== null && (less > 0.001 ? ` Over all ${figure(now.cycle)} s: ${figure(now.whole)} J, ${percent(less)} less.` : " No slower motion needs less over the whole cycle.")}
+      {less !== null &&
+        (less > 0.001
+          ? ` Over all ${figure(now.cycle)} s: ${figure(now.whole)} J, ${percent(less)} less.`
+          : " No slower motion needs less over the whole cycle.")}
+    </Note>
+  );
+}
+
+/** How much of a round goes from the start and back to it, and the round without that. */
+function WayHome() {
+  const now = home.value;
+  const shown = answered.value;
+  if (!now || !shown) return null;
+  const total = shown.solution.energy.electrical.total;
+  const { without } = now;
+  const less = without ? 1 - without.joules / total : 0;
+  const leave = () => {
+    edit(now.request, typed.value);
+    optimise(now.request).catch((error) => tell(error, now.request));
+  };
+  return (
+    <Note
+      kind="warning"
+      action={
+        less > 0.001 && (
+          <Button small onClick={leave}>
+            Leave out
+          </Button>
+        )
+      }
+    >
+      <b>
+        The start and back take {figure(now.joules)} of {figure(total)} J.
+      </b>
+      {without &&
+        less > 0.001 &&
+        ` A round from the last stop: ${figure(without.joules)} J in ${figure(without.duration)} s, ${percent(less)} less.`}
     </Note>
   );
 }
@@ -77,8 +138,15 @@ function Close({ shown }: { shown: Answered }) {
     tab.value = "picture";
   };
   return (
-    <Note action={<Button small onClick={see}>Show</Button>}>
-      {clearance.pair.join(" and ")} pass {figure(distance * 1000, 2)} mm apart, {figure(clearance.min_clearance * 1000, 2)} mm to spare.
+    <Note
+      action={
+        <Button small onClick={see}>
+          Show
+        </Button>
+      }
+    >
+      {clearance.pair.join(" and ")} pass {figure(distance * 1000, 2)} mm apart,{" "}
+      {figure(clearance.min_clearance * 1000, 2)} mm to spare.
     </Note>
   );
 }

@@ -15,15 +15,28 @@ const PARTS: Record<string, [string, string]> = {
 };
 const LEAST = 5e-3; // parts below this share of the total are not listed
 
-/** Where the energy goes: one stacked bar, and the list of its parts. What is given back stands left of the line. */
+/**
+ * Where the energy goes: one stacked bar, and the list of its parts. What is given back stands left
+ * of the line.
+ */
 export function Parts({ electrical }: { electrical: Electrical }) {
   const parts = Object.keys(PARTS)
-    .map((key) => ({ key, value: electrical[key] ?? 0, text: PARTS[key]![0], title: PARTS[key]![1] }))
+    .map((key) => ({
+      key,
+      value: electrical[key] ?? 0,
+      text: PARTS[key]![0],
+      title: PARTS[key]![1],
+    }))
     .filter(({ value }) => Math.abs(value) > 1e-9);
   const back = parts.filter(({ value }) => value < 0).reverse();
   const spent = parts.filter(({ value }) => value > 0);
   const bar = ({ key, value, text, title }: (typeof parts)[number]) => (
-    <i key={key} class={`part-${key}`} style={{ flexGrow: Math.abs(value) }} title={`${text}: ${figure(value)} J. ${title}`} />
+    <i
+      key={key}
+      class={`part-${key}`}
+      style={{ flexGrow: Math.abs(value) }}
+      title={`${text}: ${figure(value)} J. ${title}`}
+    />
   );
   const listed = parts.filter(({ value }) => Math.abs(value) > LEAST * Math.abs(electrical.total));
   return (

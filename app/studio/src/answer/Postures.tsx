@@ -12,35 +12,60 @@ const MOST = 3; // arms beside that of the answer
 
 const degrees = (q: number[]) => q.map((value) => fixed((value * 180) / Math.PI, 0));
 
-/** Ways to stand at the goal, with joints as the pendant shows them and the energy of the way there. */
+/**
+ * Ways to stand at the goal, with joints as the pendant shows them and the energy of the way there.
+ */
 export function Postures() {
   const shown = answered.value;
   const all = postures.value;
   if (!shown || shown.cycle || !all?.length) return null;
   const free = all.filter(({ state }) => state !== "collides");
   const copy = () => {
-    const text = all.map(({ letter, q, energy }) => [letter, ...degrees(q), figure(energy)].join("\t")).join("\n");
-    navigator.clipboard?.writeText(text).then(() => (toast.value = "The joints are copied, in degrees."), () => undefined);
+    const text = all
+      .map(({ letter, q, energy }) => [letter, ...degrees(q), figure(energy)].join("\t"))
+      .join("\n");
+    navigator.clipboard?.writeText(text).then(
+      () => (toast.value = "The joints are copied, in degrees."),
+      () => undefined,
+    );
   };
   const [best] = all;
   const collide = all.length - free.length;
   return (
-    <Section title="Postures at the goal" note="degrees" id="postures" action={<Button kind="link" onClick={copy}>Copy joints</Button>}>
+    <Section
+      title="Postures at the goal"
+      note="degrees"
+      id="postures"
+      action={
+        <Button kind="link" onClick={copy}>
+          Copy joints
+        </Button>
+      }
+    >
       <div class="scroll" role="region" aria-label="Postures" tabIndex={0}>
         <table class={stale.value ? "stale" : undefined}>
           <thead>
             <tr>
               <td />
-              {best!.q.map((_, k) => <th scope="col" key={k}>{k ? k + 1 : "joint 1"}</th>)}
+              {best!.q.map((_, k) => (
+                <th scope="col" key={k}>
+                  {k ? k + 1 : "joint 1"}
+                </th>
+              ))}
               <th scope="col">J</th>
             </tr>
           </thead>
-          <tbody>{all.map((posture) => <Row key={posture.letter} posture={posture} />)}</tbody>
+          <tbody>
+            {all.map((posture) => (
+              <Row key={posture.letter} posture={posture} />
+            ))}
+          </tbody>
         </table>
       </div>
       <p class="hint">
         {best!.letter}: {postureWords(best!.label)}. Each from the start that suits it best.
-        {collide > 0 && ` ${collide} of ${all.length} ${collide === 1 ? "collides" : "collide"} at the goal.`}
+        {collide > 0 &&
+          ` ${collide} of ${all.length} ${collide === 1 ? "collides" : "collide"} at the goal.`}
       </p>
     </Section>
   );
@@ -50,16 +75,36 @@ function Row({ posture }: { posture: Posture }) {
   const { letter, label, q, state, energy, why, solution } = posture;
   const own = solution !== null && solution === answered.value?.solution;
   const name = `Posture ${letter}`;
-  const seen = own || racers.value.some((each) => each.name === name) || ghosts.value.some((each) => each.q === q);
+  const seen =
+    own ||
+    racers.value.some((each) => each.name === name) ||
+    ghosts.value.some((each) => each.q === q);
   return (
     <tr class={own ? "best" : state} title={why || capital(postureWords(label))}>
       <th scope="row">
-        <button type="button" class="plain" aria-pressed={seen} aria-label={`${seen ? "Hide" : "Show"} posture ${letter}`} disabled={own} onClick={() => showPosture(posture, name, seen)}>
+        <button
+          type="button"
+          class="plain"
+          aria-pressed={seen}
+          aria-label={`${seen ? "Hide" : "Show"} posture ${letter}`}
+          disabled={own}
+          onClick={() => showPosture(posture, name, seen)}
+        >
           <Icon name={seen ? "eye" : "eyeOff"} /> {letter}
         </button>
       </th>
-      {degrees(q).map((text, k) => <td key={k}>{text}</td>)}
-      <td>{state === "computing" ? "…" : state === "collides" ? "collides" : state === "failed" ? "–" : figure(energy)}</td>
+      {degrees(q).map((text, k) => (
+        <td key={k}>{text}</td>
+      ))}
+      <td>
+        {state === "computing"
+          ? "…"
+          : state === "collides"
+            ? "collides"
+            : state === "failed"
+              ? "–"
+              : figure(energy)}
+      </td>
     </tr>
   );
 }
@@ -72,7 +117,10 @@ function showPosture({ q, solution }: Posture, name: string, seen: boolean): voi
   } else if (solution) {
     race({ name, solution, colour: 0 });
   } else {
-    ghosts.value = [...ghosts.value, { q, colour: COLOURS[ghosts.value.length % COLOURS.length]! }].slice(-4);
+    ghosts.value = [
+      ...ghosts.value,
+      { q, colour: COLOURS[ghosts.value.length % COLOURS.length]! },
+    ].slice(-4);
   }
 }
 

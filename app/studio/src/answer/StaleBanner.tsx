@@ -25,7 +25,12 @@ export function StaleBanner() {
         {all.length > MOST && <li>and {all.length - MOST} more</li>}
       </ul>
       <div class="row">
-        <Button kind="primary" icon="refresh" disabled={Boolean(run.value) || Boolean(lackOf(request.value))} onClick={trying(() => optimise())}>
+        <Button
+          kind="primary"
+          icon="refresh"
+          disabled={Boolean(run.value) || Boolean(lackOf(request.value))}
+          onClick={trying(() => optimise())}
+        >
           Optimise again
         </Button>
         <Button onClick={revert}>{all.length === 1 ? "Undo it" : "Undo all"}</Button>

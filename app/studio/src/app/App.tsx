@@ -31,7 +31,10 @@ export function App() {
   const shown = answered.value;
   useEffect(() => {
     const { solution } = shown ?? {};
-    document.title = solution && !stale.value ? `${figure(solution.energy[solution.objective].total)} J in ${figure(solution.duration)} s · joulepath studio` : "joulepath studio";
+    document.title =
+      solution && !stale.value
+        ? `${figure(solution.energy[solution.objective].total)} J in ${figure(solution.duration)} s · joulepath studio`
+        : "joulepath studio";
   }, [shown, stale.value]);
   return (
     <div class={`app${alone ? " alone" : ""}`} data-tab={tab.value}>
@@ -53,7 +56,12 @@ export function App() {
       {page.value === "library" && <LibraryPage />}
       {page.value === "cell" && (
         <nav class="bottom" aria-label="Parts of the cell">
-          <Tabs label="Parts of the cell" options={alone ? TABS.slice(1) : TABS} value={tab.value} onChange={(next) => (tab.value = next)} />
+          <Tabs
+            label="Parts of the cell"
+            options={alone ? TABS.slice(1) : TABS}
+            value={tab.value}
+            onChange={(next) => (tab.value = next)}
+          />
         </nav>
       )}
       <Dialogs />

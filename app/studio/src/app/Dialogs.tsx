@@ -16,14 +16,24 @@ export function Dialogs() {
   return (
     <>
       {keyAsked.value && <KeyDialog />}
-      {dialog.value === "export" && answered.value && (alone ? <Dialog title="Files" onClose={close}><Others /></Dialog> : <ExportDialog onClose={close} />)}
+      {dialog.value === "export" &&
+        answered.value &&
+        (alone ? (
+          <Dialog title="Files" onClose={close}>
+            <Others />
+          </Dialog>
+        ) : (
+          <ExportDialog onClose={close} />
+        ))}
       {dialog.value === "projects" && <ProjectsDialog onClose={close} />}
       {dialog.value === "keys" && (
         <Dialog title="Keys" onClose={close}>
           <dl class="keys">
             {KEYS.map(([keys, effect]) => (
               <div key={keys}>
-                <dt><kbd>{keys}</kbd></dt>
+                <dt>
+                  <kbd>{keys}</kbd>
+                </dt>
                 <dd>{effect}</dd>
               </div>
             ))}
@@ -38,10 +48,25 @@ function KeyDialog() {
   const [key, setKey] = useState("");
   const give = keyAsked.value!;
   return (
-    <Dialog title="This service needs an API key" onClose={() => give(null)} footer={<Button kind="primary" onClick={() => give(key.trim() || null)}>Use it</Button>}>
+    <Dialog
+      title="This service needs an API key"
+      onClose={() => give(null)}
+      footer={
+        <Button kind="primary" onClick={() => give(key.trim() || null)}>
+          Use it
+        </Button>
+      }
+    >
       <label class="field">
         Key
-        <input id="key" type="password" autocomplete="off" value={key} onInput={(event) => setKey(event.currentTarget.value)} onKeyDown={(event) => event.key === "Enter" && give(key.trim() || null)} />
+        <input
+          id="key"
+          type="password"
+          autocomplete="off"
+          value={key}
+          onInput={(event) => setKey(event.currentTarget.value)}
+          onKeyDown={(event) => event.key === "Enter" && give(key.trim() || null)}
+        />
       </label>
       <p class="hint">It is kept until this tab is closed.</p>
     </Dialog>

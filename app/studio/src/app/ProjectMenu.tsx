@@ -15,7 +15,11 @@ import { openCell, openFirst } from "../store/open";
 export function ProjectMenu() {
   const [known, setKnown] = useState<{ summary: string; value: ApiRequest }[] | null>(null);
   const load = () => void (known ?? examples().then(setKnown, (error) => tell(error)));
-  const create = () => replaceCell({ project: { id: newId(), name: "New cell" }, request: { ...EMPTY, robot: robotName(request.value) } });
+  const create = () =>
+    replaceCell({
+      project: { id: newId(), name: "New cell" },
+      request: { ...EMPTY, robot: robotName(request.value) },
+    });
   const pick = (index: string) => {
     const example = known?.[Number(index)];
     if (index === "first") void openFirst();
@@ -23,24 +27,60 @@ export function ProjectMenu() {
   };
   return (
     <>
-      <input type="text" class="project-name" aria-label="Name of the project" value={project.value.name} onChange={(event) => (project.value = { ...project.value, name: event.currentTarget.value || "Untitled cell" })} />
+      <input
+        type="text"
+        class="project-name"
+        aria-label="Name of the project"
+        value={project.value.name}
+        onChange={(event) =>
+          (project.value = { ...project.value, name: event.currentTarget.value || "Untitled cell" })
+        }
+      />
       <Menu label="" name="Project" icon="down" quiet align="left" id="project">
-        <Button kind="quiet" icon="plus" onClick={create}>New cell</Button>
-        <Button kind="quiet" onClick={() => (dialog.value = "projects")}>Open a project …</Button>
-        <Button kind="quiet" onClick={saveFile}>Save as a file</Button>
+        <Button kind="quiet" icon="plus" onClick={create}>
+          New cell
+        </Button>
+        <Button kind="quiet" onClick={() => (dialog.value = "projects")}>
+          Open a project …
+        </Button>
+        <Button kind="quiet" onClick={saveFile}>
+          Save as a file
+        </Button>
         <label class="button quiet">
           Open a file …
-          <input type="file" class="unseen" id="open-file" accept=".json,application/json" onChange={(event) => { const file = event.currentTarget.files?.[0]; event.currentTarget.value = ""; if (file) void readFile(file); }} />
+          <input
+            type="file"
+            class="unseen"
+            id="open-file"
+            accept=".json,application/json"
+            onChange={(event) => {
+              const file = event.currentTarget.files?.[0];
+              event.currentTarget.value = "";
+              if (file) void readFile(file);
+            }}
+          />
         </label>
         <label class="examples">
           Example{" "}
-          <select id="examples" value="" onFocus={load} onMouseDown={load} onChange={(event) => pick(event.currentTarget.value)}>
+          <select
+            id="examples"
+            value=""
+            onFocus={load}
+            onMouseDown={load}
+            onChange={(event) => pick(event.currentTarget.value)}
+          >
             <option value="">choose …</option>
             <option value="first">From a bin to a shelf</option>
-            {known?.map(({ summary }, k) => <option key={summary} value={k}>{summary}</option>)}
+            {known?.map(({ summary }, k) => (
+              <option key={summary} value={k}>
+                {summary}
+              </option>
+            ))}
           </select>
         </label>
-        <Button kind="quiet" onClick={() => (dialog.value = "keys")}>Keys …</Button>
+        <Button kind="quiet" onClick={() => (dialog.value = "keys")}>
+          Keys …
+        </Button>
       </Menu>
     </>
   );

@@ -2,7 +2,19 @@ import { Button } from "../ui/Button";
 import { Menu } from "../ui/Menu";
 import { alone } from "../store/alone";
 import { link, presentCell } from "../store/share";
-import { answered, canRedo, canUndo, page, redo, saved, stale, toast, trouble, undo, type Page } from "../store/state";
+import {
+  answered,
+  canRedo,
+  canUndo,
+  page,
+  redo,
+  saved,
+  stale,
+  toast,
+  trouble,
+  undo,
+  type Page,
+} from "../store/state";
 import { trying } from "../store/trouble";
 import { dialog } from "./dialog";
 import { ProjectMenu } from "./ProjectMenu";
@@ -14,7 +26,12 @@ const PAGES: { value: Page; text: string }[] = [
   { value: "logs", text: "Logs" },
   { value: "library", text: "Library" },
 ];
-const SAVED = { "": "", saving: "Saving …", saved: "Saved in this browser", failed: "Not saved: this browser keeps nothing" };
+const SAVED = {
+  "": "",
+  saving: "Saving …",
+  saved: "Saved in this browser",
+  failed: "Not saved: this browser keeps nothing",
+};
 
 /** Puts the cell into the address of the page, and the address into the clipboard. */
 async function share(): Promise<void> {
@@ -50,7 +67,12 @@ export function TopBar() {
         <>
           <nav class="pages" aria-label="Pages">
             {PAGES.map(({ value, text }) => (
-              <button type="button" key={value} aria-current={page.value === value ? "page" : undefined} onClick={() => open(value)}>
+              <button
+                type="button"
+                key={value}
+                aria-current={page.value === value ? "page" : undefined}
+                onClick={() => open(value)}
+              >
                 {text}
               </button>
             ))}
@@ -58,26 +80,59 @@ export function TopBar() {
           {page.value === "cell" && (
             <div class="project">
               <ProjectMenu />
-              <small class="saved" id="saved">{SAVED[saved.value]}</small>
-              <Button kind="quiet" icon="undo" label="Undo" id="undo" disabled={!canUndo.value} onClick={undo} />
-              <Button kind="quiet" icon="redo" label="Redo" id="redo" disabled={!canRedo.value} onClick={redo} />
+              <small class="saved" id="saved">
+                {SAVED[saved.value]}
+              </small>
+              <Button
+                kind="quiet"
+                icon="undo"
+                label="Undo"
+                id="undo"
+                disabled={!canUndo.value}
+                onClick={undo}
+              />
+              <Button
+                kind="quiet"
+                icon="redo"
+                label="Redo"
+                id="redo"
+                disabled={!canRedo.value}
+                onClick={redo}
+              />
             </div>
           )}
           <span class="space" />
-          <a class="button quiet" href="docs">API</a>
+          <a class="button quiet" href="docs">
+            API
+          </a>
         </>
       )}
       {alone && <span class="space" />}
       {page.value === "cell" && (
         <>
-          {!alone && <Button kind="quiet" icon="share" id="share" onClick={trying(share)}>Share</Button>}
+          {!alone && (
+            <Button kind="quiet" icon="share" id="share" onClick={trying(share)}>
+              Share
+            </Button>
+          )}
           {!alone && ready && (
             <Menu label="Report" icon="file" id="report">
-              <Button kind="quiet" onClick={trying(() => report("pdf"))}>PDF, to print and send</Button>
-              <Button kind="quiet" onClick={trying(() => report("html"))}>Page (HTML), with request and answer</Button>
+              <Button kind="quiet" onClick={trying(() => report("pdf"))}>
+                PDF, to print and send
+              </Button>
+              <Button kind="quiet" onClick={trying(() => report("html"))}>
+                Page (HTML), with request and answer
+              </Button>
             </Menu>
           )}
-          <Button kind={ready ? "primary" : undefined} icon="download" id="export" disabled={!ready} title={ready ? "Ctrl E" : "Optimise first"} onClick={() => (dialog.value = "export")}>
+          <Button
+            kind={ready ? "primary" : undefined}
+            icon="download"
+            id="export"
+            disabled={!ready}
+            title={ready ? "Ctrl E" : "Optimise first"}
+            onClick={() => (dialog.value = "export")}
+          >
             Export…
           </Button>
         </>

@@ -13,7 +13,10 @@ export function saveFile(): void {
 
 /** Opens a project file that is chosen, or a request as JSON. */
 export function openFile(): void {
-  const input = Object.assign(document.createElement("input"), { type: "file", accept: ".json,application/json" });
+  const input = Object.assign(document.createElement("input"), {
+    type: "file",
+    accept: ".json,application/json",
+  });
   input.onchange = () => {
     const file = input.files?.[0];
     if (file) void readFile(file);
@@ -25,7 +28,12 @@ export async function readFile(file: File): Promise<void> {
   try {
     const cell = cellOf(await file.text());
     const name = cell.name ?? file.name.replace(/(\.joulepath)?\.json$/, "");
-    replaceCell({ project: { id: newId(), name }, request: cell.request, typed: cell.typed, economics: cell.economics });
+    replaceCell({
+      project: { id: newId(), name },
+      request: cell.request,
+      typed: cell.typed,
+      economics: cell.economics,
+    });
     page.value = "cell";
   } catch (error) {
     tell(new Error(`${file.name} is no project: ${(error as Error).message}`));

@@ -35,7 +35,12 @@ const WRITING = "input:not([type=range]):not([type=checkbox]):not([type=radio]),
 export function onKey(event: KeyboardEvent): void {
   if (event.defaultPrevented) return;
   const target = event.target as HTMLElement;
-  const act = event.ctrlKey || event.metaKey ? withControl(event, target) : event.altKey ? null : single(event, target);
+  const act =
+    event.ctrlKey || event.metaKey
+      ? withControl(event, target)
+      : event.altKey
+        ? null
+        : single(event, target);
   if (!act) return;
   event.preventDefault();
   act();
@@ -61,14 +66,19 @@ function withControl(event: KeyboardEvent, target: HTMLElement): (() => unknown)
 
 function single(event: KeyboardEvent, target: HTMLElement): (() => unknown) | null {
   if (event.key === "Escape" && run.value) return cancel;
-  if (page.value !== "cell" || target.closest(`${WRITING}, dialog, [role=tab], [role=radio], summary`)) return null;
+  if (
+    page.value !== "cell" ||
+    target.closest(`${WRITING}, dialog, [role=tab], [role=radio], summary`)
+  )
+    return null;
   const key = event.key.length > 1 ? event.key : event.key.toLowerCase();
   if (/^[1-6]$/.test(key)) return () => picture.value?.look(Number(key));
   if (key === " " && target.closest("button, a, input")) return null;
   if (key === "?") return () => (dialog.value = "keys");
   const inPicture = target.closest("#view") && !alone;
   const tools: Record<string, Tool> = { d: "move", t: "turn", b: "box" };
-  if (inPicture && tools[key]) return () => (tool.value = tool.value === tools[key] ? "look" : tools[key]!);
+  if (inPicture && tools[key])
+    return () => (tool.value = tool.value === tools[key] ? "look" : tools[key]!);
   if (inPicture && key === "p") return takePose;
   const acts: Record<string, () => unknown> = {
     " ": toggle,

@@ -2,14 +2,39 @@ import "../styles/font.css";
 import "uplot/dist/uPlot.min.css";
 import "../styles/tokens.css";
 import "../styles/base.css";
+import "../styles/controls.css";
+import "../styles/surfaces.css";
 import "../styles/task.css";
+import "../styles/forms.css";
+import "../styles/targets.css";
 import "../styles/picture.css";
+import "../styles/charts.css";
 import "../styles/answer.css";
+import "../styles/figures.css";
 import "../styles/pages.css";
 import "../styles/narrow.css";
 import { render } from "preact";
 import { multiply, ofPose } from "../store/chain";
-import { answered, changes, economics, page, playing, project, racers, request, run, saved, selected, show, stale, tab, time, typed, duration, trouble } from "../store/state";
+import {
+  answered,
+  changes,
+  economics,
+  page,
+  playing,
+  project,
+  racers,
+  request,
+  run,
+  saved,
+  selected,
+  show,
+  stale,
+  tab,
+  time,
+  typed,
+  duration,
+  trouble,
+} from "../store/state";
 import { postures } from "../answer/postures";
 import { picture } from "../picture/instance";
 import { reachedGhost } from "../picture/reachedGhost";
@@ -23,11 +48,39 @@ declare global {
   }
 }
 
-const signals = { answered, changes, duration, economics, page, playing, postures, project, racers, request, run, saved, selected, show, stale, tab, time, trouble, typed };
+const signals = {
+  answered,
+  changes,
+  duration,
+  economics,
+  page,
+  playing,
+  postures,
+  project,
+  racers,
+  request,
+  run,
+  saved,
+  selected,
+  show,
+  stale,
+  tab,
+  time,
+  trouble,
+  typed,
+};
 
 /** For tests, and for those who look in the console. */
 window.studio = {
-  state: Object.defineProperties({}, Object.fromEntries(Object.entries(signals).map(([name, each]) => [name, { get: () => each.value, enumerable: true }]))),
+  state: Object.defineProperties(
+    {},
+    Object.fromEntries(
+      Object.entries(signals).map(([name, each]) => [
+        name,
+        { get: () => each.value, enumerable: true },
+      ]),
+    ),
+  ),
   get view() {
     return picture.value;
   },

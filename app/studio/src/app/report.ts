@@ -18,9 +18,22 @@ export async function report(format: "html" | "pdf"): Promise<void> {
     carbon: given.carbon,
     ...(given.box ? { control_box: given.box } : {}),
   };
-  const body = { [endpointOf(shown.asked)]: shown.asked, answer: shown.solution.id, title: project.value.name.slice(0, 120), costs, format };
+  const body = {
+    [endpointOf(shown.asked)]: shown.asked,
+    answer: shown.solution.id,
+    title: project.value.name.slice(0, 120),
+    costs,
+    format,
+  };
   toast.value = "The report is being written …";
-  const response = await send("report", { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
-  save(`${project.value.name.replace(/[^\w-]+/g, "-").toLowerCase() || "report"}.${format}`, await response.blob());
+  const response = await send("report", {
+    method: "POST",
+    body: JSON.stringify(body),
+    headers: { "Content-Type": "application/json" },
+  });
+  save(
+    `${project.value.name.replace(/[^\w-]+/g, "-").toLowerCase() || "report"}.${format}`,
+    await response.blob(),
+  );
   toast.value = "The report is saved; request and answer are attached to it.";
 }

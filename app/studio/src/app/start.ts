@@ -1,6 +1,7 @@
 // What the page shows first: the cell of a link, the last project, or the example.
 import { play } from "../picture/clock";
 import { followRobot } from "../picture/pictured";
+import { followHome } from "../answer/home";
 import { followPostures } from "../answer/postures";
 import { followWaits } from "../answer/waits";
 import { alone, embedded } from "../store/alone";
@@ -22,17 +23,22 @@ export async function start(): Promise<void> {
   followChanges();
   followPostures();
   followWaits();
-  window.addEventListener("hashchange", () => /^#(r|answer)=/.test(location.hash) && location.reload());
+  followHome();
+  window.addEventListener(
+    "hashchange",
+    () => /^#(r|answer)=/.test(location.hash) && location.reload(),
+  );
   const given = await shared(location.hash).catch(async (error) => {
     await openFirst();
     tell(error);
     return { done: true } as const;
   });
   if ("done" in given) return undefined;
-  if (given.answer) await openKept(given.answer).catch(async (error) => {
-    await openFirst();
-    tell(error);
-  });
+  if (given.answer)
+    await openKept(given.answer).catch(async (error) => {
+      await openFirst();
+      tell(error);
+    });
   else if (given.cell) await openCell(given.cell, given.cell.name ?? "Shared cell");
   else await openLast();
   return begin();

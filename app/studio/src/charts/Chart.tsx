@@ -28,7 +28,13 @@ export function Chart({ id, label, series, data, options, clocked, over }: Props
     if (clocked) follow(drawn);
     over?.(drawn);
     const stop = clocked ? cursor(drawn) : () => undefined;
-    const widths = new ResizeObserver(() => requestAnimationFrame(() => element.clientWidth && drawn.setSize({ width: Math.max(120, element.clientWidth), height: drawn.height })));
+    const widths = new ResizeObserver(() =>
+      requestAnimationFrame(
+        () =>
+          element.clientWidth &&
+          drawn.setSize({ width: Math.max(120, element.clientWidth), height: drawn.height }),
+      ),
+    );
     widths.observe(element);
     return () => {
       stop();
@@ -41,7 +47,8 @@ export function Chart({ id, label, series, data, options, clocked, over }: Props
 
 /** A click or a drag sets the time of everything. */
 function follow({ over, posToVal }: uPlot): void {
-  const seek = (event: PointerEvent) => goTo(posToVal(event.clientX - over.getBoundingClientRect().left, "x"));
+  const seek = (event: PointerEvent) =>
+    goTo(posToVal(event.clientX - over.getBoundingClientRect().left, "x"));
   over.classList.add("clocked");
   over.onpointerdown = (event) => {
     over.setPointerCapture(event.pointerId);

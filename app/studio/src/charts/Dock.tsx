@@ -29,7 +29,13 @@ export function Dock() {
       {shown.cycle && <LegTimeline cycle={shown.cycle} />}
       <div class="charts">
         <div class="chart">
-          <Tabs label="First chart" options={options} value={now} onChange={(next) => (view.value = next)} controls="first-chart" />
+          <Tabs
+            label="First chart"
+            options={options}
+            value={now}
+            onChange={(next) => (view.value = next)}
+            controls="first-chart"
+          />
           <div id="first-chart" role="tabpanel" aria-label="First chart">
             {now === "power" && <Power />}
             {now === "front" && <Front />}

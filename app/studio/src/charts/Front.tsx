@@ -23,7 +23,12 @@ async function ask(): Promise<void> {
   const asked = answered.value!.asked!;
   const range = typeof asked.duration === "number" ? null : (asked.duration ?? null);
   const deadline = Math.max(30, typeof asked.deadline === "number" ? asked.deadline : 10);
-  const answer = (await compute("pareto", { ...asked, duration: range, candidates: "none", deadline })) as { points: Point[] } | null;
+  const answer = (await compute("pareto", {
+    ...asked,
+    duration: range,
+    candidates: "none",
+    deadline,
+  })) as { points: Point[] } | null;
   if (answer) front.value = { points: answer.points, asked };
 }
 
@@ -40,12 +45,24 @@ export function Front() {
     return (
       <div class="chart-empty">
         <p class="hint">How much a slower or faster motion would need.</p>
-        <Button id="compute-front" disabled={!shown.asked || stale.value || Boolean(run.value)} onClick={trying(ask)}>
+        <Button
+          id="compute-front"
+          disabled={!shown.asked || stale.value || Boolean(run.value)}
+          onClick={trying(ask)}
+        >
           Compute
         </Button>
       </div>
     );
-  return <Drawn points={known} own={{ duration: shown.solution.duration, energy: shown.solution.energy[shown.solution.objective].total }} />;
+  return (
+    <Drawn
+      points={known}
+      own={{
+        duration: shown.solution.duration,
+        energy: shown.solution.energy[shown.solution.objective].total,
+      }}
+    />
+  );
 }
 
 function Drawn({ points, own }: { points: Point[]; own: { duration: number; energy: number } }) {
@@ -56,24 +73,52 @@ function Drawn({ points, own }: { points: Point[]; own: { duration: number; ener
     return [least - room, most + room];
   };
   const [x, y] = [range("duration"), range("energy")];
-  const data = useMemo(() => [points.map((each) => each.duration), points.map((each) => each.energy)] as [number[], number[]], [points, own.duration]);
+  const data = useMemo(
+    () =>
+      [points.map((each) => each.duration), points.map((each) => each.energy)] as [
+        number[],
+        number[],
+      ],
+    [points, own.duration],
+  );
   const over = (drawn: uPlot) => {
-    const place = (node: HTMLElement, { duration, energy }: { duration: number; energy: number }) => {
+    const place = (
+      node: HTMLElement,
+      { duration, energy }: { duration: number; energy: number },
+    ) => {
       node.style.left = `${(100 * (duration - x[0])) / (x[1] - x[0])}%`;
       node.style.top = `${(100 * (y[1] - energy)) / (y[1] - y[0])}%`;
       drawn.over.append(node);
     };
     for (const point of points) {
       const text = `${figure(point.duration)} s, ${figure(point.energy)} J`;
-      const button = Object.assign(document.createElement("button"), { type: "button", className: "point", title: text, onclick: trying(() => load(point.answer)) });
+      const button = Object.assign(document.createElement("button"), {
+        type: "button",
+        className: "point",
+        title: text,
+        onclick: trying(() => load(point.answer)),
+      });
       button.setAttribute("aria-label", `Load the motion of ${text}`);
       place(button, point);
     }
-    place(Object.assign(document.createElement("i"), { className: "present", title: "the motion shown" }), own);
+    place(
+      Object.assign(document.createElement("i"), {
+        className: "present",
+        title: "the motion shown",
+      }),
+      own,
+    );
   };
   return (
     <div id="front">
-      <Chart id="plot-front" label="Least energy over duration" series={[{ stroke: style("--good"), width: 2, points: { show: false } }]} data={data} options={{ x, y, height: 7.6 }} over={over} />
+      <Chart
+        id="plot-front"
+        label="Least energy over duration"
+        series={[{ stroke: style("--good"), width: 2, points: { show: false } }]}
+        data={data}
+        options={{ x, y, height: 7.6 }}
+        over={over}
+      />
       <p class="hint">J over s. The large point is shown; click another to load it.</p>
     </div>
   );

@@ -11,7 +11,10 @@ import { DASHES } from "./plot";
 
 type Quantity = "v" | "q" | "a" | "tau";
 
-const QUANTITIES: Record<Quantity, { name: string; unit: string; limit: "velocity" | "acceleration" | "torque" | null }> = {
+const QUANTITIES: Record<
+  Quantity,
+  { name: string; unit: string; limit: "velocity" | "acceleration" | "torque" | null }
+> = {
   v: { name: "Speed", unit: "rad/s", limit: "velocity" },
   q: { name: "Angle", unit: "rad", limit: null },
   a: { name: "Acceleration", unit: "rad/s²", limit: "acceleration" },
@@ -44,9 +47,19 @@ export function Joints() {
   const { t } = shown.solution.trajectory;
   const columns = useMemo(() => columnsOf(shown, now, asShares), [shown, now, asShares]);
   const limits = asShares ? [-1, 1] : [];
-  const data = useMemo(() => [t, ...columns, ...limits.map((share) => t.map(() => share))] as [number[], ...number[][]], [columns]);
+  const data = useMemo(
+    () =>
+      [t, ...columns, ...limits.map((share) => t.map(() => share))] as [number[], ...number[][]],
+    [columns],
+  );
   const series = useMemo(() => {
-    const lines = shown.robot.joints.map((_, j) => ({ stroke: style(`--joint-${j + 1}`), width: 1.8, dash: DASHES[j], show: !hidden.value.has(j), points: { show: false } }));
+    const lines = shown.robot.joints.map((_, j) => ({
+      stroke: style(`--joint-${j + 1}`),
+      width: 1.8,
+      dash: DASHES[j],
+      show: !hidden.value.has(j),
+      points: { show: false },
+    }));
     const red = { stroke: style("--bad"), width: 1, dash: [6, 4], points: { show: false } };
     return [...lines, ...limits.map(() => red)];
   }, [columns, scheme, hidden.value]);
@@ -60,18 +73,57 @@ export function Joints() {
   return (
     <>
       <div class="chart-head">
-        <Tabs label="Quantity" options={(Object.keys(QUANTITIES) as Quantity[]).map((value) => ({ value, text: QUANTITIES[value].name }))} value={now} onChange={(next) => (quantity.value = next)} controls="joint-chart" />
+        <Tabs
+          label="Quantity"
+          options={(Object.keys(QUANTITIES) as Quantity[]).map((value) => ({
+            value,
+            text: QUANTITIES[value].name,
+          }))}
+          value={now}
+          onChange={(next) => (quantity.value = next)}
+          controls="joint-chart"
+        />
         <label class="share" id="joint-title">
-          <input id="shares" type="checkbox" checked={asShares} onChange={(event) => (shares.value = event.currentTarget.checked)} /> {asShares ? "share of the limit" : unit}
+          <input
+            id="shares"
+            type="checkbox"
+            checked={asShares}
+            onChange={(event) => (shares.value = event.currentTarget.checked)}
+          />{" "}
+          {asShares ? "share of the limit" : unit}
         </label>
       </div>
       <div id="joint-chart" role="tabpanel" aria-label={`Joint ${name.toLowerCase()}`}>
-        <Chart id="plot-joints" label={`${name} of the joints`} series={series} data={data} options={{ x: [0, Math.max(duration.value, 1e-3)], y: [-extent, extent], height: 7.2 }} clocked />
+        <Chart
+          id="plot-joints"
+          label={`${name} of the joints`}
+          series={series}
+          data={data}
+          options={{ x: [0, Math.max(duration.value, 1e-3)], y: [-extent, extent], height: 7.2 }}
+          clocked
+        />
       </div>
       <div class="joints">
         {shown.robot.joints.map((joint, j) => (
-          <button type="button" class="joint" key={joint} aria-pressed={!hidden.value.has(j)} title="Show or hide" onClick={() => flip(j)}>
-            <svg viewBox="0 0 22 4" aria-hidden="true"><line x1="0" x2="22" y1="2" y2="2" stroke={`var(--joint-${j + 1})`} stroke-width="2.4" stroke-dasharray={DASHES[j]!.join(" ")} /></svg>
+          <button
+            type="button"
+            class="joint"
+            key={joint}
+            aria-pressed={!hidden.value.has(j)}
+            title="Show or hide"
+            onClick={() => flip(j)}
+          >
+            <svg viewBox="0 0 22 4" aria-hidden="true">
+              <line
+                x1="0"
+                x2="22"
+                y1="2"
+                y2="2"
+                stroke={`var(--joint-${j + 1})`}
+                stroke-width="2.4"
+                stroke-dasharray={DASHES[j]!.join(" ")}
+              />
+            </svg>
             {jointName(joint)}
           </button>
         ))}

@@ -5,7 +5,9 @@ import { figure } from "../store/units";
 
 /** Legs as wide as their time and as high as their mean power; the figures are joules. */
 export function LegTimeline({ cycle: { legs } }: { cycle: CycleShown }) {
-  const most = Math.max(...legs.map(({ electrical, duration }) => electrical / (duration || Infinity)));
+  const most = Math.max(
+    ...legs.map(({ electrical, duration }) => electrical / (duration || Infinity)),
+  );
   const now = legAt(legs, time.value);
   return (
     <div class="timeline" id="timeline">
@@ -16,7 +18,16 @@ export function LegTimeline({ cycle: { legs } }: { cycle: CycleShown }) {
           const height = (100 * leg.electrical) / (leg.duration || 1) / most;
           const kind = leg.answer ? (leg.payload_mass ? "loaded" : "unloaded") : "rest";
           return (
-            <button type="button" key={k} class={`leg ${kind}`} title={text} aria-label={text} data-now={k === now ? "" : undefined} style={{ flexGrow: leg.duration, height: `${Math.max(8, height)}%` }} onClick={() => goTo(leg.t0)}>
+            <button
+              type="button"
+              key={k}
+              class={`leg ${kind}`}
+              title={text}
+              aria-label={text}
+              data-now={k === now ? "" : undefined}
+              style={{ flexGrow: leg.duration, height: `${Math.max(8, height)}%` }}
+              onClick={() => goTo(leg.t0)}
+            >
               <span>{leg.answer ? figure(leg.electrical) : ""}</span>
             </button>
           );

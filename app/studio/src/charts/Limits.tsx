@@ -16,7 +16,9 @@ const FULL = 0.995; // share of a limit that counts as reached
 /** How much of each limit the motion uses. A click goes to the instant where it uses most. */
 export function Limits() {
   const shown = answered.value!;
-  const rows = Object.entries(shown.solution.certificate.worst_ratio).filter(([, share]) => typeof share === "number");
+  const rows = Object.entries(shown.solution.certificate.worst_ratio).filter(
+    ([, share]) => typeof share === "number",
+  );
   return (
     <ol class="bars" id="limits">
       {rows.map(([name, value]) => {
@@ -26,7 +28,10 @@ export function Limits() {
           <>
             <span class="name">{NAMES[name] ?? words(name)}</span>
             <span class="track">
-              <span class={`fill ${share > FULL ? "own" : "other"}`} style={{ width: `${Math.min(100, share * 100)}%` }} />
+              <span
+                class={`fill ${share > FULL ? "own" : "other"}`}
+                style={{ width: `${Math.min(100, share * 100)}%` }}
+              />
             </span>
             <span class="value">{percent(share, 3)}</span>
           </>
@@ -36,7 +41,12 @@ export function Limits() {
             {time === null ? (
               <div class="bar-row">{parts}</div>
             ) : (
-              <button type="button" class="plain bar-row" title={`Worst at ${figure(time)} s`} onClick={() => goTo(time)}>
+              <button
+                type="button"
+                class="plain bar-row"
+                title={`Worst at ${figure(time)} s`}
+                onClick={() => goTo(time)}
+              >
                 {parts}
               </button>
             )}

@@ -10,7 +10,14 @@ import { hatching } from "./plot";
 export function Power() {
   const { t, power } = answered.value!.solution.trajectory;
   const scheme = dark.value;
-  const data = useMemo(() => [t, power, power.map((watts) => Math.min(0, watts)), t.map(() => 0)] as [number[], ...number[][]], [t]);
+  const data = useMemo(
+    () =>
+      [t, power, power.map((watts) => Math.min(0, watts)), t.map(() => 0)] as [
+        number[],
+        ...number[][],
+      ],
+    [t],
+  );
   const series = useMemo(() => {
     const green = style("--good");
     return [
@@ -26,7 +33,10 @@ export function Power() {
       label={`Power from ${figure(least)} to ${figure(most)} W`}
       series={series}
       data={data}
-      options={{ x: [0, Math.max(duration.value, 1e-3)], y: [Math.min(0, least) * 1.08, Math.max(1, most) * 1.08] }}
+      options={{
+        x: [0, Math.max(duration.value, 1e-3)],
+        y: [Math.min(0, least) * 1.08, Math.max(1, most) * 1.08],
+      }}
       clocked
     />
   );

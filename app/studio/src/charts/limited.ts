@@ -22,7 +22,11 @@ export function worstTime(shown: Answered, name: string): number | null {
       ),
     velocity: () => shareOf(v, limits.velocity),
     acceleration: () => shareOf(a, limits.acceleration),
-    jerk: () => shareOf(a.slice(1).map((row, k) => row.map((x, j) => (x - a[k]![j]!) / (t[k + 1]! - t[k]! || 1))), limits.jerk),
+    jerk: () =>
+      shareOf(
+        a.slice(1).map((row, k) => row.map((x, j) => (x - a[k]![j]!) / (t[k + 1]! - t[k]! || 1))),
+        limits.jerk,
+      ),
     torque: () => shareOf(limitedTorque(shown), limits.torque),
   };
   const worst = shares[name]?.().map((row) => Math.max(...row));

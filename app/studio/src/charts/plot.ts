@@ -8,7 +8,8 @@ export const steps = uPlot.paths.stepped!({ align: 1 });
 /** Each joint has a dash beside its colour. */
 export const DASHES = [[], [7, 3], [2, 3], [10, 3, 2, 3], [4, 2], [12, 4], [1, 2]];
 
-const rem = (size: number) => size * parseFloat(getComputedStyle(document.documentElement).fontSize);
+const rem = (size: number) =>
+  size * parseFloat(getComputedStyle(document.documentElement).fontSize);
 
 export interface PlotOptions {
   x: uPlot.Range.MinMax | uPlot.Range.Function;
@@ -19,7 +20,12 @@ export interface PlotOptions {
 }
 
 /** Draws a chart into an element: `series` and columns of `data` as uPlot takes them. */
-export function plot(box: HTMLElement, series: uPlot.Series[], data: uPlot.AlignedData, { x, y, unit = "s", cursor = {}, height = 8.6 }: PlotOptions): uPlot {
+export function plot(
+  box: HTMLElement,
+  series: uPlot.Series[],
+  data: uPlot.AlignedData,
+  { x, y, unit = "s", cursor = {}, height = 8.6 }: PlotOptions,
+): uPlot {
   const grid = { stroke: style("--line"), width: 1 };
   const axis = (extra: uPlot.Axis): uPlot.Axis => ({
     stroke: style("--ink-2"),
@@ -34,7 +40,13 @@ export function plot(box: HTMLElement, series: uPlot.Series[], data: uPlot.Align
       height: rem(height),
       padding: [8, 10, 0, 0],
       scales: { x: { time: false, range: x as uPlot.Range.MinMax }, y: { range: y } },
-      axes: [axis({ size: rem(1.5), values: (_, values) => values.map((value) => `${+value.toFixed(3)} ${unit}`) }), axis({ size: rem(2.9) })],
+      axes: [
+        axis({
+          size: rem(1.5),
+          values: (_, values) => values.map((value) => `${+value.toFixed(3)} ${unit}`),
+        }),
+        axis({ size: rem(2.9) }),
+      ],
       legend: { show: false },
       cursor: { drag: { x: false, y: false }, points: { size: 6 }, ...cursor },
       series: [{}, ...series],

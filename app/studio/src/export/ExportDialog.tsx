@@ -2,53 +2,27 @@ import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
 import { Icon } from "../ui/icons";
-import { Problem, send } from "../store/client";
+import { Problem } from "../store/client";
 import { save } from "../store/share";
-import { answered, project, toast, type Answered } from "../store/state";
+import { answered, project, toast } from "../store/state";
 import { figure } from "../store/units";
 import { energyOf } from "../store/facts";
-import { formatsFor, isText, type Format } from "./formats";
-import { movejProgram } from "./movej";
+import { fileOf, type ExportedFile, type Options } from "./file";
+import { formatsFor, type Format } from "./formats";
 import { Others } from "./Others";
+import { Settings } from "./Settings";
 import { Steps } from "./Steps";
 
 const GROUPS = { robot: "For this", software: "For other software", makers: "For other makers" };
 const MOVEJ: Format = {
   name: "movej",
   title: "Program, plain movej",
-  about: "The found joints, a few lines to edit. The controller chooses way and time; clearance is not proven.",
+  about:
+    "The found joints, a few lines to edit. The controller chooses way and time; clearance is not proven.",
   not: null,
   group: "robot",
 };
 const PAUSE = 400; // after the last change of an option [ms]
-
-interface File_ {
-  name: string;
-  blob: Blob;
-  text: string;
-  notes: string | null;
-}
-
-interface Options {
-  speed: number;
-  output: number | null;
-}
-
-/** A file of the answer in a format. Throws Problem. */
-async function fileOf(shown: Answered, format: string, { speed, output }: Options, signal: AbortSignal): Promise<File_> {
-  if (format === "movej") {
-    const text = movejProgram(shown, speed, output);
-    return { name: `${shown.robot.name}-movej.script`, blob: new Blob([text], { type: "text/plain" }), text, notes: null };
-  }
-  const { solution } = shown;
-  const switched = output !== null && ["urscript", "krl"].includes(format) ? { [format]: { digital_output: output } } : {};
-  const body = { answer: solution.answer ?? solution, speed_scale: speed, ...switched };
-  const response = await send(`export/${format}`, { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" }, signal });
-  const name = /filename="?([^";]+)/.exec(response.headers.get("Content-Disposition") ?? "")?.[1] ?? `motion.${format}`;
-  const blob = await response.blob();
-  const text = isText(format) ? await blob.slice(0, 6000).text() : "A file of arrays.";
-  return { name, blob, text, notes: response.headers.get("Joulepath-Notes") };
-}
 
 /** From the answer to a file: format, speed, outputs, and what to do before it runs. */
 export function ExportDialog({ onClose }: { onClose: () => void }) {
@@ -56,15 +30,25 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
   const [formats, setFormats] = useState<Format[]>([]);
   const [format, setFormat] = useState("");
   const [options, setOptions] = useState<Options>({ speed: 0.1, output: null });
-  const [file, setFile] = useState<File_ | null>(null);
+  const [file, setFile] = useState<ExportedFile | null>(null);
   const [why, setWhy] = useState("");
   useEffect(() => {
     formatsFor(shown.robot).then(
       (all) => {
         const ur = all.some(({ name, not }) => name === "urscript" && !not);
-        const offered = ur ? [all.find(({ name }) => name === "urscript")!, MOVEJ, ...all.filter(({ name }) => name !== "urscript")] : all;
+        const offered = ur
+          ? [
+              all.find(({ name }) => name === "urscript")!,
+              MOVEJ,
+              ...all.filter(({ name }) => name !== "urscript"),
+            ]
+          : all;
         setFormats(offered);
-        setFormat(offered.find(({ not, group }) => !not && group === "robot")?.name ?? offered.find(({ not }) => !not)?.name ?? "");
+        setFormat(
+          offered.find(({ not, group }) => !not && group === "robot")?.name ??
+            offered.find(({ not }) => !not)?.name ??
+            "",
+        );
       },
       (error: Error) => setWhy(error.message),
     );
@@ -75,7 +59,11 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
     setFile(null);
     setWhy("");
     const timer = setTimeout(() => {
-      fileOf(shown, format, options, own.signal).then(setFile, (error: Error) => own.signal.aborted || setWhy(error instanceof Problem ? error.message : String(error)));
+      fileOf(shown, format, options, own.signal).then(
+        setFile,
+        (error: Error) =>
+          own.signal.aborted || setWhy(error instanceof Problem ? error.message : String(error)),
+      );
     }, PAUSE);
     return () => {
       clearTimeout(timer);
@@ -85,11 +73,19 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
   const download = () => {
     if (!file) return;
     save(file.name, file.blob);
-    toast.value = [file.notes, "Set payload, speed and safety limits on the controller before you run it."].filter(Boolean).join("; ");
+    toast.value = [
+      file.notes,
+      "Set payload, speed and safety limits on the controller before you run it.",
+    ]
+      .filter(Boolean)
+      .join("; ");
   };
   const footer = (
     <>
-      <span class="chip warn"><Icon name="alert" />Never run on hardware by us</span>
+      <span class="chip warn">
+        <Icon name="alert" />
+        Never run on hardware by us
+      </span>
       <span class="space" />
       <Button onClick={onClose}>Cancel</Button>
       <Button kind="primary" icon="download" id="download" disabled={!file} onClick={download}>
@@ -97,23 +93,44 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
       </Button>
     </>
   );
-  const title = <>Export <small>{project.value.name} · {figure(energyOf(shown))} J · {figure(shown.solution.duration)} s</small></>;
+  const title = (
+    <>
+      Export{" "}
+      <small>
+        {project.value.name} · {figure(energyOf(shown))} J · {figure(shown.solution.duration)} s
+      </small>
+    </>
+  );
   return (
     <Dialog title={title} onClose={onClose} wide footer={footer}>
       <div class="export">
         <div class="formats" role="radiogroup" aria-label="Format">
           {(Object.keys(GROUPS) as (keyof typeof GROUPS)[]).map((group) => {
             const own = formats.filter((each) => each.group === group);
-            return own.length > 0 && (
-              <div key={group}>
-                <h3>{GROUPS[group]}{group === "robot" ? ` ${shown.robot.title}` : ""}</h3>
-                {own.map((each) => (
-                  <button type="button" role="radio" key={each.name} data-format={each.name} class="choice" aria-checked={each.name === format} disabled={Boolean(each.not)} onClick={() => setFormat(each.name)}>
-                    <b>{each.title}</b>
-                    <small>{each.not ?? each.about}</small>
-                  </button>
-                ))}
-              </div>
+            return (
+              own.length > 0 && (
+                <div key={group}>
+                  <h3>
+                    {GROUPS[group]}
+                    {group === "robot" ? ` ${shown.robot.title}` : ""}
+                  </h3>
+                  {own.map((each) => (
+                    <button
+                      type="button"
+                      role="radio"
+                      key={each.name}
+                      data-format={each.name}
+                      class="choice"
+                      aria-checked={each.name === format}
+                      disabled={Boolean(each.not)}
+                      onClick={() => setFormat(each.name)}
+                    >
+                      <b>{each.title}</b>
+                      <small>{each.not ?? each.about}</small>
+                    </button>
+                  ))}
+                </div>
+              )
             );
           })}
           <h3>Also here</h3>
@@ -121,41 +138,36 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
         </div>
         <div class="export-file">
           <Settings format={format} options={options} onChange={setOptions} shown={shown} />
-          <h3>File <small>{file ? `${file.name}, ${figure(file.blob.size / 1000)} kB` : why ? "" : "…"}</small>
-            {file && <Button kind="link" icon="copy" onClick={() => void file.blob.text().then((text) => navigator.clipboard?.writeText(text))}>Copy</Button>}
+          <h3>
+            File{" "}
+            <small>
+              {file ? `${file.name}, ${figure(file.blob.size / 1000)} kB` : why ? "" : "…"}
+            </small>
+            {file && (
+              <Button
+                kind="link"
+                icon="copy"
+                onClick={() =>
+                  void file.blob.text().then((text) => navigator.clipboard?.writeText(text))
+                }
+              >
+                Copy
+              </Button>
+            )}
           </h3>
-          {why && <p class="error" role="alert" id="export-error">{why}</p>}
-          {file && <pre id="preview" tabIndex={0} aria-label="Begin of the file">{file.text}</pre>}
+          {why && (
+            <p class="error" role="alert" id="export-error">
+              {why}
+            </p>
+          )}
+          {file && (
+            <pre id="preview" tabIndex={0} aria-label="Begin of the file">
+              {file.text}
+            </pre>
+          )}
           <Steps shown={shown} speed={options.speed} format={format} />
         </div>
       </div>
     </Dialog>
-  );
-}
-
-function Settings({ format, options, onChange, shown }: { format: string; options: Options; onChange: (next: Options) => void; shown: Answered }) {
-  const switches = ["urscript", "krl", "movej"].includes(format);
-  const { duration } = shown.solution;
-  const resting = shown.cycle?.legs.filter(({ answer }) => !answer).reduce((sum, leg) => sum + leg.duration, 0) ?? 0;
-  return (
-    <>
-      <h3>Speed</h3>
-      <label class="row">
-        <input type="range" id="export-speed" min={1} max={100} step={1} value={options.speed * 100} aria-label="Speed in %" onInput={(event) => onChange({ ...options, speed: Number(event.currentTarget.value) / 100 })} />
-        <output>{Math.round(options.speed * 100)} %</output>
-      </label>
-      <p class="hint">
-        {format === "movej" ? "Share of the controller’s default speed." : `${figure((duration - resting) / options.speed + resting)} s. The limits are proven again at this speed.`} First 10 %, then 30, 60, 100.
-      </p>
-      {switches && (
-        <label class="row">
-          <b>Gripper</b>
-          <select aria-label="Gripper output" value={options.output ?? ""} onChange={(event) => onChange({ ...options, output: event.currentTarget.value === "" ? null : Number(event.currentTarget.value) })}>
-            <option value="">no output is switched</option>
-            {[0, 1, 2, 3, 4, 5, 6, 7].map((each) => <option key={each} value={each}>DO {each} on from each grasp to the release</option>)}
-          </select>
-        </label>
-      )}
-    </>
   );
 }

@@ -18,15 +18,33 @@ export function Others() {
   const files: [string, () => Promise<void> | void, boolean][] = [
     ["Answer (JSON)", () => save("answer.json", json(whole), "application/json"), true],
     ["Samples (CSV)", () => save("motion.csv", csvOf(solution.trajectory), "text/csv"), true],
-    ["Picture (PNG)", async () => save("motion.png", (await picture.value?.picture()) ?? new Blob()), true],
+    [
+      "Picture (PNG)",
+      async () => save("motion.png", (await picture.value?.picture()) ?? new Blob()),
+      true,
+    ],
     ["Request (JSON)", () => save("request.json", json(asked), "application/json"), true],
-    ["Page that stands alone (HTML)", async () => save("motion.html", await standalone(shown), "text/html"), false],
-    ["Robot (URDF)", async () => save(`${robot.name}.urdf`, await (await send(`robots/${robot.name}/urdf`, {})).blob()), false],
+    [
+      "Page that stands alone (HTML)",
+      async () => save("motion.html", await standalone(shown), "text/html"),
+      false,
+    ],
+    [
+      "Robot (URDF)",
+      async () =>
+        save(`${robot.name}.urdf`, await (await send(`robots/${robot.name}/urdf`, {})).blob()),
+      false,
+    ],
   ];
   return (
     <div class="others">
       {files
-        .filter(([name, , here]) => (here || !alone) && (name !== "Picture (PNG)" || picture.value) && (name !== "Request (JSON)" || asked))
+        .filter(
+          ([name, , here]) =>
+            (here || !alone) &&
+            (name !== "Picture (PNG)" || picture.value) &&
+            (name !== "Request (JSON)" || asked),
+        )
         .map(([name, give]) => (
           <Button key={name} kind="link" onClick={trying(async () => give())}>
             {name}

@@ -12,7 +12,10 @@ export interface Format {
 }
 
 const TITLES: Record<string, [title: string, about: string]> = {
-  urscript: ["Program, the exact motion", "Follows the answer by servoj. The joules are those of this motion."],
+  urscript: [
+    "Program, the exact motion",
+    "Follows the answer by servoj. The joules are those of this motion.",
+  ],
   rapid: ["RAPID module", "Points that an ABB controller moves through."],
   krl: ["KRL program", "Points that a KUKA controller moves through."],
   franka: ["Franka", "A table or a motion generator for libfranka."],
@@ -35,13 +38,21 @@ export const isText = (name: string) => name !== "npz";
 /** All formats of the service, for a robot. Throws Problem. */
 export async function formatsFor(robot: Robot): Promise<Format[]> {
   const { paths, components } = await openapi();
-  const parameter = paths["/export/{format}"]?.post?.parameters?.find(({ name }) => name === "format");
+  const parameter = paths["/export/{format}"]?.post?.parameters?.find(
+    ({ name }) => name === "format",
+  );
   const reference = parameter?.schema.$ref as string | undefined;
   const schema = reference ? components.schemas[reference.split("/").at(-1)!] : parameter?.schema;
   return ((schema?.enum ?? []) as string[]).map((name): Format => {
     const [title, about] = TITLES[name] ?? [name, ""];
     const maker = MAKERS[name];
     const fits = !maker || maker[0].test(robot.title);
-    return { name, title, about, not: fits ? null : `Not for a ${robot.title}.`, group: fits ? (maker ? "robot" : "software") : "makers" };
+    return {
+      name,
+      title,
+      about,
+      not: fits ? null : `Not for a ${robot.title}.`,
+      group: fits ? (maker ? "robot" : "software") : "makers",
+    };
   });
 }

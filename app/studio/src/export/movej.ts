@@ -19,9 +19,14 @@ function stopsOf({ solution, cycle, cell }: Answered): Stop[] {
   const { start, goal } = solution.branch;
   if (!cycle) {
     const load = cell.payload ?? null;
-    return [{ name: "start", q: start.q, load, dwell: 0 }, { name: "goal", q: goal.q, load, dwell: 0 }];
+    return [
+      { name: "start", q: start.q, load, dwell: 0 },
+      { name: "goal", q: goal.q, load, dwell: 0 },
+    ];
   }
-  const stops: Stop[] = [{ name: "start", q: start.q, load: cycle.loads[0]?.payload ?? null, dwell: 0 }];
+  const stops: Stop[] = [
+    { name: "start", q: start.q, load: cycle.loads[0]?.payload ?? null, dwell: 0 },
+  ];
   cycle.legs.forEach(({ kind, goal: to, duration }, k) => {
     const load = cycle.loads[k + 1]?.payload ?? cycle.loads[k]?.payload ?? null;
     if (kind === "dwell" || kind === "wait") stops.at(-1)!.dwell += duration;
@@ -30,7 +35,10 @@ function stopsOf({ solution, cycle, cell }: Answered): Stop[] {
   return stops;
 }
 
-/** The text of a URScript program; `output`: a digital output that is on while the arm carries something more. */
+/**
+ * The text of a URScript program; `output`: a digital output that is on while the arm carries
+ * something more.
+ */
 export function movejProgram(shown: Answered, speed: number, output: number | null): string {
   const stops = stopsOf(shown);
   const [a, v] = [number(1.4 * speed * speed), number(1.05 * speed)];
@@ -38,9 +46,18 @@ export function movejProgram(shown: Answered, speed: number, output: number | nu
   const lines = stops.flatMap(({ name, q, load, dwell }, k) => {
     const before = k ? (stops[k - 1]!.load?.mass ?? 0) : base;
     const mass = load?.mass ?? 0;
-    const grip = output === null || mass === before ? [] : [`  set_standard_digital_out(${output}, ${mass > base ? "True" : "False"})`];
+    const grip =
+      output === null || mass === before
+        ? []
+        : [`  set_standard_digital_out(${output}, ${mass > base ? "True" : "False"})`];
     const loaded = mass === before && k ? [] : [payload(load)];
-    return [`  # ${name}`, `  movej(${joints(q)}, a=${a}, v=${v})`, ...grip, ...(dwell ? [`  sleep(${number(dwell)})`] : []), ...loaded];
+    return [
+      `  # ${name}`,
+      `  movej(${joints(q)}, a=${a}, v=${v})`,
+      ...grip,
+      ...(dwell ? [`  sleep(${number(dwell)})`] : []),
+      ...loaded,
+    ];
   });
   return [
     "# The found joints; the controller chooses the way and the time between them.",

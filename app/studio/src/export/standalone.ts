@@ -1,4 +1,5 @@
-// One answer as a single HTML file that needs no service: the page itself, with its scripts and the answer inside.
+// One answer as a single HTML file that needs no service: the page itself, with its scripts and the
+// answer inside.
 import { EMBEDDED, type Embedded } from "../store/alone";
 import { send } from "../store/client";
 import { meshFileOf } from "../store/service";
@@ -17,8 +18,15 @@ export async function standalone(shown: Answered): Promise<string> {
   const page = new DOMParser().parseFromString(await text("studio"), "text/html");
   const main = page.querySelector("script[type=module]")!.getAttribute("src")!;
   const modules = await gathered(new URL(main, location.href).href);
-  const styles = await Promise.all([...page.querySelectorAll("link[rel=stylesheet]")].map((link) => styleOf(link.getAttribute("href")!)));
-  for (const node of page.querySelectorAll("link[rel=stylesheet], link[rel=modulepreload], head script, noscript")) node.remove();
+  const styles = await Promise.all(
+    [...page.querySelectorAll("link[rel=stylesheet]")].map((link) =>
+      styleOf(link.getAttribute("href")!),
+    ),
+  );
+  for (const node of page.querySelectorAll(
+    "link[rel=stylesheet], link[rel=modulepreload], head script, noscript",
+  ))
+    node.remove();
   const file = shown.robot.has_meshes ? await meshFileOf(shown.robot.name).catch(() => null) : null;
   const solution = { ...shown.solution, answer: null, candidates: [] };
   const data: Embedded = { answered: { ...shown, solution }, meshes: file && base64(file) };

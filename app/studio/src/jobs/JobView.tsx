@@ -18,26 +18,57 @@ export function JobView({ shown }: { shown: Opened }) {
   const { job, rows, notes } = shown;
   const total = rows.length;
   const { counts } = job;
-  const filters: [Filter, string, number][] = [["all", "All", total], ["done", "Done", counts.done], ["failed", "Failed", counts.failed], ["waiting", "Waiting", counts.waiting]];
+  const filters: [Filter, string, number][] = [
+    ["all", "All", total],
+    ["done", "Done", counts.done],
+    ["failed", "Failed", counts.failed],
+    ["waiting", "Waiting", counts.waiting],
+  ];
   const listed = rows.filter(({ state }) => filter === "all" || state === filter);
-  const act = (path: string) => trying(async () => {
-    await post(`jobs/${job.id}/${path}`, {});
-    await loadJob(job.id);
-  });
+  const act = (path: string) =>
+    trying(async () => {
+      await post(`jobs/${job.id}/${path}`, {});
+      await loadJob(job.id);
+    });
   return (
     <>
       <header class="page-head">
         <div>
           <h2>{job.name ?? job.id.slice(0, 8)}</h2>
-          <p class="hint">{notes ? `${notes.source} · ` : ""}{job.state}</p>
+          <p class="hint">
+            {notes ? `${notes.source} · ` : ""}
+            {job.state}
+          </p>
         </div>
         <span class="space" />
-        <Button icon="file" id="job-csv" onClick={() => save(`${(job.name ?? "job").replace(/[^\w-]+/g, "-").toLowerCase()}.csv`, csvOfJob(shown), "text/csv")}>CSV</Button>
-        {counts.failed > 0 && isOver(job) && <Button icon="refresh" onClick={act("retry")}>Retry {counts.failed} failed</Button>}
-        {!isOver(job) && <Button icon="close" onClick={act("cancel")}>Cancel</Button>}
+        <Button
+          icon="file"
+          id="job-csv"
+          onClick={() =>
+            save(
+              `${(job.name ?? "job").replace(/[^\w-]+/g, "-").toLowerCase()}.csv`,
+              csvOfJob(shown),
+              "text/csv",
+            )
+          }
+        >
+          CSV
+        </Button>
+        {counts.failed > 0 && isOver(job) && (
+          <Button icon="refresh" onClick={act("retry")}>
+            Retry {counts.failed} failed
+          </Button>
+        )}
+        {!isOver(job) && (
+          <Button icon="close" onClick={act("cancel")}>
+            Cancel
+          </Button>
+        )}
       </header>
       <div class="row">
-        <b id="job-progress">{counts.done + counts.failed + counts.cancelled} of {total} moves</b>
+        <b id="job-progress">
+          {counts.done + counts.failed + counts.cancelled} of {total} moves
+        </b>
         <span class="space" />
         {!isOver(job) && <b>{job.eta === null ? "" : `about ${figure(job.eta, 2)} s left`}</b>}
       </div>
@@ -46,24 +77,48 @@ export function JobView({ shown }: { shown: Opened }) {
       <Totals shown={shown} />
       <div class="row" role="group" aria-label="Rows shown">
         {filters.map(([value, text, count]) => (
-          <button type="button" class="chip-button" key={value} aria-pressed={filter === value} onClick={() => setFilter(value)}>
+          <button
+            type="button"
+            class="chip-button"
+            key={value}
+            aria-pressed={filter === value}
+            onClick={() => setFilter(value)}
+          >
             {text} {count}
           </button>
         ))}
         <span class="space" />
-        {counts.done > 0 && !shown.details && <Button small onClick={trying(() => loadDetails(job.id))}>Intervals and savings</Button>}
+        {counts.done > 0 && !shown.details && (
+          <Button small onClick={trying(() => loadDetails(job.id))}>
+            Intervals and savings
+          </Button>
+        )}
       </div>
       <div class="scroll" role="region" aria-label="Moves" tabIndex={0}>
         <table class="moves" id="moves">
           <thead>
             <tr>
-              {["no.", "from", "to", "kg", "s", "J", "likely", "nearest usual way", "saves"].map((name, k) => <th scope="col" key={name} class={k > 2 ? "number" : undefined}>{name}</th>)}
+              {["no.", "from", "to", "kg", "s", "J", "likely", "nearest usual way", "saves"].map(
+                (name, k) => (
+                  <th scope="col" key={name} class={k > 2 ? "number" : undefined}>
+                    {name}
+                  </th>
+                ),
+              )}
             </tr>
           </thead>
-          <tbody>{listed.slice(0, MOST_ROWS).map((row) => <MoveRow key={row.index} row={row} shown={shown} />)}</tbody>
+          <tbody>
+            {listed.slice(0, MOST_ROWS).map((row) => (
+              <MoveRow key={row.index} row={row} shown={shown} />
+            ))}
+          </tbody>
         </table>
       </div>
-      {listed.length > MOST_ROWS && <p class="hint">{MOST_ROWS} of {listed.length} are listed; the CSV has all.</p>}
+      {listed.length > MOST_ROWS && (
+        <p class="hint">
+          {MOST_ROWS} of {listed.length} are listed; the CSV has all.
+        </p>
+      )}
     </>
   );
 }
@@ -72,14 +127,29 @@ function Totals({ shown: { rows, details } }: { shown: Opened }) {
   const done = rows.filter(({ energy }) => energy !== null);
   const sum = (key: "energy" | "duration") => done.reduce((all, row) => all + (row[key] ?? 0), 0);
   const compared = [...(details?.values() ?? [])].filter(({ rivalEnergy }) => rivalEnergy !== null);
-  const ours = done.filter((row) => details?.get(row.index)?.rivalEnergy != null).reduce((all, row) => all + row.energy!, 0);
+  const ours = done
+    .filter((row) => details?.get(row.index)?.rivalEnergy != null)
+    .reduce((all, row) => all + row.energy!, 0);
   const theirs = compared.reduce((all, each) => all + each.rivalEnergy!, 0);
   const joules = sum("energy");
   return (
     <dl class="facts wide" id="job-totals">
-      <div><dt>in {done.length} moves</dt><dd class="good">{joules >= 1e4 ? `${figure(joules / 1000)} kJ` : `${figure(joules)} J`}</dd></div>
-      <div><dt>of motion</dt><dd>{figure(sum("duration"))} s</dd></div>
-      {compared.length > 0 && <div><dt>less than the nearest usual way, in {compared.length} moves</dt><dd>{percent(1 - ours / theirs)}</dd></div>}
+      <div>
+        <dt>in {done.length} moves</dt>
+        <dd class="good">
+          {joules >= 1e4 ? `${figure(joules / 1000)} kJ` : `${figure(joules)} J`}
+        </dd>
+      </div>
+      <div>
+        <dt>of motion</dt>
+        <dd>{figure(sum("duration"))} s</dd>
+      </div>
+      {compared.length > 0 && (
+        <div>
+          <dt>less than the nearest usual way, in {compared.length} moves</dt>
+          <dd>{percent(1 - ours / theirs)}</dd>
+        </div>
+      )}
     </dl>
   );
 }
@@ -90,11 +160,24 @@ function MoveRow({ row, shown }: { row: JobRow; shown: Opened }) {
   const asked = shown.notes?.requests[row.index];
   const detail = shown.details?.get(row.index);
   const name = to ? `${from} to ${to}` : from;
-  const open = () => (row.answer ? openKept(row.answer) : asked ? openCell({ request: asked }, name) : Promise.resolve());
+  const open = () =>
+    row.answer
+      ? openKept(row.answer)
+      : asked
+        ? openCell({ request: asked }, name)
+        : Promise.resolve();
   const head = (
     <>
       <td>{row.index + 1}</td>
-      <th scope="row">{(row.answer || asked) ? <button type="button" class="plain" title="Open in the cell" onClick={trying(open)}>{from}</button> : from}</th>
+      <th scope="row">
+        {row.answer || asked ? (
+          <button type="button" class="plain" title="Open in the cell" onClick={trying(open)}>
+            {from}
+          </button>
+        ) : (
+          from
+        )}
+      </th>
       <td>{to}</td>
       <td class="number">{mass ? figure(mass) : "–"}</td>
     </>
@@ -103,17 +186,34 @@ function MoveRow({ row, shown }: { row: JobRow; shown: Opened }) {
     return (
       <tr class="failed">
         {head}
-        <td colSpan={5}>{row.problem.detail ?? row.problem.title} {asked && <Button kind="link" onClick={trying(open)}>Open in cell</Button>}</td>
+        <td colSpan={5}>
+          {row.problem.detail ?? row.problem.title}{" "}
+          {asked && (
+            <Button kind="link" onClick={trying(open)}>
+              Open in cell
+            </Button>
+          )}
+        </td>
       </tr>
     );
   return (
     <tr class={row.state}>
       {head}
       <td class="number">{row.energy === null ? row.state : figure(row.duration)}</td>
-      <td class="number"><b>{row.energy === null ? "" : figure(row.energy)}</b></td>
-      <td class="number">{detail?.interval ? `${figure(detail.interval.p5, 2)} to ${figure(detail.interval.p95, 2)}` : ""}</td>
-      <td class="number" title={detail?.rival ? baselineName(detail.rival) : undefined}>{detail ? figure(detail.rivalEnergy) : ""}</td>
-      <td class="number">{detail ? (detail.saving === null ? "–" : percent(detail.saving)) : ""}</td>
+      <td class="number">
+        <b>{row.energy === null ? "" : figure(row.energy)}</b>
+      </td>
+      <td class="number">
+        {detail?.interval
+          ? `${figure(detail.interval.p5, 2)} to ${figure(detail.interval.p95, 2)}`
+          : ""}
+      </td>
+      <td class="number" title={detail?.rival ? baselineName(detail.rival) : undefined}>
+        {detail ? figure(detail.rivalEnergy) : ""}
+      </td>
+      <td class="number">
+        {detail ? (detail.saving === null ? "–" : percent(detail.saving)) : ""}
+      </td>
     </tr>
   );
 }

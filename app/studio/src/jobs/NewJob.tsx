@@ -54,29 +54,93 @@ export function NewJob({ onClose }: { onClose: () => void }) {
       title="New job"
       wide
       onClose={onClose}
-      footer={<><span class="hint">In the cell “{project.value.name}”: {robotName(request.value)}, {request.value.scene?.obstacles?.length ?? 0} obstacles.</span><span class="space" /><Button onClick={onClose}>Cancel</Button><Button kind="primary" id="start-job" disabled={!reading || !moves.length || busy} onClick={start}>Start {moves.length || ""} moves</Button></>}
+      footer={
+        <>
+          <span class="hint">
+            In the cell “{project.value.name}”: {robotName(request.value)},{" "}
+            {request.value.scene?.obstacles?.length ?? 0} obstacles.
+          </span>
+          <span class="space" />
+          <Button onClick={onClose}>Cancel</Button>
+          <Button
+            kind="primary"
+            id="start-job"
+            disabled={!reading || !moves.length || busy}
+            onClick={start}
+          >
+            Start {moves.length || ""} moves
+          </Button>
+        </>
+      }
     >
       <div class="fields">
-        <label>Name <input type="text" value={name} onChange={(event) => setName(event.currentTarget.value)} /></label>
-        <label>A CSV file <input type="file" id="moves-file" accept=".csv,.txt,.tsv" onChange={(event) => void take(event.currentTarget.files?.[0])} /></label>
+        <label>
+          Name{" "}
+          <input
+            type="text"
+            value={name}
+            onChange={(event) => setName(event.currentTarget.value)}
+          />
+        </label>
+        <label>
+          A CSV file{" "}
+          <input
+            type="file"
+            id="moves-file"
+            accept=".csv,.txt,.tsv"
+            onChange={(event) => void take(event.currentTarget.files?.[0])}
+          />
+        </label>
         <label>
           or paste: one move in a row
-          <textarea id="moves-text" rows={9} spellcheck={false} placeholder={SAMPLE} value={text} onInput={(event) => { setText(event.currentTarget.value); setChosen(-1); }} />
+          <textarea
+            id="moves-text"
+            rows={9}
+            spellcheck={false}
+            placeholder={SAMPLE}
+            value={text}
+            onInput={(event) => {
+              setText(event.currentTarget.value);
+              setChosen(-1);
+            }}
+          />
         </label>
-        <p class="hint">Names and kg may be left out. Joint positions may stand in place of poses; with one target in a row, the moves go from each to the next.</p>
-        {read && "why" in read && <p class="error" role="alert">{read.why}</p>}
-        {why && <p class="error" role="alert" id="job-error">{why}</p>}
+        <p class="hint">
+          Names and kg may be left out. Joint positions may stand in place of poses; with one target
+          in a row, the moves go from each to the next.
+        </p>
+        {read && "why" in read && (
+          <p class="error" role="alert">
+            {read.why}
+          </p>
+        )}
+        {why && (
+          <p class="error" role="alert" id="job-error">
+            {why}
+          </p>
+        )}
         {readings.length > 1 && (
           <div class="row" id="job-readings">
             <b>How is it meant?</b>
-            {readings.map(({ echo }, k) => <Button key={echo} small pressed={k === chosen} onClick={() => setChosen(k)}>{echo}</Button>)}
+            {readings.map(({ echo }, k) => (
+              <Button key={echo} small pressed={k === chosen} onClick={() => setChosen(k)}>
+                {echo}
+              </Button>
+            ))}
           </div>
         )}
         {reading && moves.length > 0 && (
           <>
-            <p>{moves.length} moves, read as {reading.echo}.</p>
+            <p>
+              {moves.length} moves, read as {reading.echo}.
+            </p>
             <ul class="hint">
-              {moves.slice(0, SHOWN).map(({ from, to, mass }, k) => <li key={k}>{from} → {to}{mass === null ? "" : `, ${figure(mass)} kg`}</li>)}
+              {moves.slice(0, SHOWN).map(({ from, to, mass }, k) => (
+                <li key={k}>
+                  {from} → {to}
+                  {mass === null ? "" : `, ${figure(mass)} kg`}
+                </li>
+              ))}
             </ul>
           </>
         )}

@@ -56,15 +56,24 @@ export async function loadJob(id: string): Promise<void> {
   let job: (Job & { requests: JobRow[]; next: number | null }) | null = null;
   let after = -1;
   do {
-    job = await get<Job & { requests: JobRow[]; next: number | null }>(`jobs/${id}?limit=${PAGE}&after=${after}`);
+    job = await get<Job & { requests: JobRow[]; next: number | null }>(
+      `jobs/${id}?limit=${PAGE}&after=${after}`,
+    );
     rows.push(...job.requests);
     after = job.next ?? -1;
   } while (after >= 0);
   const before = opened.value?.job.id === id ? opened.value : null;
-  opened.value = { job, rows, notes: before?.notes ?? (await jobNotes(id)) ?? null, details: before?.details ?? null };
+  opened.value = {
+    job,
+    rows,
+    notes: before?.notes ?? (await jobNotes(id)) ?? null,
+    details: before?.details ?? null,
+  };
 }
 
-/** Reads the whole answers of a job, one after the other, for intervals and savings. Throws Problem. */
+/**
+ * Reads the whole answers of a job, one after the other, for intervals and savings. Throws Problem.
+ */
 export async function loadDetails(id: string): Promise<void> {
   const response = await send(`jobs/${id}/results`, {});
   const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
@@ -74,15 +83,23 @@ export async function loadDetails(id: string): Promise<void> {
     text += part.value;
     const lines = text.split("\n");
     text = lines.pop() ?? "";
-    for (const line of lines) if (line) keep(details, JSON.parse(line) as { index: number; result: Partial<Solution> | null });
+    for (const line of lines)
+      if (line)
+        keep(details, JSON.parse(line) as { index: number; result: Partial<Solution> | null });
   }
-  if (text.trim()) keep(details, JSON.parse(text) as { index: number; result: Partial<Solution> | null });
+  if (text.trim())
+    keep(details, JSON.parse(text) as { index: number; result: Partial<Solution> | null });
   if (opened.value?.job.id === id) opened.value = { ...opened.value, details };
 }
 
-function keep(details: Map<number, Detail>, { index, result }: { index: number; result: Partial<Solution> | null }): void {
+function keep(
+  details: Map<number, Detail>,
+  { index, result }: { index: number; result: Partial<Solution> | null },
+): void {
   if (!result?.energy) return;
-  const kept = (result.baselines ?? []).filter((each) => each.within_limits && each.saving !== null);
+  const kept = (result.baselines ?? []).filter(
+    (each) => each.within_limits && each.saving !== null,
+  );
   // the nearest of the ways that keep every limit
   const [rival] = kept.sort((a, b) => a.electrical - b.electrical);
   details.set(index, {
@@ -105,12 +122,49 @@ export function csvOfJob(shown: Opened): string {
     const text = value === null || value === undefined ? "" : String(value);
     return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
   };
-  const head = ["no", "from", "to", "kg", "state", "duration_s", "energy_J", "p5_J", "p95_J", "rival", "rival_J", "saving", "problem", "answer"];
+  const head = [
+    "no",
+    "from",
+    "to",
+    "kg",
+    "state",
+    "duration_s",
+    "energy_J",
+    "p5_J",
+    "p95_J",
+    "rival",
+    "rival_J",
+    "saving",
+    "problem",
+    "answer",
+  ];
   const lines = shown.rows.map((row) => {
     const [from, to] = namesOf(shown, row.index);
     const detail = shown.details?.get(row.index);
-    const { interval, rival, rivalEnergy, saving } = detail ?? { interval: null, rival: null, rivalEnergy: null, saving: null };
-    return [row.index + 1, from, to, shown.notes?.moves[row.index]?.mass, row.state, row.duration, row.energy, interval?.p5, interval?.p95, rival, rivalEnergy, saving, row.problem?.detail, row.answer].map(quoted).join(",");
+    const { interval, rival, rivalEnergy, saving } = detail ?? {
+      interval: null,
+      rival: null,
+      rivalEnergy: null,
+      saving: null,
+    };
+    return [
+      row.index + 1,
+      from,
+      to,
+      shown.notes?.moves[row.index]?.mass,
+      row.state,
+      row.duration,
+      row.energy,
+      interval?.p5,
+      interval?.p95,
+      rival,
+      rivalEnergy,
+      saving,
+      row.problem?.detail,
+      row.answer,
+    ]
+      .map(quoted)
+      .join(",");
   });
   return [head.join(","), ...lines, ""].join("\n");
 }

@@ -43,7 +43,9 @@ export function LibraryPage() {
   const [next, setNext] = useState<string | null>(null);
   const [filter, setFilter] = useState("");
   const load = async (after?: string) => {
-    const page = await get<{ answers: Kept[]; next: string | null }>(`answers?limit=${MOST}${after ? `&after=${after}` : ""}`);
+    const page = await get<{ answers: Kept[]; next: string | null }>(
+      `answers?limit=${MOST}${after ? `&after=${after}` : ""}`,
+    );
     const own = page.answers.filter(({ kind }) => !OF_LOGS.includes(kind));
     setAnswers((before) => (after ? [...before, ...own] : own));
     setNext(page.next);
@@ -56,22 +58,45 @@ export function LibraryPage() {
     await remove(`answers/${id}`);
     setAnswers((before) => before.filter((each) => each.id !== id));
   };
-  const shown = answers.filter((each) => `${textOf(each)} ${each.id}`.toLowerCase().includes(filter.toLowerCase()));
+  const shown = answers.filter((each) =>
+    `${textOf(each)} ${each.id}`.toLowerCase().includes(filter.toLowerCase()),
+  );
   return (
     <main class="page" id="library">
-      {trouble.value && <p class="error" role="alert" id="problem">{trouble.value.text}</p>}
+      {trouble.value && (
+        <p class="error" role="alert" id="problem">
+          {trouble.value.text}
+        </p>
+      )}
       <div class="columns">
         <section aria-label="Answers">
           <h2>Answers</h2>
-          <input type="search" class="search" aria-label="Search answers" placeholder="Search" value={filter} onInput={(event) => setFilter(event.currentTarget.value)} />
+          <input
+            type="search"
+            class="search"
+            aria-label="Search answers"
+            placeholder="Search"
+            value={filter}
+            onInput={(event) => setFilter(event.currentTarget.value)}
+          />
           <ul class="kept" id="answers">
             {shown.map((each) => (
               <li key={each.id}>
-                <button type="button" class="choice" disabled={!OPENED.includes(each.kind)} onClick={trying(() => openKept(each.id))}>
+                <button
+                  type="button"
+                  class="choice"
+                  disabled={!OPENED.includes(each.kind)}
+                  onClick={trying(() => openKept(each.id))}
+                >
                   <b>{textOf(each)}</b>
                   <small>{when(each.created)}</small>
                 </button>
-                <Button kind="quiet" icon="trash" label={`Delete the answer of ${when(each.created)}`} onClick={trying(() => drop(each.id))} />
+                <Button
+                  kind="quiet"
+                  icon="trash"
+                  label={`Delete the answer of ${when(each.created)}`}
+                  onClick={trying(() => drop(each.id))}
+                />
               </li>
             ))}
           </ul>
@@ -89,20 +114,35 @@ function Studies() {
   const [all, setAll] = useState<Study[]>([]);
   const [opened, setOpened] = useState<{ name: string; rows: Iteration[] } | null>(null);
   useEffect(() => {
-    get<{ studies: Study[] }>(`studies?limit=${MOST}`).then(({ studies }) => setAll(studies), (error) => tell(error));
+    get<{ studies: Study[] }>(`studies?limit=${MOST}`).then(
+      ({ studies }) => setAll(studies),
+      (error) => tell(error),
+    );
   }, []);
-  const open = async ({ id, name }: Study) => setOpened({ name, rows: (await get<{ history: Iteration[] }>(`studies/${id}`)).history });
-  const title = ({ number, kind, energy }: Iteration) => `${number}: ${kind ?? ""} ${energy == null ? "no energy" : `${figure(energy)} J`}`;
+  const open = async ({ id, name }: Study) =>
+    setOpened({ name, rows: (await get<{ history: Iteration[] }>(`studies/${id}`)).history });
+  const title = ({ number, kind, energy }: Iteration) =>
+    `${number}: ${kind ?? ""} ${energy == null ? "no energy" : `${figure(energy)} J`}`;
   return (
     <section aria-label="Studies">
       <h2>Studies</h2>
       {opened ? (
         <>
-          <Button small onClick={() => setOpened(null)}>← all</Button>
+          <Button small onClick={() => setOpened(null)}>
+            ← all
+          </Button>
           <ul class="kept" id="iterations">
             {opened.rows.slice(0, MOST).map((row) => (
               <li key={row.number}>
-                <button type="button" class="choice" disabled={!row.answer} onClick={trying(() => openKept(row.answer!))}><b>{title(row)}</b><small>{row.answer ? opened.name : "no kept answer"}</small></button>
+                <button
+                  type="button"
+                  class="choice"
+                  disabled={!row.answer}
+                  onClick={trying(() => openKept(row.answer!))}
+                >
+                  <b>{title(row)}</b>
+                  <small>{row.answer ? opened.name : "no kept answer"}</small>
+                </button>
               </li>
             ))}
           </ul>
@@ -111,7 +151,12 @@ function Studies() {
         <ul class="kept" id="studies">
           {all.map((study) => (
             <li key={study.id}>
-              <button type="button" class="choice" onClick={trying(() => open(study))}><b>{study.name}</b><small>{study.iterations} iterations · {when(study.created)}</small></button>
+              <button type="button" class="choice" onClick={trying(() => open(study))}>
+                <b>{study.name}</b>
+                <small>
+                  {study.iterations} iterations · {when(study.created)}
+                </small>
+              </button>
             </li>
           ))}
         </ul>
@@ -139,8 +184,16 @@ function OwnRobots() {
       <ul class="kept">
         {all.map(({ name, title }) => (
           <li key={name}>
-            <span class="choice"><b>{title}</b><small>{name}</small></span>
-            <Button kind="quiet" icon="trash" label={`Delete ${name}`} onClick={trying(() => drop(name))} />
+            <span class="choice">
+              <b>{title}</b>
+              <small>{name}</small>
+            </span>
+            <Button
+              kind="quiet"
+              icon="trash"
+              label={`Delete ${name}`}
+              onClick={trying(() => drop(name))}
+            />
           </li>
         ))}
       </ul>

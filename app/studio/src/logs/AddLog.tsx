@@ -9,46 +9,108 @@ import { addLog, chosen, openedIdentification, openedLog } from "./model";
 
 /** How a file is to be read. */
 export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
-  const [settings, setSettings] = useState({ name: file.name.slice(0, 80), robot: robotName(request.value), units: "rad", current_units: "A", effort: "auto", mass: "", columns: "" });
+  const [settings, setSettings] = useState({
+    name: file.name.slice(0, 80),
+    robot: robotName(request.value),
+    units: "rad",
+    current_units: "A",
+    effort: "auto",
+    mass: "",
+    columns: "",
+  });
   const [why, setWhy] = useState<{ text: string; link: string | null } | null>(null);
   const [busy, setBusy] = useState(false);
-  const set = (field: keyof typeof settings) => (event: { currentTarget: { value: string } }) => setSettings({ ...settings, [field]: event.currentTarget.value });
+  const set = (field: keyof typeof settings) => (event: { currentTarget: { value: string } }) =>
+    setSettings({ ...settings, [field]: event.currentTarget.value });
   const send = async () => {
     const { mass, columns, ...plain } = settings;
     const weight = parseNumber(mass);
-    if (mass.trim() && weight === null) return setWhy({ text: "The payload is a number of kg.", link: null });
+    if (mass.trim() && weight === null)
+      return setWhy({ text: "The payload is a number of kg.", link: null });
     setBusy(true);
     try {
-      const carried: Record<string, string> = weight === null ? {} : { payload: JSON.stringify({ mass: weight, com: weight ? [0, 0, 0.05] : undefined }) };
-      const detail = await addLog(file, { ...plain, ...carried, ...(columns.trim() ? { columns: columns.trim() } : {}) });
+      const carried: Record<string, string> =
+        weight === null
+          ? {}
+          : { payload: JSON.stringify({ mass: weight, com: weight ? [0, 0, 0.05] : undefined }) };
+      const detail = await addLog(file, {
+        ...plain,
+        ...carried,
+        ...(columns.trim() ? { columns: columns.trim() } : {}),
+      });
       openedIdentification.value = null;
       openedLog.value = detail;
       chosen.value = [...new Set([...chosen.value, detail.id])];
       onClose();
     } catch (error) {
       const details = error instanceof Problem ? error.details : {};
-      const fields = (details.errors ?? []).map(({ loc, msg }) => `${loc.slice(1).join(".")}: ${msg}`).join(" ");
-      setWhy({ text: `${(error as Error).message} ${fields}`, link: details.type?.includes("problems/") ? details.type.slice(details.type.indexOf("problems/")) : null });
+      const fields = (details.errors ?? [])
+        .map(({ loc, msg }) => `${loc.slice(1).join(".")}: ${msg}`)
+        .join(" ");
+      setWhy({
+        text: `${(error as Error).message} ${fields}`,
+        link: details.type?.includes("problems/")
+          ? details.type.slice(details.type.indexOf("problems/"))
+          : null,
+      });
     } finally {
       setBusy(false);
     }
   };
   const choice = (field: "units" | "current_units" | "effort", text: string, options: string[]) => (
-    <label>{text}
-      <select aria-label={text} value={settings[field]} onChange={set(field)}>{options.map((each) => <option key={each}>{each}</option>)}</select>
+    <label>
+      {text}
+      <select aria-label={text} value={settings[field]} onChange={set(field)}>
+        {options.map((each) => (
+          <option key={each}>{each}</option>
+        ))}
+      </select>
     </label>
   );
   return (
-    <Dialog title={`Add ${file.name}`} onClose={onClose} footer={<Button kind="primary" id="add-log" disabled={busy} onClick={send}>Add the log</Button>}>
+    <Dialog
+      title={`Add ${file.name}`}
+      onClose={onClose}
+      footer={
+        <Button kind="primary" id="add-log" disabled={busy} onClick={send}>
+          Add the log
+        </Button>
+      }
+    >
       <div class="fields">
-        <label>Name <input type="text" value={settings.name} onChange={set("name")} /></label>
-        <label>Robot <input type="text" value={settings.robot} onChange={set("robot")} /></label>
-        <label>Payload that it carried, kg <input type="text" inputMode="decimal" placeholder="unknown" value={settings.mass} onChange={set("mass")} /></label>
+        <label>
+          Name <input type="text" value={settings.name} onChange={set("name")} />
+        </label>
+        <label>
+          Robot <input type="text" value={settings.robot} onChange={set("robot")} />
+        </label>
+        <label>
+          Payload that it carried, kg{" "}
+          <input
+            type="text"
+            inputMode="decimal"
+            placeholder="unknown"
+            value={settings.mass}
+            onChange={set("mass")}
+          />
+        </label>
         {choice("units", "Angles in", ["rad", "deg"])}
         {choice("current_units", "Currents in", ["A", "mA"])}
         {choice("effort", "Efforts are", ["auto", "current", "torque", "external"])}
-        <label>Names of columns, as JSON, where they are unusual <input type="text" value={settings.columns} placeholder="found by themselves" onChange={set("columns")} /></label>
-        {why && <p class="error" role="alert" id="log-error">{why.text} {why.link && <a href={why.link}>What this means</a>}</p>}
+        <label>
+          Names of columns, as JSON, where they are unusual{" "}
+          <input
+            type="text"
+            value={settings.columns}
+            placeholder="found by themselves"
+            onChange={set("columns")}
+          />
+        </label>
+        {why && (
+          <p class="error" role="alert" id="log-error">
+            {why.text} {why.link && <a href={why.link}>What this means</a>}
+          </p>
+        )}
       </div>
     </Dialog>
   );

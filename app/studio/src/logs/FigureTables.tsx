@@ -11,37 +11,76 @@ const POWER: Record<string, [string, string]> = {
   energy_max: ["its greatest", "%"],
 };
 
-/** Errors on moves that no fit has seen: of these figures, of the robot's own, and of a constant power. */
+/**
+ * Errors on moves that no fit has seen: of these figures, of the robot's own, and of a constant
+ * power.
+ */
 export function ErrorTable({ validation, robot }: { validation: Validation; robot: Robot }) {
   const { moves, fitted, own, constant, coverage, half_width } = validation;
   const torque = fitted.torque
     ? [
-        ...robot.joints.map((name, j) => [`torque, ${jointName(name)}`, fitted.torque!.relative[j]!, own.torque.relative[j]!, "", "%"]),
+        ...robot.joints.map((name, j) => [
+          `torque, ${jointName(name)}`,
+          fitted.torque!.relative[j]!,
+          own.torque.relative[j]!,
+          "",
+          "%",
+        ]),
         ["energy at the shafts", fitted.torque.shaft_energy, own.torque.shaft_energy, "", "%"],
         ["energy in copper", fitted.torque.copper_energy, own.torque.copper_energy, "", "%"],
       ]
     : [];
   const power = fitted.power
-    ? (Object.keys(POWER) as (keyof typeof constant)[]).map((key) => [POWER[key]![0], fitted.power![key], own.power[key], constant[key], POWER[key]![1]])
+    ? (Object.keys(POWER) as (keyof typeof constant)[]).map((key) => [
+        POWER[key]![0],
+        fitted.power![key],
+        own.power[key],
+        constant[key],
+        POWER[key]![1],
+      ])
     : [];
   return (
     <article>
-      <h3>Errors <small>on {moves} moves that the fit has not seen</small></h3>
-      <Table label="Errors" head={["", "these figures", "robot's own", "constant", ""]} rows={[...torque, ...power].map((cells) => ({ cells }))} />
-      {coverage !== null && <p class="hint">{percent(coverage)} of the energies lie between their P5 and P95, which are {figure(half_width, 2)} % below and above the middle.</p>}
+      <h3>
+        Errors <small>on {moves} moves that the fit has not seen</small>
+      </h3>
+      <Table
+        label="Errors"
+        head={["", "these figures", "robot's own", "constant", ""]}
+        rows={[...torque, ...power].map((cells) => ({ cells }))}
+      />
+      {coverage !== null && (
+        <p class="hint">
+          {percent(coverage)} of the energies lie between their P5 and P95, which are{" "}
+          {figure(half_width, 2)} % below and above the middle.
+        </p>
+      )}
     </article>
   );
 }
 
-/** All figures that were sought, with what the robot's own documents say of those that the logs did not tell. */
-export function FigureTable({ result: { parameters, document: found }, robot }: { result: Found; robot: Robot }) {
+/**
+ * All figures that were sought, with what the robot's own documents say of those that the logs did
+ * not tell.
+ */
+export function FigureTable({
+  result: { parameters, document: found },
+  robot,
+}: {
+  result: Found;
+  robot: Robot;
+}) {
   const own = [robot.drives, robot.electronics, robot.friction.laws[0]?.coefficients];
   const these = [found.drives, found.electronics, found.friction_laws?.identified];
-  const of = (places: (Record<string, Parameter> | undefined)[], name: string) => places.find((place) => place?.[name])?.[name];
+  const of = (places: (Record<string, Parameter> | undefined)[], name: string) =>
+    places.find((place) => place?.[name])?.[name];
   const rows = parameters.map(({ figure: name, joint, value, sd, previous, identified, why }) => ({
     title: why ?? undefined,
     cells: [
-      <span>{words(name)}{why && <small> {why}</small>}</span>,
+      <span>
+        {words(name)}
+        {why && <small> {why}</small>}
+      </span>,
       joint === null ? "" : jointName(robot.joints[joint]!),
       value,
       identified ? sd : null,
@@ -52,8 +91,17 @@ export function FigureTable({ result: { parameters, document: found }, robot }: 
   }));
   return (
     <article class="wide">
-      <h3>Figures <small>trust: A maker's, B fitted to measured data, C second-hand, T of a sister robot, E default</small></h3>
-      <Table label="Figures" head={["figure", "joint", "value", "standard deviation", "robot's own", "trust", "unit"]} rows={rows} />
+      <h3>
+        Figures{" "}
+        <small>
+          trust: A maker's, B fitted to measured data, C second-hand, T of a sister robot, E default
+        </small>
+      </h3>
+      <Table
+        label="Figures"
+        head={["figure", "joint", "value", "standard deviation", "robot's own", "trust", "unit"]}
+        rows={rows}
+      />
     </article>
   );
 }

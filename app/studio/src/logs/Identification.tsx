@@ -10,7 +10,10 @@ import { Curves } from "./Curves";
 import { ErrorTable, FigureTable } from "./FigureTables";
 import { openedIdentification, type Found, type LogDetail } from "./model";
 
-/** An identification: measured and modelled, errors on moves that no fit has seen, figures with their letters. */
+/**
+ * An identification: measured and modelled, errors on moves that no fit has seen, figures with
+ * their letters.
+ */
 export function Identification() {
   const { found, moves } = openedIdentification.value!;
   const result = found.result!;
@@ -19,7 +22,13 @@ export function Identification() {
   useEffect(() => {
     void robotOf(result.robot).then(setRobot);
     const ids = [...new Set(moves.map(({ log }) => log))];
-    const asked = ids.map((id) => get<LogDetail>(`logs/${id}`).catch(() => ({ id, name: null, warnings: ["This log was deleted."] })));
+    const asked = ids.map((id) =>
+      get<LogDetail>(`logs/${id}`).catch(() => ({
+        id,
+        name: null,
+        warnings: ["This log was deleted."],
+      })),
+    );
     void Promise.all(asked).then(setLogs);
   }, [found.id]);
   if (!robot) return <p class="hint">…</p>;
@@ -34,10 +43,15 @@ export function Identification() {
       <header class="page-head">
         <div>
           <h2>Identification of {robot.name}</h2>
-          <p class="hint">{new Date(found.created).toLocaleString()}, {told} of {result.parameters.length} figures told by the logs</p>
+          <p class="hint">
+            {new Date(found.created).toLocaleString()}, {told} of {result.parameters.length} figures
+            told by the logs
+          </p>
         </div>
         <span class="space" />
-        <Button kind="primary" disabled={!found.figures} onClick={use}>Use these figures</Button>
+        <Button kind="primary" disabled={!found.figures} onClick={use}>
+          Use these figures
+        </Button>
         <Button onClick={() => (openedIdentification.value = null)}>Back to the logs</Button>
       </header>
       <div class="columns">
@@ -51,20 +65,42 @@ export function Identification() {
 }
 
 /** What is odd in the logs or in what was found, and what would help most. */
-function Advice({ result, logs, figures }: { result: Found; logs: Pick<LogDetail, "id" | "name" | "warnings">[]; figures: string | null }) {
+function Advice({
+  result,
+  logs,
+  figures,
+}: {
+  result: Found;
+  logs: Pick<LogDetail, "id" | "name" | "warnings">[];
+  figures: string | null;
+}) {
   const { residuals, physical, advice, payload } = result;
   const all = [
     !figures && "The figures are not stored: there was no room, or they were deleted.",
-    payload && (payload.why ?? `The last log carried ${figure(payload.mass)} ± ${figure(payload.mass_sd, 2)} kg.`),
+    payload &&
+      (payload.why ??
+        `The last log carried ${figure(payload.mass)} ± ${figure(payload.mass_sd, 2)} kg.`),
     physical && !physical.consistent && "Not all links are real bodies.",
-    !residuals.white && "Neighbouring residuals are alike: something moves that the model does not have. Standard deviations are over motions, and hold.",
-    ...logs.flatMap(({ id, name, warnings }) => warnings.map((text) => `${name ?? id.slice(0, 8)}: ${text}`)),
-    advice && `Most of the energy's uncertainty (${percent(advice.share)}) is from ${advice.figure.replaceAll("_", " ")}. ${advice.do}`,
+    !residuals.white &&
+      "Neighbouring residuals are alike: something moves that the model does not have. Standard deviations are over motions, and hold.",
+    ...logs.flatMap(({ id, name, warnings }) =>
+      warnings.map((text) => `${name ?? id.slice(0, 8)}: ${text}`),
+    ),
+    advice &&
+      `Most of the energy's uncertainty (${percent(advice.share)}) is from ${advice.figure.replaceAll("_", " ")}. ${advice.do}`,
   ].filter((text) => typeof text === "string");
   return (
     <article>
       <h3>Warnings and advice</h3>
-      {all.length ? <ul>{all.map((text) => <li key={text}>{plain(text)}</li>)}</ul> : <p class="hint">none</p>}
+      {all.length ? (
+        <ul>
+          {all.map((text) => (
+            <li key={text}>{plain(text)}</li>
+          ))}
+        </ul>
+      ) : (
+        <p class="hint">none</p>
+      )}
     </article>
   );
 }

@@ -25,17 +25,31 @@ export function LogView({ log }: { log: LogDetail }) {
         <div>
           <h2>{log.name ?? log.id.slice(0, 8)}</h2>
           <p class="hint">
-            {log.robot} · {figure(log.duration)} s · {moving} moves · {figure(log.rate)} Hz · carried {figure(log.payload)} kg
+            {log.robot} · {figure(log.duration)} s · {moving} moves · {figure(log.rate)} Hz ·
+            carried {figure(log.payload)} kg
             {log.effort && ` · efforts are a ${log.effort.meaning}`}
           </p>
         </div>
       </header>
-      {log.warnings.map((text) => <Note kind="warning" key={text}>{plain(text)}</Note>)}
-      {robotName(request.value) !== log.robot && <Note kind="warning">This log is of a {log.robot}; the cell has a {robotName(request.value)}.</Note>}
+      {log.warnings.map((text) => (
+        <Note kind="warning" key={text}>
+          {plain(text)}
+        </Note>
+      ))}
+      {robotName(request.value) !== log.robot && (
+        <Note kind="warning">
+          This log is of a {log.robot}; the cell has a {robotName(request.value)}.
+        </Note>
+      )}
       <h3>Measured and predicted joules</h3>
       {usable && (
         <label>
-          <input type="checkbox" checked={withOwn} onChange={(event) => setWithOwn(event.currentTarget.checked)} /> with the cell’s own figures
+          <input
+            type="checkbox"
+            checked={withOwn}
+            onChange={(event) => setWithOwn(event.currentTarget.checked)}
+          />{" "}
+          with the cell’s own figures
         </label>
       )}
       {found ? <Measured found={found} /> : <p class="hint">Computing …</p>}
@@ -43,14 +57,18 @@ export function LogView({ log }: { log: LogDetail }) {
   );
 }
 
-const differs = (measured: number, predicted: number) => `${predicted >= measured ? "+" : "−"}${figure(Math.abs(100 * (predicted / measured - 1)), 2)} %`;
+const differs = (measured: number, predicted: number) =>
+  `${predicted >= measured ? "+" : "−"}${figure(Math.abs(100 * (predicted / measured - 1)), 2)} %`;
 
 function Measured({ found: { segments, total } }: { found: Evaluation }) {
   const electrical = total.measured?.electrical != null;
   const efforts = total.measured?.by_efforts != null;
   const cells = (name: string, part: Evaluated) => {
     const predicted = part.energy.electrical.total;
-    const { electrical: drawn, by_efforts: worked } = part.measured ?? { electrical: null, by_efforts: null };
+    const { electrical: drawn, by_efforts: worked } = part.measured ?? {
+      electrical: null,
+      by_efforts: null,
+    };
     const { interval } = part.energy.electrical;
     return [
       name,
@@ -62,17 +80,38 @@ function Measured({ found: { segments, total } }: { found: Evaluation }) {
       drawn ? differs(drawn, predicted) : worked ? differs(worked, predicted) : "–",
     ];
   };
-  const head = ["", "s", ...(electrical ? ["measured, J"] : []), ...(efforts ? ["by currents, J"] : []), "predicted, J", "likely", "difference"];
-  const rows = segments.map((part, k) => ({ key: k, cells: cells(`${figure(part.start)} to ${figure(part.end)} s`, part) }));
+  const head = [
+    "",
+    "s",
+    ...(electrical ? ["measured, J"] : []),
+    ...(efforts ? ["by currents, J"] : []),
+    "predicted, J",
+    "likely",
+    "difference",
+  ];
+  const rows = segments.map((part, k) => ({
+    key: k,
+    cells: cells(`${figure(part.start)} to ${figure(part.end)} s`, part),
+  }));
   return (
     <>
-      {!electrical && !efforts && <p class="hint">Neither power nor currents nor torques were logged: nothing is measured to compare with.</p>}
+      {!electrical && !efforts && (
+        <p class="hint">
+          Neither power nor currents nor torques were logged: nothing is measured to compare with.
+        </p>
+      )}
       <div id="measured">
-        <Table label="Measured and predicted" head={head} rows={[{ key: "all", class: "total", cells: cells("whole log", total) }, ...rows]} />
+        <Table
+          label="Measured and predicted"
+          head={head}
+          rows={[{ key: "all", class: "total", cells: cells("whole log", total) }, ...rows]}
+        />
       </div>
       <p class="hint">
         {electrical && "Measured: power at the arm’s bus over time. "}
-        {efforts && "By currents: shaft work, copper loss and the electronics of the robot’s figures. "}The difference is that of the prediction.
+        {efforts &&
+          "By currents: shaft work, copper loss and the electronics of the robot’s figures. "}
+        The difference is that of the prediction.
       </p>
     </>
   );

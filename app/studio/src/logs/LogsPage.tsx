@@ -7,7 +7,18 @@ import { figure, when } from "../store/units";
 import { AddLog } from "./AddLog";
 import { Identification } from "./Identification";
 import { LogView } from "./LogView";
-import { busy, chosen, identifications, identify, loadLogs, logs, openedIdentification, openedLog, openIdentification, openLog } from "./model";
+import {
+  busy,
+  chosen,
+  identifications,
+  identify,
+  loadLogs,
+  logs,
+  openedIdentification,
+  openedLog,
+  openIdentification,
+  openLog,
+} from "./model";
 
 /** Logs of one's own arm: measured against predicted joules, and figures found from them. */
 export function LogsPage() {
@@ -17,8 +28,13 @@ export function LogsPage() {
     trouble.value = null;
     loadLogs().catch((error) => tell(error));
   }, []);
-  const shown = (logs.value ?? []).filter(({ name, robot, id }) => `${name ?? ""} ${robot} ${id}`.toLowerCase().includes(filter.toLowerCase()));
-  const flip = (id: string) => (chosen.value = chosen.value.includes(id) ? chosen.value.filter((each) => each !== id) : [...chosen.value, id]);
+  const shown = (logs.value ?? []).filter(({ name, robot, id }) =>
+    `${name ?? ""} ${robot} ${id}`.toLowerCase().includes(filter.toLowerCase()),
+  );
+  const flip = (id: string) =>
+    (chosen.value = chosen.value.includes(id)
+      ? chosen.value.filter((each) => each !== id)
+      : [...chosen.value, id]);
   const drop = async (id: string) => {
     await remove(`logs/${id}`);
     chosen.value = chosen.value.filter((each) => each !== id);
@@ -30,34 +46,86 @@ export function LogsPage() {
       <aside class="side" aria-label="Logs">
         <label class="button primary">
           Add a log …
-          <input type="file" class="unseen" id="log-file" accept=".csv,.gz,.txt" onChange={(event) => { setFile(event.currentTarget.files?.[0] ?? null); event.currentTarget.value = ""; }} />
+          <input
+            type="file"
+            class="unseen"
+            id="log-file"
+            accept=".csv,.gz,.txt"
+            onChange={(event) => {
+              setFile(event.currentTarget.files?.[0] ?? null);
+              event.currentTarget.value = "";
+            }}
+          />
         </label>
-        <input type="search" class="search" aria-label="Search logs" placeholder="Search logs" value={filter} onInput={(event) => setFilter(event.currentTarget.value)} />
-        {logs.value && !shown.length && <p class="hint">No log yet: add a CSV file of your arm (RTDE, ROS, or t, q1 …).</p>}
+        <input
+          type="search"
+          class="search"
+          aria-label="Search logs"
+          placeholder="Search logs"
+          value={filter}
+          onInput={(event) => setFilter(event.currentTarget.value)}
+        />
+        {logs.value && !shown.length && (
+          <p class="hint">No log yet: add a CSV file of your arm (RTDE, ROS, or t, q1 …).</p>
+        )}
         <ul class="kept">
           {shown.map((log) => (
             <li key={log.id}>
-              <input type="checkbox" aria-label={`Use ${log.name ?? log.id} for an identification`} checked={chosen.value.includes(log.id)} onChange={() => flip(log.id)} />
-              <button type="button" class="choice" aria-current={openedLog.value?.id === log.id && !openedIdentification.value ? "true" : undefined} onClick={trying(() => openLog(log.id))}>
+              <input
+                type="checkbox"
+                aria-label={`Use ${log.name ?? log.id} for an identification`}
+                checked={chosen.value.includes(log.id)}
+                onChange={() => flip(log.id)}
+              />
+              <button
+                type="button"
+                class="choice"
+                aria-current={
+                  openedLog.value?.id === log.id && !openedIdentification.value ? "true" : undefined
+                }
+                onClick={trying(() => openLog(log.id))}
+              >
                 <b>{log.name ?? log.id.slice(0, 8)}</b>
-                <small>{log.robot} · {figure(log.duration)} s · {when(log.created)}</small>
+                <small>
+                  {log.robot} · {figure(log.duration)} s · {when(log.created)}
+                </small>
               </button>
-              <Button kind="quiet" icon="trash" label={`Delete ${log.name ?? log.id}`} onClick={trying(() => drop(log.id))} />
+              <Button
+                kind="quiet"
+                icon="trash"
+                label={`Delete ${log.name ?? log.id}`}
+                onClick={trying(() => drop(log.id))}
+              />
             </li>
           ))}
         </ul>
-        <Button id="identify" disabled={!chosen.value.length || Boolean(busy.value)} title="Friction, rotors, power of your own arm" onClick={trying(() => identify({ logs: chosen.value }))}>
+        <Button
+          id="identify"
+          disabled={!chosen.value.length || Boolean(busy.value)}
+          title="Friction, rotors, power of your own arm"
+          onClick={trying(() => identify({ logs: chosen.value }))}
+        >
           Identify from {chosen.value.length} {chosen.value.length === 1 ? "log" : "logs"}
         </Button>
-        {busy.value && <p class="hint" role="status">{busy.value}</p>}
+        {busy.value && (
+          <p class="hint" role="status">
+            {busy.value}
+          </p>
+        )}
         <h2>Identifications</h2>
         {!identifications.value.length && <p class="hint">None yet.</p>}
         <ul class="kept">
           {identifications.value.map((each) => (
             <li key={each.id}>
-              <button type="button" class="choice" onClick={trying(() => openIdentification(each.id))}>
+              <button
+                type="button"
+                class="choice"
+                onClick={trying(() => openIdentification(each.id))}
+              >
                 <b>{each.robot ?? each.id.slice(0, 8)}</b>
-                <small>{each.state} · {when(each.created)}</small>
+                <small>
+                  {each.state} · {when(each.created)}
+                </small>
               </button>
             </li>
           ))}
@@ -65,7 +133,16 @@ export function LogsPage() {
       </aside>
       <section class="content" aria-label="Log">
         <Wrong />
-        {openedIdentification.value ? <Identification /> : openedLog.value ? <LogView key={openedLog.value.id} log={openedLog.value} /> : <p class="empty">Choose a log to see measured against predicted joules of each move; tick logs to identify the figures of your own arm.</p>}
+        {openedIdentification.value ? (
+          <Identification />
+        ) : openedLog.value ? (
+          <LogView key={openedLog.value.id} log={openedLog.value} />
+        ) : (
+          <p class="empty">
+            Choose a log to see measured against predicted joules of each move; tick logs to
+            identify the figures of your own arm.
+          </p>
+        )}
       </section>
       {file && <AddLog file={file} onClose={() => setFile(null)} />}
     </main>
@@ -74,9 +151,11 @@ export function LogsPage() {
 
 function Wrong() {
   const now = trouble.value;
-  return now && (
-    <p class="error" role="alert" id="problem">
-      <b>{now.title}.</b> {now.text} {now.link && <a href={now.link}>What this means</a>}
-    </p>
+  return (
+    now && (
+      <p class="error" role="alert" id="problem">
+        <b>{now.title}.</b> {now.text} {now.link && <a href={now.link}>What this means</a>}
+      </p>
+    )
   );
 }

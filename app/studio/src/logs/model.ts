@@ -24,7 +24,10 @@ export interface LogDetail extends LogSummary {
 export interface Evaluated {
   start: number;
   end: number;
-  energy: { electrical: { total: number; idle: number; copper: number; interval: Interval | null }; mechanical: { total: number } };
+  energy: {
+    electrical: { total: number; idle: number; copper: number; interval: Interval | null };
+    mechanical: { total: number };
+  };
   measured: { electrical: number | null; by_efforts: number | null } | null;
 }
 
@@ -111,12 +114,17 @@ export const identifications = signal<IdentificationSummary[]>([]);
 /** Ids of the logs that an identification is to use. */
 export const chosen = signal<string[]>([]);
 export const openedLog = signal<LogDetail | null>(null);
-export const openedIdentification = signal<{ found: Identification; moves: MoveCurves[] } | null>(null);
+export const openedIdentification = signal<{ found: Identification; moves: MoveCurves[] } | null>(
+  null,
+);
 export const busy = signal("");
 
 /** Throws Problem. */
 export async function loadLogs(): Promise<void> {
-  const [own, found] = await Promise.all([get<{ logs: LogSummary[] }>("logs?limit=200"), get<{ identifications: IdentificationSummary[] }>("identifications?limit=50")]);
+  const [own, found] = await Promise.all([
+    get<{ logs: LogSummary[] }>("logs?limit=200"),
+    get<{ identifications: IdentificationSummary[] }>("identifications?limit=50"),
+  ]);
   logs.value = own.logs;
   identifications.value = found.identifications;
 }
@@ -124,7 +132,11 @@ export async function loadLogs(): Promise<void> {
 /** Sends a file; the settings say how it is read. Throws Problem. */
 export async function addLog(file: File, settings: Record<string, string>): Promise<LogDetail> {
   const query = new URLSearchParams(settings);
-  const response = await send(`logs?${query}`, { method: "POST", body: file, headers: { "Content-Type": "text/csv" } });
+  const response = await send(`logs?${query}`, {
+    method: "POST",
+    body: file,
+    headers: { "Content-Type": "text/csv" },
+  });
   const detail = (await response.json()) as LogDetail;
   await loadLogs();
   return detail;
@@ -136,7 +148,8 @@ export const openLog = async (id: string) => {
 };
 
 /** Measured and predicted joules of each move of a log. Throws Problem. */
-export const evaluated = (log: string, figures: string | null) => post<Evaluation>("evaluate", { log, figures });
+export const evaluated = (log: string, figures: string | null) =>
+  post<Evaluation>("evaluate", { log, figures });
 
 /** Starts an identification, waits for its end and opens it. Throws Problem. */
 export async function identify(body: Record<string, unknown>): Promise<void> {
@@ -155,7 +168,11 @@ export async function openIdentification(id: string): Promise<void> {
       found = await get<Identification>(path);
     }
     if (found.problem) throw new Problem(found.problem);
-    if (!found.result) throw new Problem({ title: "Nothing was found", detail: `The identification is ${found.state}.` });
+    if (!found.result)
+      throw new Problem({
+        title: "Nothing was found",
+        detail: `The identification is ${found.state}.`,
+      });
     const { moves } = await get<{ moves: MoveCurves[] | null }>(`${path}/residuals`);
     openedIdentification.value = { found, moves: moves ?? [] };
   } finally {

@@ -53,16 +53,34 @@ export function Picture() {
   const layer = useRef<HTMLDivElement>(null);
   useEffect(() => (hasWebGl ? start(box.current!, layer.current!) : undefined), []);
   return (
-    <div id="view" ref={box} tabIndex={0} role="group" aria-label={describe()} data-without-axes={show.value.axes ? undefined : ""}>
+    <div
+      id="view"
+      ref={box}
+      tabIndex={0}
+      role="group"
+      aria-label={describe()}
+      data-without-axes={show.value.axes ? undefined : ""}
+    >
       <div id="labels" ref={layer} aria-hidden="true" />
-      {!hasWebGl && <p id="no-view">This browser offers no WebGL, so the arm cannot be drawn. Charts, tables and downloads work.</p>}
+      {!hasWebGl && (
+        <p id="no-view">
+          This browser offers no WebGL, so the arm cannot be drawn. Charts, tables and downloads
+          work.
+        </p>
+      )}
       {hasWebGl && (
         <>
           <Tools />
           <Legend />
           <p class="frame-note">{frameNote()}</p>
-          {dragNote.value && <p class="drag-note" id="drag-note" role="status">{dragNote.value}</p>}
-          {stale.value && !dragNote.value && <p class="drag-note">The old motion is hidden: it is not one of this cell.</p>}
+          {dragNote.value && (
+            <p class="drag-note" id="drag-note" role="status">
+              {dragNote.value}
+            </p>
+          )}
+          {stale.value && !dragNote.value && (
+            <p class="drag-note">The old motion is hidden: it is not one of this cell.</p>
+          )}
         </>
       )}
     </div>
@@ -78,7 +96,9 @@ function describe(): string {
 
 function frameNote(): string {
   const pendant = pictured.value?.robot.title.startsWith("Universal Robots");
-  return pendant ? "Base frame as on the pendant; ROS base_link is turned by 180° about z" : "Base frame of the robot";
+  return pendant
+    ? "Base frame as on the pendant; ROS base_link is turned by 180° about z"
+    : "Base frame of the robot";
 }
 
 function Legend() {

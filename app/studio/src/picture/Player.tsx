@@ -10,7 +10,14 @@ export function Player() {
   const off = !answered.value || stale.value;
   return (
     <div class="player" id="player">
-      <button type="button" id="play" class="button bare" aria-label={playing.value ? "Pause" : "Play"} disabled={off} onClick={toggle}>
+      <button
+        type="button"
+        id="play"
+        class="button bare"
+        aria-label={playing.value ? "Pause" : "Play"}
+        disabled={off}
+        onClick={toggle}
+      >
         <Icon name={playing.value ? "pause" : "play"} />
       </button>
       <output id="clock">{time.value.toFixed(3)} s</output>
@@ -27,7 +34,11 @@ export function Player() {
         onInput={(event) => goTo(Number(event.currentTarget.value))}
       />
       <span class="hint">{figure(duration.value)} s</span>
-      <select aria-label="Speed of playing" value={speed.value} onChange={(event) => (speed.value = Number(event.currentTarget.value))}>
+      <select
+        aria-label="Speed of playing"
+        value={speed.value}
+        onChange={(event) => (speed.value = Number(event.currentTarget.value))}
+      >
         {SPEEDS.map((each) => (
           <option key={each} value={each}>
             {each}×
@@ -35,7 +46,13 @@ export function Player() {
         ))}
       </select>
       <label>
-        <input type="checkbox" id="loop" checked={loop.value} onChange={(event) => (loop.value = event.currentTarget.checked)} /> loop
+        <input
+          type="checkbox"
+          id="loop"
+          checked={loop.value}
+          onChange={(event) => (loop.value = event.currentTarget.checked)}
+        />{" "}
+        loop
       </label>
     </div>
   );

@@ -33,7 +33,15 @@ export function Tools() {
         <Menu label="Show" quiet id="show">
           {SHOWN.map(([name, text]) => (
             <label key={name}>
-              <input type="checkbox" data-show={name} checked={show.value[name]} onChange={(event) => (show.value = { ...show.value, [name]: event.currentTarget.checked })} /> {text}
+              <input
+                type="checkbox"
+                data-show={name}
+                checked={show.value[name]}
+                onChange={(event) =>
+                  (show.value = { ...show.value, [name]: event.currentTarget.checked })
+                }
+              />{" "}
+              {text}
             </label>
           ))}
         </Menu>
@@ -48,18 +56,57 @@ function DragTools() {
     if (next !== "box" && !selected.value) selected.value = rows.at(-1)?.pointer ?? null;
     tool.value = tool.value === next ? "look" : next;
   };
-  const names = [...rows.map(({ pointer, name }) => [pointer, name] as const), ...obstaclesListed(request.value).map(({ name }, k) => [`/scene/obstacles/${k}`, String(name)] as const)];
+  const names = [
+    ...rows.map(({ pointer, name }) => [pointer, name] as const),
+    ...obstaclesListed(request.value).map(
+      ({ name }, k) => [`/scene/obstacles/${k}`, String(name)] as const,
+    ),
+  ];
   const dragging = tool.value === "move" || tool.value === "turn";
   return (
     <div class="tools" role="toolbar" aria-label="By hand">
-      <Button kind="quiet" small icon="move" pressed={tool.value === "move"} onClick={() => pick("move")}>Drag</Button>
-      <Button kind="quiet" small icon="turn" pressed={tool.value === "turn"} onClick={() => pick("turn")}>Turn</Button>
+      <Button
+        kind="quiet"
+        small
+        icon="move"
+        pressed={tool.value === "move"}
+        onClick={() => pick("move")}
+      >
+        Drag
+      </Button>
+      <Button
+        kind="quiet"
+        small
+        icon="turn"
+        pressed={tool.value === "turn"}
+        onClick={() => pick("turn")}
+      >
+        Turn
+      </Button>
       {dragging && (
-        <select id="drag" aria-label="What is dragged" value={selected.value ?? ""} onChange={(event) => (selected.value = event.currentTarget.value)}>
-          {names.map(([pointer, name]) => <option key={pointer} value={pointer}>{name}</option>)}
+        <select
+          id="drag"
+          aria-label="What is dragged"
+          value={selected.value ?? ""}
+          onChange={(event) => (selected.value = event.currentTarget.value)}
+        >
+          {names.map(([pointer, name]) => (
+            <option key={pointer} value={pointer}>
+              {name}
+            </option>
+          ))}
         </select>
       )}
-      <Button kind="quiet" small icon="box" id="draw-box" pressed={tool.value === "box"} onClick={() => pick("box")}>Add box</Button>
+      <Button
+        kind="quiet"
+        small
+        icon="box"
+        id="draw-box"
+        pressed={tool.value === "box"}
+        onClick={() => pick("box")}
+      >
+        Add box
+      </Button>
     </div>
   );
 }

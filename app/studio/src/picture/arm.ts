@@ -1,11 +1,20 @@
-// An arm as three.js objects: its links from the figures, its tool and its payload; and what collision checks see.
+// An arm as three.js objects: its links from the figures, its tool and its payload; and what
+// collision checks see.
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { IDENTITY, type Chain, type Matrix } from "../store/chain";
 import type { ApiRequest, FormBody, Payload, Robot, Shape } from "../store/types";
 import { along, capsule, place, placedShape, roundedCylinder } from "./shapes";
 
-const COLOURS = { tube: 0xe3e7ec, housing: 0xcfd5dc, cap: 0x2f7fb8, ring: 0x3a424c, foot: 0x555e69, tool: 0x2f3742, payload: 0xd8951f };
+const COLOURS = {
+  tube: 0xe3e7ec,
+  housing: 0xcfd5dc,
+  cap: 0x2f7fb8,
+  ring: 0x3a424c,
+  foot: 0x555e69,
+  tool: 0x2f3742,
+  payload: 0xd8951f,
+};
 const ROUNDED = { tube: 0.01, housing: 0.04, cap: 0.16, ring: 0.01, foot: 0.1 }; // edges, of the radius
 const SIDES = 22; // of round bodies
 const WATER = 1000; // density [kg/m³]
@@ -18,15 +27,27 @@ interface Geometries {
 const geometries = new Map<string, Geometries>(); // of each robot, by name: several arms share them
 
 /** Names of the links, base first. */
-export const linkNames = (robot: Robot) => ["base", ...(robot.kinematics.link_names!.value as string[])];
+export const linkNames = (robot: Robot) => [
+  "base",
+  ...(robot.kinematics.link_names!.value as string[]),
+];
 
-/** One geometry for each link, with the colours of its bodies, and one with the capsules of its collision checks. */
+/**
+ * One geometry for each link, with the colours of its bodies, and one with the capsules of its
+ * collision checks.
+ */
 function robotGeometry(robot: Robot): Geometries {
   const known = geometries.get(robot.name);
   if (known) return known;
-  const drawn = robot.form.map((bodies) => merged(bodies.map((body) => coloured(bodyGeometry(body), COLOURS[body.kind]))));
-  const capsules = linkNames(robot).map((name) => (robot.collision[name]?.value ?? []) as number[][]);
-  const seen = capsules.map((own) => merged(own.map((row) => capsule(row.slice(0, 3), row.slice(3, 6), row[6]!, 14))));
+  const drawn = robot.form.map((bodies) =>
+    merged(bodies.map((body) => coloured(bodyGeometry(body), COLOURS[body.kind]))),
+  );
+  const capsules = linkNames(robot).map(
+    (name) => (robot.collision[name]?.value ?? []) as number[][],
+  );
+  const seen = capsules.map((own) =>
+    merged(own.map((row) => capsule(row.slice(0, 3), row.slice(3, 6), row[6]!, 14))),
+  );
   geometries.set(robot.name, { drawn, seen });
   return { drawn, seen };
 }
@@ -35,7 +56,8 @@ function robotGeometry(robot: Robot): Geometries {
 export const drawBy = (robot: Robot, drawn: THREE.BufferGeometry[]) =>
   geometries.set(robot.name, { ...robotGeometry(robot), drawn });
 
-const merged = (parts: THREE.BufferGeometry[]) => (parts.length ? mergeGeometries(parts) : new THREE.BufferGeometry());
+const merged = (parts: THREE.BufferGeometry[]) =>
+  parts.length ? mergeGeometries(parts) : new THREE.BufferGeometry();
 
 function coloured(geometry: THREE.BufferGeometry, colour: number): THREE.BufferGeometry {
   const one = new THREE.Color(colour).toArray();
@@ -48,7 +70,11 @@ const bodyGeometry = ({ kind, start, end, radius }: FormBody) =>
 
 /** What is drawn of a payload: its shape; without one, the ball that as much water has. */
 const loadShape = ({ mass, com, shape }: Payload): Shape =>
-  shape ?? { shape: "sphere", radius: Math.cbrt((3 * mass) / (4 * Math.PI * WATER)), pose: { position: com ?? [0, 0, 0] } };
+  shape ?? {
+    shape: "sphere",
+    radius: Math.cbrt((3 * mass) / (4 * Math.PI * WATER)),
+    pose: { position: com ?? [0, 0, 0] },
+  };
 
 export interface ArmOptions {
   /** A colour over its own ones. */
@@ -88,12 +114,18 @@ export class Arm {
     // ghosts and further arms stand on the same base
     const first = tint === 0xffffff ? 0 : 1;
     this.drawn = drawn.slice(first).map((geometry, k) => put(k + first, geometry, own));
-    this.seen = ghost ? [] : seen.map((geometry, link) => put(link, geometry, armMaterial(0x66aadd, 0.45, false)));
+    this.seen = ghost
+      ? []
+      : seen.map((geometry, link) => put(link, geometry, armMaterial(0x66aadd, 0.45, false)));
     for (const mesh of this.seen) mesh.castShadow = false;
-    const tool = (typeof request.tool === "object" ? (request.tool.capsules ?? []) : []).map(({ start, end, radius }) => capsule(start, end, radius, 16));
+    const tool = (typeof request.tool === "object" ? (request.tool.capsules ?? []) : []).map(
+      ({ start, end, radius }) => capsule(start, end, radius, 16),
+    );
     if (tool.length) put(drawn.length, merged(tool), of("tool"));
     this.loads = loads.map((payload) => {
-      const part = payload?.mass ? placedShape(loadShape(payload), of("payload")) : new THREE.Group();
+      const part = payload?.mass
+        ? placedShape(loadShape(payload), of("payload"))
+        : new THREE.Group();
       part.traverse((each) => (each.castShadow = !ghost));
       this.links.at(-1)!.add(part);
       return part;
@@ -121,7 +153,19 @@ export class Arm {
 }
 
 function armMaterial(color: number, opacity: number, vertexColors: boolean): THREE.Material {
-  if (opacity === 1) return new THREE.MeshPhongMaterial({ color, vertexColors, shininess: 28, specular: 0x333333 });
-  const behind = { depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
-  return new THREE.MeshLambertMaterial({ color, opacity, vertexColors, transparent: true, ...behind });
+  if (opacity === 1)
+    return new THREE.MeshPhongMaterial({ color, vertexColors, shininess: 28, specular: 0x333333 });
+  const behind = {
+    depthWrite: false,
+    polygonOffset: true,
+    polygonOffsetFactor: 2,
+    polygonOffsetUnits: 2,
+  };
+  return new THREE.MeshLambertMaterial({
+    color,
+    opacity,
+    vertexColors,
+    transparent: true,
+    ...behind,
+  });
 }

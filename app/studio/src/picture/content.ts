@@ -1,24 +1,23 @@
-// What the picture holds: arms, ghosts, obstacles, the path of the TCP, the nearest pair, the names of stops.
+// What the picture holds: arms, ghosts, obstacles, the path of the TCP, the nearest pair, the names
+// of stops.
 import * as THREE from "three";
 import { Chain, positionOf, sampleAt, type Matrix } from "../store/chain";
 import { legAt, stopsOf } from "../store/cycle";
-import { DEFAULT_MARGIN } from "../store/request";
 import { ghosts, run, show, time } from "../store/state";
 import type { Obstacle, Pose } from "../store/types";
 import { figure } from "../store/units";
 import { Arm } from "./arm";
-import type { Solid } from "./eye";
 import type { Labels } from "./labels";
+import { drawnObstacle } from "./obstacles";
+import { nearestPair, type NearestPair } from "./nearest";
 import type { Parts } from "./parts";
 import { pathOfPower } from "./path";
 import { pictured, type Pictured } from "./pictured";
 import { reachedGhost } from "./reachedGhost";
-import { placedShape } from "./shapes";
 import { colour } from "./theme";
 
 const NEAR = 0.5; // of a round, for which the nearest pair is shown before and after its instant [s]
 const SAMPLES = 24; // of a motion that the picture is to hold
-const PINK = 0xd62f6b;
 
 interface Built {
   robot: string;
@@ -35,7 +34,7 @@ export class Content {
   ignored: string[] = [];
   private drawn: Pictured | null = null;
   private scene = "";
-  private nearest: { text: string; at: number[]; time: number } | null = null;
+  private nearest: NearestPair | null = null;
 
   constructor(
     private readonly parts: Parts,
@@ -52,10 +51,17 @@ export class Content {
     for (const name of ["arms", "path"] as const) empty(this.parts[name]);
     this.arms = now.motion ? now.arms.map((_, k) => this.moving(now, k)) : [this.still(now)];
     this.drawScene(now.cell.scene?.obstacles ?? []);
-    this.buildNearest(now);
+    empty(this.parts.nearest);
+    this.nearest = nearestPair(now, this.parts.nearest);
     this.nameStops(now);
     this.buildGhosts();
-    return { robot: now.robot.name, chain: this.chain, tcp: now.cell.tcp, samples: samplesOf(now), moves: Boolean(now.motion) };
+    return {
+      robot: now.robot.name,
+      chain: this.chain,
+      tcp: now.cell.tcp,
+      samples: samplesOf(now),
+      moves: Boolean(now.motion),
+    };
   }
 
   private moving(now: Pictured, k: number): Arm {
@@ -108,28 +114,14 @@ export class Content {
   }
 
   private obstacle(obstacle: Obstacle): void {
-    const solid = obstacle.shape !== "half_space";
-    const material = new THREE.MeshLambertMaterial({ color: colour(solid ? "--obstacle" : "--floor"), side: THREE.DoubleSide });
-    const object = placedShape(obstacle, material);
-    // to look for thousands of parts between eye and arm would take longer than to draw them
-    const hides = solid && !["points", "voxels", "mesh_file"].includes(obstacle.shape);
-    const margin = typeof obstacle.margin === "number" ? obstacle.margin : DEFAULT_MARGIN;
-    object.userData = { material, solid, hides, name: obstacle.name, title: `${obstacle.name}, margin ${figure(margin * 1000)} mm` } satisfies Solid;
-    object.traverse((mesh) => {
-      mesh.receiveShadow = true;
-      mesh.castShadow = solid;
-    });
-    object.children[0]!.userData.filled = this.redraw;
+    const { object, shell } = drawnObstacle(obstacle, this.redraw);
     this.parts.obstacles.add(object);
-    if (margin <= 0 || obstacle.shape === "mesh_file") return;
-    const shell = new THREE.MeshBasicMaterial({ color: 0xd64545, transparent: true, opacity: 0.16, depthWrite: false, side: THREE.DoubleSide });
-    const around = placedShape(obstacle, shell, margin);
-    around.userData.of = object;
-    this.parts.margins.add(around);
+    if (shell) this.parts.margins.add(shell);
   }
 
   showMargins(over: THREE.Object3D | null = null): void {
-    for (const shell of this.parts.margins.children) shell.visible = show.value.margins || shell.userData.of === over;
+    for (const shell of this.parts.margins.children)
+      shell.visible = show.value.margins || shell.userData.of === over;
   }
 
   /** Start and goal, configurations that are looked at, and the best goal so far. */
@@ -153,7 +145,10 @@ export class Content {
   }
 
   private nameEnds(now: Pictured): void {
-    for (const [name, q] of [["Start", now.motion?.cycle ? null : now.start], ["Goal", now.goal]] as const) {
+    for (const [name, q] of [
+      ["Start", now.motion?.cycle ? null : now.start],
+      ["Goal", now.goal],
+    ] as const) {
       if (!q || !show.value.ghosts) this.labels.drop(name);
       else this.labels.put(name, name, positionOf(this.tcpAt(q)), `end ${name.toLowerCase()}`);
     }
@@ -164,32 +159,15 @@ export class Content {
     const places = new Map<string, string[]>();
     const stops = motion?.cycle ? stopsOf(motion.cycle) : [];
     for (const [name, q] of new Map(stops.map(({ stop, q }) => [stop ?? "", q]))) {
-      const at = positionOf(this.tcpAt(q)).map((value) => value.toFixed(3)).join();
+      const at = positionOf(this.tcpAt(q))
+        .map((value) => value.toFixed(3))
+        .join();
       if (!name.includes("/")) places.set(at, [...(places.get(at) ?? []), name]);
     }
-    [...places].forEach(([at, names], k) => this.labels.put(`stop ${k}`, names.join(", "), at.split(",").map(Number), "stop"));
+    [...places].forEach(([at, names], k) =>
+      this.labels.put(`stop ${k}`, names.join(", "), at.split(",").map(Number), "stop"),
+    );
     this.labels.keep("stop", places.size);
-  }
-
-  /** The line between the nearest points, and its words: that nothing but the distance of this instant is meant. */
-  private buildNearest({ motion }: Pictured): void {
-    empty(this.parts.nearest);
-    this.nearest = null;
-    const clearance = motion?.solution.certificate.clearance;
-    if (!clearance?.points) return;
-    const ends = clearance.points.map((point) => new THREE.Vector3().fromArray(point));
-    const material = new THREE.MeshBasicMaterial({ color: PINK, depthTest: false, transparent: true });
-    for (const end of ends) {
-      const dot = new THREE.Mesh(new THREE.SphereGeometry(0.008, 14, 10), material);
-      dot.position.copy(end);
-      dot.renderOrder = 2;
-      this.parts.nearest.add(dot);
-    }
-    const line = new THREE.LineBasicMaterial({ color: PINK, depthTest: false });
-    this.parts.nearest.add(new THREE.Line(new THREE.BufferGeometry().setFromPoints(ends), line));
-    const [a, b] = [ends[0]!, ends[1]!];
-    const text = `${clearance.pair.join(" – ")}: ${figure(a.distanceTo(b) * 1000)} mm at ${figure(clearance.time)} s`;
-    this.nearest = { text, at: a.clone().add(b).multiplyScalar(0.5).toArray(), time: clearance.time };
   }
 
   /** The arms at the present time, and what is switched on. */
@@ -206,9 +184,13 @@ export class Content {
         arm.carry(leg);
       });
     for (const arm of this.arms) arm.showCapsules(show.value.capsules);
-    for (const name of ["ghosts", "path", "axes"] as const) this.parts[name].visible = show.value[name];
+    for (const name of ["ghosts", "path", "axes"] as const)
+      this.parts[name].visible = show.value[name];
     // in a round the arm is elsewhere most of the time
-    const near = this.nearest && show.value.nearest && (!cycle || Math.abs(time.value - this.nearest.time) < NEAR);
+    const near =
+      this.nearest &&
+      show.value.nearest &&
+      (!cycle || Math.abs(time.value - this.nearest.time) < NEAR);
     this.parts.nearest.visible = Boolean(near);
     if (near) this.labels.put("nearest", this.nearest!.text, this.nearest!.at, "near");
     else this.labels.drop("nearest");
@@ -223,7 +205,12 @@ export class Content {
     if (!several) return;
     now.arms.forEach(({ name, solution }, k) => {
       const [x, y, z] = positionOf(this.arms[k]!.frames.at(-1)!);
-      this.labels.put(`arm ${k}`, `${name}: ${figure(solution.energy.electrical.total)} J`, [x, y, z + 0.08 + 0.07 * k], "arm");
+      this.labels.put(
+        `arm ${k}`,
+        `${name}: ${figure(solution.energy.electrical.total)} J`,
+        [x, y, z + 0.08 + 0.07 * k],
+        "arm",
+      );
     });
   }
 }
@@ -241,4 +228,3 @@ function empty(group: THREE.Group): void {
   group.traverse((each) => (each as Partial<THREE.Mesh>).geometry?.dispose());
   group.clear();
 }
-

@@ -1,8 +1,17 @@
-// Handles in the picture: targets and obstacles are dragged; boxes are drawn on the floor. `/ik` says what is reached.
+// Handles in the picture: targets and obstacles are dragged; boxes are drawn on the floor. `/ik`
+// says what is reached.
 import { effect, signal } from "@preact/signals";
 import * as THREE from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
-import { frameOf, inverse, multiply, obstaclesOf, ofPose, poseOfMatrix, type Matrix } from "../store/chain";
+import {
+  frameOf,
+  inverse,
+  multiply,
+  obstaclesOf,
+  ofPose,
+  poseOfMatrix,
+  type Matrix,
+} from "../store/chain";
 import { at, put } from "../store/pointer";
 import { solutionsOf } from "../store/reach";
 import { freshName, isObject, listOf, poseAt, rowsOf, targetAt, targetOf } from "../store/request";
@@ -34,7 +43,10 @@ export class Drag {
     this.gizmo.size = 0.75;
     view.scene.add(this.handle, this.gizmo.getHelper());
     this.gizmo.addEventListener("change", () => view.draw());
-    this.gizmo.addEventListener("objectChange", () => this.rowNow() && void this.reach(this.poseOfHandle()));
+    this.gizmo.addEventListener(
+      "objectChange",
+      () => this.rowNow() && void this.reach(this.poseOfHandle()),
+    );
     this.gizmo.addEventListener("dragging-changed", ({ value }) => {
       view.controls.enabled = !value;
       this.dragging = Boolean(value);
@@ -50,7 +62,8 @@ export class Drag {
   /** Puts the handle on what is selected. */
   private attach(): void {
     const [chosen, mode, robot] = [selected.value, tool.value, robotNow.value];
-    const pose = chosen && robot && (mode === "move" || mode === "turn") ? this.poseOf(chosen) : null;
+    const pose =
+      chosen && robot && (mode === "move" || mode === "turn") ? this.poseOf(chosen) : null;
     if (this.dragging) return;
     if (mode !== "move" && mode !== "turn") dragNote.value = "";
     if (mode === "box") this.drawBox();
@@ -61,7 +74,10 @@ export class Drag {
       return;
     }
     this.gizmo.setMode(mode === "turn" ? "rotate" : "translate");
-    new THREE.Matrix4().fromArray(pose).transpose().decompose(this.handle.position, this.handle.quaternion, this.handle.scale);
+    new THREE.Matrix4()
+      .fromArray(pose)
+      .transpose()
+      .decompose(this.handle.position, this.handle.quaternion, this.handle.scale);
     this.gizmo.attach(this.handle);
     this.view.draw();
   }
@@ -73,12 +89,17 @@ export class Drag {
     try {
       if (!row) {
         const index = /^\/scene\/obstacles\/(\d+)$/.exec(chosen)?.[1];
-        return index === undefined ? null : ofPose(obstaclesOf(request.value, robot)[Number(index)]!.pose);
+        return index === undefined
+          ? null
+          : ofPose(obstaclesOf(request.value, robot)[Number(index)]!.pose);
       }
       const target = targetAt(request.value, row);
-      if (target.kind === "pose") return multiply(frameOf(robot, target.pose.frame), ofPose(target.pose));
+      if (target.kind === "pose")
+        return multiply(frameOf(robot, target.pose.frame), ofPose(target.pose));
       const q = configurationOf(row, null) ?? pictured.value?.start;
-      return q && this.view.content.chain ? this.view.content.chain.tcp(q, dressed(request.value, toolNow.value).tcp) : null;
+      return q && this.view.content.chain
+        ? this.view.content.chain.tcp(q, dressed(request.value, toolNow.value).tcp)
+        : null;
     } catch {
       return null;
     }
@@ -91,7 +112,10 @@ export class Drag {
     return { position: pose.position.map(rounded), rotvec: pose.rotvec };
   }
 
-  /** Says whether a pose is reached, and draws how. While an answer is awaited, only the last pose waits. */
+  /**
+   * Says whether a pose is reached, and draws how. While an answer is awaited, only the last pose
+   * waits.
+   */
   private async reach(pose: Pose): Promise<void> {
     this.waiting = pose;
     if (this.asking) return;
@@ -106,8 +130,12 @@ export class Drag {
         const far = (q: number[]) => Math.hypot(...q.map((x, j) => x - (near[j] ?? 0)));
         const [first] = (free.length ? free : [...solutions]).sort((a, b) => far(a.q) - far(b.q));
         reachedGhost.value = first?.q ?? null;
-        const collisions = free.length ? `${free.length} of them without a collision` : "all of them in a collision";
-        dragNote.value = first ? `Reached by ${solutions.length} configurations, ${collisions}.` : "No configuration reaches it.";
+        const collisions = free.length
+          ? `${free.length} of them without a collision`
+          : "all of them in a collision";
+        dragNote.value = first
+          ? `Reached by ${solutions.length} configurations, ${collisions}.`
+          : "No configuration reaches it.";
       } catch (error) {
         reachedGhost.value = null;
         dragNote.value = (error as Error).message;
@@ -116,7 +144,10 @@ export class Drag {
     this.asking = false;
   }
 
-  /** Writes the new pose into the request. What was not turned keeps its orientation as it was given. */
+  /**
+   * Writes the new pose into the request. What was not turned keeps its orientation as it was
+   * given.
+   */
   private release(): void {
     const chosen = selected.value;
     const robot = robotNow.value;
@@ -125,9 +156,14 @@ export class Drag {
     const given = row ? at(request.value, poseAt(row)) : at(request.value, `${chosen}/pose`);
     const before = isObject(given) ? (given as unknown as Pose) : null;
     const frame = row ? before?.frame : request.value.scene?.frame;
-    const inFrame = poseOfMatrix(multiply(inverse(frameOf(robot, frame)), ofPose(this.poseOfHandle())));
+    const inFrame = poseOfMatrix(
+      multiply(inverse(frameOf(robot, frame)), ofPose(this.poseOfHandle())),
+    );
     const position = inFrame.position.map((value) => Math.round(value * ROUND) / ROUND);
-    const moved = before && tool.value === "move" ? { ...before, position } : { position, rotvec: inFrame.rotvec, ...(row && frame ? { frame: before!.frame } : {}) };
+    const moved =
+      before && tool.value === "move"
+        ? { ...before, position }
+        : { position, rotvec: inFrame.rotvec, ...(row && frame ? { frame: before!.frame } : {}) };
     const pointer = row ? row.pointer : `${chosen}/pose`;
     edit(put(request.value, pointer, row ? targetOf(row, moved) : moved), untyped(pointer));
   }
@@ -140,11 +176,22 @@ export class Drag {
     const over = new AbortController();
     const canvas = this.view.renderer.domElement;
     let first: number[] | null = null;
-    canvas.addEventListener("pointerdown", (event) => (first = this.onFloor(event)), { signal: over.signal });
-    canvas.addEventListener("pointermove", (event) => {
-      const last = first && this.onFloor(event);
-      if (first && last) edit(withBox(before, frameOf(robotNow.value!, before.scene?.frame), first, last), typed.value, "draw a box");
-    }, { signal: over.signal });
+    canvas.addEventListener("pointerdown", (event) => (first = this.onFloor(event)), {
+      signal: over.signal,
+    });
+    canvas.addEventListener(
+      "pointermove",
+      (event) => {
+        const last = first && this.onFloor(event);
+        if (first && last)
+          edit(
+            withBox(before, frameOf(robotNow.value!, before.scene?.frame), first, last),
+            typed.value,
+            "draw a box",
+          );
+      },
+      { signal: over.signal },
+    );
     const end = () => {
       over.abort();
       this.view.controls.enabled = true;
@@ -163,18 +210,29 @@ export class Drag {
 
 /** What was typed, without what stands below a pointer. */
 export function untyped(pointer: string): Record<string, string> {
-  return Object.fromEntries(Object.entries(typed.value).filter(([each]) => !each.startsWith(`${pointer}/`)));
+  return Object.fromEntries(
+    Object.entries(typed.value).filter(([each]) => !each.startsWith(`${pointer}/`)),
+  );
 }
 
-/** The request with one more box, on the floor between two of its corners [x, y]; `frame`: that of the scene. */
+/**
+ * The request with one more box, on the floor between two of its corners [x, y]; `frame`: that of
+ * the scene.
+ */
 function withBox(asked: ApiRequest, frame: Matrix, first: number[], last: number[]): ApiRequest {
   const rounded = (value: number) => Math.round(value * 1000) / 1000;
   const size = first.map((value, axis) => Math.max(0.01, rounded(Math.abs(last[axis]! - value))));
   const position = first.map((value, axis) => rounded((value + last[axis]!) / 2));
   const obstacles = listOf<Obstacle>(asked.scene?.obstacles);
-  const name = freshName("box", obstacles.map((each) => each.name));
+  const name = freshName(
+    "box",
+    obstacles.map((each) => each.name),
+  );
   const pose = { position: [...position, HEIGHT / 2], rotvec: [0, 0, 0] };
-  const inFrame = asked.scene?.frame === "base_link" ? poseOfMatrix(multiply(inverse(frame), ofPose(pose))) : pose;
+  const inFrame =
+    asked.scene?.frame === "base_link"
+      ? poseOfMatrix(multiply(inverse(frame), ofPose(pose)))
+      : pose;
   const box: Obstacle = { name, shape: "box", size: [...size, HEIGHT], pose: inFrame };
   return { ...asked, scene: { ...asked.scene, obstacles: [...obstacles, box] } };
 }

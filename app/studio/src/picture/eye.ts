@@ -38,9 +38,14 @@ export class Eye {
     private readonly obstacles: THREE.Group,
   ) {}
 
-  /** What stands between the eye and the arm becomes faint, and so does what does not count, by name. */
+  /**
+   * What stands between the eye and the arm becomes faint, and so does what does not count, by
+   * name.
+   */
   fade(frames: Matrix[], ignored: string[], on: boolean, moving: boolean): void {
-    const hiding = new Set(this.obstacles.children.filter((each) => ignored.includes(solidOf(each).name)));
+    const hiding = new Set(
+      this.obstacles.children.filter((each) => ignored.includes(solidOf(each).name)),
+    );
     if (on)
       for (const T of [...frames.slice(2), multiply(frames.at(-1)!, ofPose(this.tcp))])
         for (const object of this.hiders(this.camera.position, T)) hiding.add(object);
@@ -49,19 +54,29 @@ export class Eye {
       const aim = hiding.has(object) ? FADED : 1;
       if (material.opacity === aim) continue;
       const step = moving ? 0.35 : 1;
-      material.opacity += Math.abs(aim - material.opacity) < 0.02 ? aim - material.opacity : step * (aim - material.opacity);
-      // what is not faint is drawn from front to back, and nothing is blended: that costs a slow machine least
+      material.opacity +=
+        Math.abs(aim - material.opacity) < 0.02
+          ? aim - material.opacity
+          : step * (aim - material.opacity);
+      // what is not faint is drawn from front to back, and nothing is blended: that costs a slow
+      // machine least
       material.transparent = material.opacity < 1;
       material.depthWrite = material.opacity > 0.6;
     }
   }
 
   /** Light, controls and distance for postures of an arm. */
-  fit(samples: number[][], chain: Chain, tcp: Partial<Pose> | undefined, sun: THREE.DirectionalLight): void {
+  fit(
+    samples: number[][],
+    chain: Chain,
+    tcp: Partial<Pose> | undefined,
+    sun: THREE.DirectionalLight,
+  ): void {
     this.tcp = tcp;
     this.postures = samples.map((q) => chain.frames(q));
     const box = new THREE.Box3(new THREE.Vector3(-0.2, -0.2, 0), new THREE.Vector3(0.2, 0.2, 0.4));
-    for (const frames of this.postures) for (const T of frames) box.expandByPoint(new THREE.Vector3(...positionOf(T)));
+    for (const frames of this.postures)
+      for (const T of frames) box.expandByPoint(new THREE.Vector3(...positionOf(T)));
     box.expandByScalar(0.1);
     const arm = box.getBoundingSphere(new THREE.Sphere()).radius;
     for (const object of this.obstacles.children) {
@@ -76,7 +91,14 @@ export class Eye {
     sun.position.copy(center).add(new THREE.Vector3(1.1, -0.7, 2.4).multiplyScalar(radius));
     sun.target.position.copy(center);
     const wide = 1.25 * radius;
-    Object.assign(sun.shadow.camera, { left: -wide, right: wide, bottom: -wide, top: wide, near: 0.1, far: 6 * radius });
+    Object.assign(sun.shadow.camera, {
+      left: -wide,
+      right: wide,
+      bottom: -wide,
+      top: wide,
+      near: 0.1,
+      far: 6 * radius,
+    });
     sun.shadow.camera.updateProjectionMatrix();
   }
 
@@ -103,14 +125,26 @@ export class Eye {
       for (const y of [min.y, max.y])
         for (const z of [min.z, max.z]) {
           const corner = new THREE.Vector3(x, y, z).sub(middle).applyQuaternion(back);
-          distance = Math.max(distance, corner.z + Math.max(Math.abs(corner.y), Math.abs(corner.x) / this.camera.aspect) / across);
+          distance = Math.max(
+            distance,
+            corner.z +
+              Math.max(Math.abs(corner.y), Math.abs(corner.x) / this.camera.aspect) / across,
+          );
         }
-    return from.clone().multiplyScalar(1.02 * distance).add(middle);
+    return from
+      .clone()
+      .multiplyScalar(1.02 * distance)
+      .add(middle);
   }
 
-  /** The direction around the arm from which obstacles hide least of its motion, and which the motion faces. */
+  /**
+   * The direction around the arm from which obstacles hide least of its motion, and which the
+   * motion faces.
+   */
   private clearest(): THREE.Vector3 {
-    const few = this.postures.filter((_, k, all) => k % Math.max(1, Math.floor(all.length / 5)) === 0);
+    const few = this.postures.filter(
+      (_, k, all) => k % Math.max(1, Math.floor(all.length / 5)) === 0,
+    );
     const tcps = few.map((frames) => multiply(frames.at(-1)!, ofPose(this.tcp)));
     const points = [...few.flatMap((frames) => frames.slice(3)), ...tcps];
     this.obstacles.updateMatrixWorld(true);
@@ -121,7 +155,9 @@ export class Eye {
       const angle = outward + 0.6 + (k * Math.PI) / 6;
       const from = new THREE.Vector3(Math.cos(angle), Math.sin(angle), 0.5).normalize();
       const eye = this.seeing(from, this.middle!);
-      const hidden = points.filter((T) => this.hiders(eye, T).length > 0).length - 0.2 * points.length * Math.cos(angle - outward);
+      const hidden =
+        points.filter((T) => this.hiders(eye, T).length > 0).length -
+        0.2 * points.length * Math.cos(angle - outward);
       if (hidden < best.hidden) best = { from, hidden };
     }
     return best.from;
@@ -130,7 +166,10 @@ export class Eye {
   /** The ray through the pointer. */
   aim({ offsetX, offsetY, target }: PointerEvent): THREE.Raycaster {
     const { clientWidth, clientHeight } = target as HTMLElement;
-    this.ray.setFromCamera(new THREE.Vector2((2 * offsetX) / clientWidth - 1, 1 - (2 * offsetY) / clientHeight), this.camera);
+    this.ray.setFromCamera(
+      new THREE.Vector2((2 * offsetX) / clientWidth - 1, 1 - (2 * offsetY) / clientHeight),
+      this.camera,
+    );
     this.ray.far = Infinity;
     return this.ray;
   }
@@ -148,6 +187,8 @@ export class Eye {
     const to = new THREE.Vector3(...positionOf(T));
     this.ray.set(eye, to.clone().sub(eye).normalize());
     this.ray.far = to.distanceTo(eye) - 0.03;
-    return this.obstacles.children.filter((object) => solidOf(object).hides && this.ray.intersectObject(object, true).length);
+    return this.obstacles.children.filter(
+      (object) => solidOf(object).hides && this.ray.intersectObject(object, true).length,
+    );
   }
 }

@@ -40,10 +40,14 @@ export class Labels {
   /** Drops labels `kind k` with k at or above `count`. */
   keep(kind: string, count: number): void {
     for (const name of [...this.all.keys()])
-      if (name.startsWith(`${kind} `) && Number(name.slice(kind.length + 1)) >= count) this.drop(name);
+      if (name.startsWith(`${kind} `) && Number(name.slice(kind.length + 1)) >= count)
+        this.drop(name);
   }
 
-  /** Puts every label where its point is seen; of those that would cover each other, later ones move down. */
+  /**
+   * Puts every label where its point is seen; of those that would cover each other, later ones move
+   * down.
+   */
   place({ width, height }: { width: number; height: number }): void {
     const taken: { left: number; right: number; top: number; bottom: number }[] = [];
     for (const { node, at, below } of this.all.values()) {
@@ -54,8 +58,16 @@ export class Labels {
       const [half, tall] = [node.offsetWidth / 2, node.offsetHeight];
       const x = Math.max(half, Math.min(width - half, ((point.x + 1) * width) / 2));
       let y = ((1 - point.y) * height) / 2 + below;
-      const meets = () => taken.find((box) => x - half < box.right && x + half > box.left && y - tall / 2 < box.bottom && y + tall / 2 > box.top);
-      for (let box = meets(), tries = 0; box && tries < 12; box = meets(), tries++) y = box.bottom + tall / 2 + 1;
+      const meets = () =>
+        taken.find(
+          (box) =>
+            x - half < box.right &&
+            x + half > box.left &&
+            y - tall / 2 < box.bottom &&
+            y + tall / 2 > box.top,
+        );
+      for (let box = meets(), tries = 0; box && tries < 12; box = meets(), tries++)
+        y = box.bottom + tall / 2 + 1;
       taken.push({ left: x - half, right: x + half, top: y - tall / 2, bottom: y + tall / 2 });
       node.style.transform = `translate(-50%, -50%) translate(${x}px, ${y}px)`;
     }

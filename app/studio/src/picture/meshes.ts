@@ -1,4 +1,5 @@
-// The maker's meshes, where the service has them: they take the place of what is drawn from a robot's figures.
+// The maker's meshes, where the service has them: they take the place of what is drawn from a
+// robot's figures.
 import { effect, untracked } from "@preact/signals";
 import type * as THREE from "three";
 import { meshFileOf } from "../store/service";
@@ -16,7 +17,10 @@ export function followMeshes(view: View): () => void {
     try {
       const scene = await readMeshes("glb", await meshFileOf(robot.name));
       drawn.add(robot.name);
-      drawBy(robot, linkNames(robot).map((name) => (scene.getObjectByName(name) as THREE.Mesh).geometry));
+      drawBy(
+        robot,
+        linkNames(robot).map((name) => (scene.getObjectByName(name) as THREE.Mesh).geometry),
+      );
       view.build();
     } catch {
       // drawn from its figures; the next answer asks again

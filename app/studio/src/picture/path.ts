@@ -4,13 +4,19 @@ import { positionOf, type Matrix } from "../store/chain";
 import type { Trajectory } from "../store/types";
 
 // cividis: its colours differ in lightness, so that the colour-blind tell them apart
-const RAMP = ["#00306f", "#39486b", "#62616d", "#8a7b75", "#b6996a", "#e1bd52", "#ffe945"].map((colour) => new THREE.Color(colour));
+const RAMP = ["#00306f", "#39486b", "#62616d", "#8a7b75", "#b6996a", "#e1bd52", "#ffe945"].map(
+  (colour) => new THREE.Color(colour),
+);
 const MOST = 300;
 
 export const rampStops = RAMP.map((colour) => `#${colour.getHexString()}`);
 
 /** A tube of `radius` [m] along the TCP of a trajectory; `tcp` maps joint positions to its pose. */
-export function pathOfPower({ q, power }: Trajectory, tcp: (q: number[]) => Matrix, radius: number): THREE.Object3D {
+export function pathOfPower(
+  { q, power }: Trajectory,
+  tcp: (q: number[]) => Matrix,
+  radius: number,
+): THREE.Object3D {
   const step = Math.ceil(q.length / MOST);
   const kept = q.map((_, k) => k).filter((k) => k % step === 0 || k === q.length - 1);
   const points = kept.map((k) => new THREE.Vector3(...positionOf(tcp(q[k]!))));
@@ -25,7 +31,9 @@ export function pathOfPower({ q, power }: Trajectory, tcp: (q: number[]) => Matr
   const colours = kept.flatMap((k) => {
     const place = ((RAMP.length - 1) * (power[k]! - least)) / (most - least || 1);
     const index = Math.min(Math.floor(place), RAMP.length - 2);
-    const colour = RAMP[index]!.clone().lerp(RAMP[index + 1]!, place - index).toArray();
+    const colour = RAMP[index]!.clone()
+      .lerp(RAMP[index + 1]!, place - index)
+      .toArray();
     return Array.from({ length: around }, () => colour).flat();
   });
   geometry.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));

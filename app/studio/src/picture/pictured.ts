@@ -23,7 +23,10 @@ export interface Pictured {
   goal: number[] | null;
 }
 
-/** The configuration that a target names, or the one that reaches it without a collision nearest to `near`. */
+/**
+ * The configuration that a target names, or the one that reaches it without a collision nearest to
+ * `near`.
+ */
 export function configurationOf(row: Row | undefined, near: number[] | null): number[] | null {
   if (!row) return null;
   const target = targetAt(request.value, row);
@@ -50,9 +53,19 @@ export const pictured = computed<Pictured | null>(() => {
   const rows = rowsOf(request.value);
   const fits = (q: number[] | null | undefined) => (q?.length === robot.joints.length ? q : null);
   const old = shown?.robot.name === robot.name ? shown.solution.branch : null;
-  const start = fits(configurationOf(rows[0], old?.start.q ?? null)) ?? fits(old?.start.q) ?? robot.joints.map(() => 0);
+  const start =
+    fits(configurationOf(rows[0], old?.start.q ?? null)) ??
+    fits(old?.start.q) ??
+    robot.joints.map(() => 0);
   const goal = fits(configurationOf(rows.at(-1), old?.goal.q ?? start));
-  return { robot, cell: stillCell(dressed(request.value, toolNow.value), robot), motion: null, arms: [], start, goal: rows.length > 1 ? goal : null };
+  return {
+    robot,
+    cell: stillCell(dressed(request.value, toolNow.value), robot),
+    motion: null,
+    arms: [],
+    start,
+    goal: rows.length > 1 ? goal : null,
+  };
 });
 
 /** The cell of a request that is being edited; what is wrong with it, the service says. */

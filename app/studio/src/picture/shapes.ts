@@ -18,12 +18,21 @@ export function place<T extends THREE.Object3D>(object: T, T_: Matrix): T {
 
 const upright = <T extends THREE.BufferGeometry>(geometry: T) => geometry.rotateX(Math.PI / 2);
 
-/** A geometry from `from` to `to`, both [x, y, z], made along z about its centre by `make(length)`. */
-export function along(from: number[], to: number[], make: (length: number) => THREE.BufferGeometry): THREE.BufferGeometry {
+/**
+ * A geometry from `from` to `to`, both [x, y, z], made along z about its centre by `make(length)`.
+ */
+export function along(
+  from: number[],
+  to: number[],
+  make: (length: number) => THREE.BufferGeometry,
+): THREE.BufferGeometry {
   const [a, b] = [new THREE.Vector3().fromArray(from), new THREE.Vector3().fromArray(to)];
   const direction = b.clone().sub(a);
   const geometry = make(direction.length());
-  const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), direction.clone().normalize());
+  const turn = new THREE.Quaternion().setFromUnitVectors(
+    new THREE.Vector3(0, 0, 1),
+    direction.clone().normalize(),
+  );
   const middle = a.add(b).multiplyScalar(0.5);
   return geometry.applyQuaternion(turn).translate(middle.x, middle.y, middle.z);
 }
@@ -32,7 +41,12 @@ export const capsule = (from: number[], to: number[], radius: number, segments =
   along(from, to, (length) => upright(new THREE.CapsuleGeometry(radius, length, 8, segments)));
 
 /** A cylinder along z whose edges are rounded by `round` [m]. */
-export function roundedCylinder(radius: number, length: number, round: number, segments = 32): THREE.BufferGeometry {
+export function roundedCylinder(
+  radius: number,
+  length: number,
+  round: number,
+  segments = 32,
+): THREE.BufferGeometry {
   const edge = Math.min(round, radius / 2, length / 2);
   const [wide, high] = [radius - edge, length / 2 - edge];
   const profile = new THREE.Path();
@@ -53,7 +67,10 @@ interface Fields extends Shape {
   scale?: number;
 }
 
-/** An object in the frame of the shape's pose; `margin` [m] makes it thicker. Mesh files fill themselves later. */
+/**
+ * An object in the frame of the shape's pose; `margin` [m] makes it thicker. Mesh files fill
+ * themselves later.
+ */
 export function shapeObject(shape: Fields, material: THREE.Material, margin = 0): THREE.Object3D {
   const solid = (geometry: THREE.BufferGeometry) => new THREE.Mesh(geometry, material);
   const twice = 2 * margin;
@@ -66,7 +83,9 @@ export function shapeObject(shape: Fields, material: THREE.Material, margin = 0)
     case "sphere":
       return solid(new THREE.SphereGeometry(radius, 32, 20));
     case "cylinder":
-      return solid(upright(new THREE.CylinderGeometry(radius, radius, (shape.length ?? 0) + twice, 40)));
+      return solid(
+        upright(new THREE.CylinderGeometry(radius, radius, (shape.length ?? 0) + twice, 40)),
+      );
     case "capsule":
       return solid(upright(new THREE.CapsuleGeometry(radius, shape.length ?? 0, 10, 28)));
     case "mesh":
@@ -77,7 +96,11 @@ export function shapeObject(shape: Fields, material: THREE.Material, margin = 0)
       return cells(new THREE.IcosahedronGeometry(radius, 1), shape.points ?? [], material);
     case "voxels": {
       const size = shape.size as number;
-      return cells(new THREE.BoxGeometry(size + twice, size + twice, size + twice), voxelCentres(shape, size), material);
+      return cells(
+        new THREE.BoxGeometry(size + twice, size + twice, size + twice),
+        voxelCentres(shape, size),
+        material,
+      );
     }
     case "mesh_file":
       return meshFile(shape, material);
@@ -91,7 +114,9 @@ function hull(vertices: number[][], margin: number): THREE.Vector3[] {
   const corners = vertices.map((point) => new THREE.Vector3().fromArray(point));
   if (!margin) return corners;
   const ball = new THREE.IcosahedronGeometry(margin, 1).attributes.position!;
-  const around = Array.from({ length: ball.count }, (_, k) => new THREE.Vector3().fromBufferAttribute(ball, k));
+  const around = Array.from({ length: ball.count }, (_, k) =>
+    new THREE.Vector3().fromBufferAttribute(ball, k),
+  );
   return corners.flatMap((corner) => around.map((offset) => corner.clone().add(offset)));
 }
 
@@ -101,7 +126,11 @@ function halfSpace(material: THREE.Material, margin: number): THREE.Object3D {
   return new THREE.Group().add(plane);
 }
 
-function cells(geometry: THREE.BufferGeometry, centres: number[][], material: THREE.Material): THREE.Object3D {
+function cells(
+  geometry: THREE.BufferGeometry,
+  centres: number[][],
+  material: THREE.Material,
+): THREE.Object3D {
   const step = Math.ceil(centres.length / MOST_CELLS);
   const drawn = centres.filter((_, k) => k % step === 0);
   const mesh = new THREE.InstancedMesh(geometry, material, drawn.length);
@@ -118,7 +147,8 @@ function voxelCentres({ cells: given, bits }: Fields, size: number): number[][] 
   const bytes = fromBase64(bits.data);
   const centres: number[][] = [];
   for (let bit = 0; bit < nx * ny * nz; bit++)
-    if ((bytes[bit >> 3]! >> (bit & 7)) & 1) centres.push(centre([bit % nx, Math.floor(bit / nx) % ny, Math.floor(bit / (nx * ny))]));
+    if ((bytes[bit >> 3]! >> (bit & 7)) & 1)
+      centres.push(centre([bit % nx, Math.floor(bit / nx) % ny, Math.floor(bit / (nx * ny))]));
   return centres;
 }
 
@@ -145,7 +175,10 @@ export function readMeshes(format: string, bytes: Uint8Array): Promise<THREE.Obj
 }
 
 /** A group that fills itself. */
-function meshFile({ format = "", data = "", scale = 1 }: Fields, material: THREE.Material): THREE.Object3D {
+function meshFile(
+  { format = "", data = "", scale = 1 }: Fields,
+  material: THREE.Material,
+): THREE.Object3D {
   const group = new THREE.Group();
   group.scale.setScalar(scale);
   const fill = (object: THREE.Object3D) => {
@@ -158,7 +191,9 @@ function meshFile({ format = "", data = "", scale = 1 }: Fields, material: THREE
     group.add(object);
     (group.userData.filled as (() => void) | undefined)?.();
   };
-  readMeshes(format, fromBase64(data)).then(fill).catch((error: Error) => console.warn(`A mesh file cannot be drawn: ${error.message}`));
+  readMeshes(format, fromBase64(data))
+    .then(fill)
+    .catch((error: Error) => console.warn(`A mesh file cannot be drawn: ${error.message}`));
   return group;
 }
 

@@ -7,10 +7,12 @@ import { Eye, solidOf } from "./eye";
 import { Labels } from "./labels";
 import { PARTS, type Parts } from "./parts";
 
-// time of a frame [s] above which the picture gets coarser while it moves, and below which finer again
+// time of a frame [s] above which the picture gets coarser while it moves, and below which finer
+// again
 const SLOW = 0.055;
 const FAST = 0.022;
-// pixels along an edge of a pixel of the page, of a still picture: its edges are smooth by that alone
+// pixels along an edge of a pixel of the page, of a still picture: its edges are smooth by that
+// alone
 const STILL = 2;
 const PAUSE = 400; // until then a picture does not count as still [ms]
 const AXIS = 0.22; // length of an arrow of the base frame [m]
@@ -48,7 +50,11 @@ export class View {
     layer: HTMLElement,
   ) {
     // softer shadows cost a machine without a graphics card a third of its frames
-    Object.assign(this.renderer.shadowMap, { enabled: true, type: THREE.BasicShadowMap, autoUpdate: false });
+    Object.assign(this.renderer.shadowMap, {
+      enabled: true,
+      type: THREE.BasicShadowMap,
+      autoUpdate: false,
+    });
     box.prepend(this.renderer.domElement);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
@@ -63,7 +69,8 @@ export class View {
     this.axes();
     const canvas = this.renderer.domElement;
     canvas.addEventListener("pointermove", (event) => event.buttons || this.hover(event));
-    for (const name of ["pointerdown", "pointerleave"] as const) canvas.addEventListener(name, () => this.hover(null));
+    for (const name of ["pointerdown", "pointerleave"] as const)
+      canvas.addEventListener(name, () => this.hover(null));
     new ResizeObserver(() => this.resize()).observe(box);
     this.resize();
   }
@@ -88,8 +95,15 @@ export class View {
   private axes(): void {
     AXES.forEach(([x, y, z, colour], axis) => {
       const direction = new THREE.Vector3(x, y, z);
-      this.parts.axes.add(new THREE.ArrowHelper(direction, new THREE.Vector3(), AXIS, colour, 0.035, 0.02));
-      this.labels.put(`axis ${axis}`, "xyz"[axis]!, [x, y, z].map((part) => part * (AXIS + 0.02)), "axis");
+      this.parts.axes.add(
+        new THREE.ArrowHelper(direction, new THREE.Vector3(), AXIS, colour, 0.035, 0.02),
+      );
+      this.labels.put(
+        `axis ${axis}`,
+        "xyz"[axis]!,
+        [x, y, z].map((part) => part * (AXIS + 0.02)),
+        "axis",
+      );
     });
   }
 
@@ -122,7 +136,10 @@ export class View {
     this.over = over;
   }
 
-  /** Draws once, at the next frame of the browser. The shadows are as before if nothing moved but the eye. */
+  /**
+   * Draws once, at the next frame of the browser. The shadows are as before if nothing moved but
+   * the eye.
+   */
   draw(onlyEye = false): void {
     if (!onlyEye) this.renderer.shadowMap.needsUpdate = true;
     if (this.waiting) return;
@@ -149,11 +166,18 @@ export class View {
     if (!fine) this.refining = setTimeout(() => this.render(true), PAUSE);
   }
 
-  /** Coarser while frames come slowly, finer when they come fast. A still picture is always fine. */
+  /**
+   * Coarser while frames come slowly, finer when they come fast. A still picture is always fine.
+   */
   private adapt(now: number): void {
     const took = (now - (this.last ?? now)) / 1000;
     if (this.fineness === this.coarse && took < 0.5) this.pace = 0.8 * this.pace + 0.2 * took;
-    const step = this.pace > SLOW && this.coarse > 0.5 ? -0.25 : this.pace < FAST && this.coarse < STILL ? 0.25 : 0;
+    const step =
+      this.pace > SLOW && this.coarse > 0.5
+        ? -0.25
+        : this.pace < FAST && this.coarse < STILL
+          ? 0.25
+          : 0;
     if (step) this.pace = (SLOW + FAST) / 2;
     this.coarse += step;
     this.setFineness(this.coarse);

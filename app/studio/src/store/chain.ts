@@ -1,4 +1,5 @@
-// Where the links of an arm are. Matrices are 4 x 4, row by row, in arrays of 16; lengths in m, angles in rad.
+// Where the links of an arm are. Matrices are 4 x 4, row by row, in arrays of 16; lengths in m,
+// angles in rad.
 import { Euler, Matrix4, Quaternion, Vector3 } from "three";
 import type { ApiRequest, Obstacle, Pose, Robot } from "./types";
 
@@ -87,7 +88,9 @@ export class Chain {
     this.flange = ofOrigin(robot.kinematics.flange_origin!.value as number[]);
   }
 
-  /** Matrices from the base to every link at joint positions q: base, one for each joint, flange. */
+  /**
+   * Matrices from the base to every link at joint positions q: base, one for each joint, flange.
+   */
   frames(q: number[]): Matrix[] {
     const frames = [IDENTITY];
     this.placements.forEach((placement, joint) => {
@@ -104,7 +107,10 @@ export class Chain {
   }
 }
 
-/** A row of samples at time t, linear between two of them; the first before the begin, the last after the end. */
+/**
+ * A row of samples at time t, linear between two of them; the first before the begin, the last
+ * after the end.
+ */
 export function sampleAt(times: number[], samples: number[][], t: number): number[] {
   const after = times.findIndex((time) => time > t);
   const high = after < 0 ? times.length - 1 : Math.max(1, after);

@@ -1,4 +1,5 @@
-// Requests to the service. All addresses are relative to the page, so that they hold behind a proxy's path.
+// Requests to the service. All addresses are relative to the page, so that they hold behind a
+// proxy's path.
 import { signal } from "@preact/signals";
 import type { ProblemDetails } from "./types";
 
@@ -24,17 +25,27 @@ export const post = async <T>(path: string, body: unknown, signal?: AbortSignal)
 
 export const remove = (path: string) => send(path, { method: "DELETE" });
 
-const posting = (body: unknown, signal?: AbortSignal, headers: Record<string, string> = {}): RequestInit => ({
+const posting = (
+  body: unknown,
+  signal?: AbortSignal,
+  headers: Record<string, string> = {},
+): RequestInit => ({
   method: "POST",
   body: JSON.stringify(body),
   headers: { "Content-Type": "application/json", ...headers },
   signal,
 });
 
-/** The response to a request that was accepted. It asks for the key where one is needed. Throws Problem. */
+/**
+ * The response to a request that was accepted. It asks for the key where one is needed. Throws
+ * Problem.
+ */
 export async function send(path: string, options: RequestInit): Promise<Response> {
   const key = sessionStorage.getItem(KEY);
-  const headers = { ...(options.headers as Record<string, string>), ...(key ? { Authorization: `Bearer ${key}` } : {}) };
+  const headers = {
+    ...(options.headers as Record<string, string>),
+    ...(key ? { Authorization: `Bearer ${key}` } : {}),
+  };
   let response: Response;
   try {
     response = await fetch(path.replace(/^\//, ""), { ...options, headers });
@@ -55,12 +66,21 @@ export async function send(path: string, options: RequestInit): Promise<Response
 async function problemOf(response: Response): Promise<ProblemDetails> {
   const title = `The service answered ${response.status}`; // a proxy's own page
   const details = (await response.json().catch(() => ({ title }))) as ProblemDetails;
-  return { status: response.status, retry: Number(response.headers.get("Retry-After")) || null, ...details };
+  return {
+    status: response.status,
+    retry: Number(response.headers.get("Retry-After")) || null,
+    ...details,
+  };
 }
 
 /** Posts, and passes every event of the stream on. Where the answer is plain JSON, it is the only event: `answer`.
  * Throws Problem, or AbortError. */
-export async function stream(path: string, body: unknown, event: (name: string, data: unknown) => void, signal: AbortSignal): Promise<void> {
+export async function stream(
+  path: string,
+  body: unknown,
+  event: (name: string, data: unknown) => void,
+  signal: AbortSignal,
+): Promise<void> {
   const accept = { Accept: "text/event-stream, application/json;q=0.9" };
   const response = await send(path, posting(body, signal, accept));
   if (!response.headers.get("Content-Type")?.startsWith("text/event-stream")) {
@@ -82,7 +102,9 @@ export async function stream(path: string, body: unknown, event: (name: string, 
 function pass(block: string, event: (name: string, data: unknown) => void): void {
   const lines = block.split("\n");
   const of = (name: string) =>
-    lines.filter((line) => line.startsWith(`${name}:`)).map((line) => line.slice(name.length + 1).replace(/^ /, ""));
+    lines
+      .filter((line) => line.startsWith(`${name}:`))
+      .map((line) => line.slice(name.length + 1).replace(/^ /, ""));
   const data = of("data").join("\n");
   if (!data) return;
   const name = of("event")[0] ?? "message";

@@ -11,9 +11,17 @@ const SAMPLED = ["q", "v", "a", "tau", "tau_motor", "power"] as const;
 
 /** An answer of POST /cycle as something to show: its moves, which are kept answers, and its rests become one motion.
  * Throws Problem. */
-export async function cycleAnswered(cycle: Cycle, asked: ApiRequest | null, took: number | null): Promise<Answered> {
+export async function cycleAnswered(
+  cycle: Cycle,
+  asked: ApiRequest | null,
+  took: number | null,
+): Promise<Answered> {
   const robot = await robotOf(cycle.robot);
-  const moves = await Promise.all(cycle.legs.map(async ({ answer }) => (answer ? (await get<{ answer: Solution }>(answer.replace(/^\//, ""))).answer : null)));
+  const moves = await Promise.all(
+    cycle.legs.map(async ({ answer }) =>
+      answer ? (await get<{ answer: Solution }>(answer.replace(/^\//, ""))).answer : null,
+    ),
+  );
   const first = moves.find((move) => move !== null);
   if (!first) throw new Error("This round has no move that could be shown.");
   const worst = cycle.certificate.clearance;
@@ -25,7 +33,10 @@ export async function cycleAnswered(cycle: Cycle, asked: ApiRequest | null, took
     trajectory: joined(cycle.legs, moves),
     candidates: [],
     candidate_counts: {},
-    baselines: cycle.baselines.map((each) => ({ ...each, reason: each.within_limits ? null : (each.reason ?? "a limit of a move") })),
+    baselines: cycle.baselines.map((each) => ({
+      ...each,
+      reason: each.within_limits ? null : (each.reason ?? "a limit of a move"),
+    })),
     certificate: { ...first.certificate, ...cycle.certificate, clearance },
     branch: { start: cycle.legs[0]!.start, goal: cycle.legs.at(-1)!.goal },
   };
@@ -54,24 +65,46 @@ function resting({ duration, start, electrical }: Leg): Trajectory {
   const still = start.q.map(() => 0);
   const of = <T>(value: T) => t.map(() => value);
   const rest = of(still);
-  return { t, q: of(start.q), v: rest, a: rest, tau: rest, tau_motor: rest, power: of(electrical / (duration || 1)) };
+  return {
+    t,
+    q: of(start.q),
+    v: rest,
+    a: rest,
+    tau: rest,
+    tau_motor: rest,
+    power: of(electrical / (duration || 1)),
+  };
 }
 
-/** What the arm carries from each leg on, and the obstacles that do not count then: as the moves' answers say. */
-function loadsOf(legs: Leg[], moves: (Solution | null)[], { payload = null, scene }: ApiRequest): CycleShown["loads"] {
+/**
+ * What the arm carries from each leg on, and the obstacles that do not count then: as the moves'
+ * answers say.
+ */
+function loadsOf(
+  legs: Leg[],
+  moves: (Solution | null)[],
+  { payload = null, scene }: ApiRequest,
+): CycleShown["loads"] {
   const all = (scene?.obstacles ?? []).map(({ name }) => name);
   return legs.map(({ t0 }, k) => {
     // at a stop the arm carries what it carries on its next move
     const next = [...moves.slice(k), ...moves.slice(0, k).reverse()].find((move) => move !== null);
     const arm = next?.arm ?? { payload };
     const counted = new Set((arm.scene?.obstacles ?? []).map(({ name }) => name));
-    return { t0, payload: arm.payload ?? null, ignored: arm.scene ? all.filter((name) => !counted.has(name)) : [] };
+    return {
+      t0,
+      payload: arm.payload ?? null,
+      ignored: arm.scene ? all.filter((name) => !counted.has(name)) : [],
+    };
   });
 }
 
 /** Number of the leg at a time of the round. */
 export function legAt(legs: { t0: number }[], time: number): number {
-  return Math.max(0, legs.findLastIndex(({ t0 }) => t0 <= time + 1e-9));
+  return Math.max(
+    0,
+    legs.findLastIndex(({ t0 }) => t0 <= time + 1e-9),
+  );
 }
 
 export function legName({ kind, start, passes, goal }: Leg): string {

@@ -26,11 +26,14 @@ export function diff(before: ApiRequest, after: ApiRequest): Change[] {
 function leaves(a: unknown, b: unknown, pointer: Pointer): Pointer[] {
   if (Object.is(a, b)) return [];
   const lists = Array.isArray(a) && Array.isArray(b) && a.length === b.length;
-  if (!lists && !(isObject(a) && isObject(b))) return JSON.stringify(a) === JSON.stringify(b) ? [] : [pointer];
+  if (!lists && !(isObject(a) && isObject(b)))
+    return JSON.stringify(a) === JSON.stringify(b) ? [] : [pointer];
   const [one, two] = [a as Record<string, unknown>, b as Record<string, unknown>];
   const keys = new Set([...Object.keys(one), ...Object.keys(two)]);
   const turned = isObject(a) && isObject(b) && turnForm(a) !== turnForm(b);
-  const inner = [...keys].filter((key) => !turned || !TURNS.includes(key)).flatMap((key) => leaves(one[key], two[key], `${pointer}/${key}`));
+  const inner = [...keys]
+    .filter((key) => !turned || !TURNS.includes(key))
+    .flatMap((key) => leaves(one[key], two[key], `${pointer}/${key}`));
   return turned ? [...inner, `${pointer}/rotvec`] : inner;
 }
 
@@ -39,22 +42,34 @@ const TURNS = ["quaternion", "rpy", "rotvec"];
 const turnForm = (pose: Record<string, unknown>) => TURNS.find((key) => key in pose);
 
 /** What stands at a pointer, as the page names it. */
-export function nameOf(pointer: Pointer, request: ApiRequest, before: ApiRequest = request): string {
+export function nameOf(
+  pointer: Pointer,
+  request: ApiRequest,
+  before: ApiRequest = request,
+): string {
   const keys = keysOf(pointer);
   const [first = "", second = ""] = keys;
-  if (first === "start" || first === "goal") return [capital(first), ...tail(keys.slice(1))].join(" ");
+  if (first === "start" || first === "goal")
+    return [capital(first), ...tail(keys.slice(1))].join(" ");
   if (first === "stops" && second !== "") {
     const stop = at(request, `/stops/${second}`) ?? at(before, `/stops/${second}`);
     return [stopName(stop, Number(second)), ...tail(keys.slice(2))].join(" ");
   }
   if (first === "scene" && second === "obstacles" && keys[2] !== undefined) {
-    const obstacle = at(request, `/scene/obstacles/${keys[2]}/name`) ?? at(before, `/scene/obstacles/${keys[2]}/name`);
+    const obstacle =
+      at(request, `/scene/obstacles/${keys[2]}/name`) ??
+      at(before, `/scene/obstacles/${keys[2]}/name`);
     return [String(obstacle ?? "Obstacle"), ...tail(keys.slice(3))].join(" ");
   }
   if (first === "scene") return "Scene";
   if (first === "tcp") return ["TCP", ...tail(keys.slice(1))].join(" ");
   if (pointer === "/payload/mass") return "Payload";
-  return capital(keys.filter((key) => key !== "target").map(words).join(" "));
+  return capital(
+    keys
+      .filter((key) => key !== "target")
+      .map(words)
+      .join(" "),
+  );
 }
 
 const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -65,12 +80,17 @@ function tail(keys: string[]): string[] {
   if (last === "rotvec") return [`R${AXES[Number(index)] ?? ""}`];
   if (last === "q") return [`joint ${Number(index) + 1}`];
   if (last === "size") return [`size ${AXES[Number(index)] ?? ""}`];
-  return keys.filter((key) => !["target", "pose", "q"].includes(key)).map((key) => (key === "rotvec" ? "orientation" : words(key)));
+  return keys
+    .filter((key) => !["target", "pose", "q"].includes(key))
+    .map((key) => (key === "rotvec" ? "orientation" : words(key)));
 }
 
 /** The unit in which a value at a pointer is shown. */
 export function unitAt(pointer: Pointer): UnitName {
-  if (/\/(position|size|com|start|end)(\/\d)?$|\/(margin|radius|length|distance|blend)$/.test(pointer)) return "mm";
+  if (
+    /\/(position|size|com|start|end)(\/\d)?$|\/(margin|radius|length|distance|blend)$/.test(pointer)
+  )
+    return "mm";
   if (/\/q\/\d$/.test(pointer)) return "deg";
   if (/\/(rotvec|rpy)\/\d$/.test(pointer)) return "rad";
   if (/\/mass$/.test(pointer)) return "kg";
@@ -88,7 +108,9 @@ function textOf(pointer: Pointer, value: unknown): string {
   if (typeof value === "boolean") return value ? "yes" : "no";
   if (Array.isArray(value)) {
     const numbers = value.every((each) => typeof each === "number");
-    return numbers ? value.map((each: number) => fixed(each, 3)).join(", ") : `${value.length} entries`;
+    return numbers
+      ? value.map((each: number) => fixed(each, 3)).join(", ")
+      : `${value.length} entries`;
   }
   return isObject(value) && typeof value.mass === "number" ? `${value.mass} kg` : "set";
 }

@@ -40,8 +40,15 @@ export interface Costs {
   carbon: { shift: number; year: number };
 }
 
-/** Costs of a motion of `energy` [J] that takes `duration` [s], with `waiting` [J] until the next one begins. */
-export function costsOf(parts: { name: string; joules: number }[], duration: number, given: Economics): Costs {
+/**
+ * Costs of a motion of `energy` [J] that takes `duration` [s], with `waiting` [J] until the next
+ * one begins.
+ */
+export function costsOf(
+  parts: { name: string; joules: number }[],
+  duration: number,
+  given: Economics,
+): Costs {
   const cycle = Math.max(given.cycle ?? duration, duration);
   const cyclesPerShift = Math.floor((given.shift * 3600) / cycle + 1e-9);
   const box = given.box ? [{ name: "Control box", joules: given.box.value * cycle }] : [];
@@ -52,5 +59,12 @@ export function costsOf(parts: { name: string; joules: number }[], duration: num
   const sum = (key: "joules" | "shift" | "year") => rows.reduce((all, row) => all + row[key], 0);
   const total = { joules: sum("joules"), shift: sum("shift"), year: sum("year") };
   const times = (value: number) => ({ shift: total.shift * value, year: total.year * value });
-  return { cycle, cyclesPerShift, rows, total, money: times(given.price.value), carbon: times(given.carbon.value) };
+  return {
+    cycle,
+    cyclesPerShift,
+    rows,
+    total,
+    money: times(given.price.value),
+    carbon: times(given.carbon.value),
+  };
 }

@@ -14,11 +14,16 @@ const without = (request: ApiRequest, fields: string[]): ApiRequest =>
 export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
   if (kind === "round") {
     if (request.stops) return request;
-    const via = listOf<Pose>(at(request, "/path/via")).map((pose, k): Stop => ({ name: `via ${k + 1}`, target: { pose } }));
+    const via = listOf<Pose>(at(request, "/path/via")).map((pose, k): Stop => ({
+      name: `via ${k + 1}`,
+      target: { pose },
+    }));
     const goal: Stop = { name: "goal", target: request.goal ?? null };
     return { ...without(request, OF_MOVES), stops: [...via, goal] };
   }
-  const last = listOf<Stop>(request.stops).filter((stop) => isObject(stop) && stop.target).at(-1)?.target;
+  const last = listOf<Stop>(request.stops)
+    .filter((stop) => isObject(stop) && stop.target)
+    .at(-1)?.target;
   const goal = request.stops ? last : request.goal;
   const rest = without(request, request.stops ? OF_ROUNDS : ["path"]);
   const move: ApiRequest = goal === undefined ? rest : { ...rest, goal };
@@ -27,7 +32,10 @@ export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
 
 const namesOf = (stops: Stop[]) => stops.map((stop, k) => stop?.name ?? `${k + 1}`);
 
-/** The request with one more stop at its end; a move becomes a round, a path has one more pose on its way. */
+/**
+ * The request with one more stop at its end; a move becomes a round, a path has one more pose on
+ * its way.
+ */
 export function withStop(request: ApiRequest, target: unknown = null, name = "stop 1"): ApiRequest {
   const round = asKind(request, "round");
   const stops = listOf<Stop>(round.stops);
@@ -44,10 +52,18 @@ export function entryOf(row: Row): { list: Pointer; index: number } | null {
   return found ? { list: found[1]!, index: Number(found[2]) } : null;
 }
 
-function relisted(request: ApiRequest, row: Row, change: (items: unknown[], index: number) => unknown[]): ApiRequest {
+function relisted(
+  request: ApiRequest,
+  row: Row,
+  change: (items: unknown[], index: number) => unknown[],
+): ApiRequest {
   const entry = entryOf(row);
   if (!entry) return request;
-  return put(request, entry.list, change([...listOf<unknown>(at(request, entry.list))], entry.index));
+  return put(
+    request,
+    entry.list,
+    change([...listOf<unknown>(at(request, entry.list))], entry.index),
+  );
 }
 
 export const withoutRow = (request: ApiRequest, row: Row) =>
@@ -57,7 +73,8 @@ export const withoutRow = (request: ApiRequest, row: Row) =>
 export const duplicated = (request: ApiRequest, row: Row) =>
   relisted(request, row, (items, index) => {
     const copy = structuredClone(items[index]);
-    if (isObject(copy) && row.role === "stop") copy.name = freshName(row.name, namesOf(items as Stop[]));
+    if (isObject(copy) && row.role === "stop")
+      copy.name = freshName(row.name, namesOf(items as Stop[]));
     return [...items.slice(0, index + 1), copy, ...items.slice(index + 1)];
   });
 
@@ -71,8 +88,11 @@ export const moved = (request: ApiRequest, row: Row, steps: number) =>
     return items;
   });
 
-export const withTarget = (request: ApiRequest, row: Row, target: { pose: Pose } | { q: number[] }) =>
-  put(request, row.pointer, "pose" in target ? targetOf(row, target.pose) : target);
+export const withTarget = (
+  request: ApiRequest,
+  row: Row,
+  target: { pose: Pose } | { q: number[] },
+) => put(request, row.pointer, "pose" in target ? targetOf(row, target.pose) : target);
 
 export const OBSTACLES = {
   box: { shape: "box", size: [0.2, 0.2, 0.2] },
@@ -82,9 +102,19 @@ export const OBSTACLES = {
 } as const;
 
 /** The request with one more obstacle. */
-export function withObstacle(request: ApiRequest, shape: Omit<Obstacle, "name">, name: string): ApiRequest {
+export function withObstacle(
+  request: ApiRequest,
+  shape: Omit<Obstacle, "name">,
+  name: string,
+): ApiRequest {
   const others = listOf<Obstacle>(at(request, "/scene/obstacles"));
-  const own: Obstacle = { ...shape, name: freshName(name, others.map((each) => each?.name)) } as Obstacle;
+  const own: Obstacle = {
+    ...shape,
+    name: freshName(
+      name,
+      others.map((each) => each?.name),
+    ),
+  } as Obstacle;
   return put(request, "/scene", { ...request.scene, obstacles: [...others, own] });
 }
 

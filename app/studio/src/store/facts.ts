@@ -39,11 +39,16 @@ export function brokenLimit({ solution }: Answered): string | null {
   const { worst_ratio: ratios, clearance } = solution.certificate;
   const over = Object.entries(ratios).find(([, share]) => (share ?? 0) > FULL);
   if (over) return `${words(over[0])} at ${figure((over[1] ?? 0) * 100)} % of its limit`;
-  if (clearance && clearance.min_clearance < -1e-4) return `${clearance.pair.join(" and ")} come too close`;
+  if (clearance && clearance.min_clearance < -1e-4)
+    return `${clearance.pair.join(" and ")} come too close`;
   return null;
 }
 
 /** `left/up/no_flip` in words. */
-export const postureWords = (label: string) => label.split("/").map((part) => words(part)).join(", ");
+export const postureWords = (label: string) =>
+  label
+    .split("/")
+    .map((part) => words(part))
+    .join(", ");
 
 export const plain = (text: string) => text.replaceAll("`", "");

@@ -17,9 +17,15 @@ export type MovesRead = { moves: Move[]; readings: Reading[] } | { why: string }
 const SEPARATOR = /[;,\t]/;
 const isNumber = (cell: string) => /^[+\-−]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(cell);
 
-/** Reads a table with one move in a row: names, kg, six numbers of the start, six of the goal; or one target in a row. */
+/**
+ * Reads a table with one move in a row: names, kg, six numbers of the start, six of the goal; or
+ * one target in a row.
+ */
 export function parseMoves(text: string, joints: number): MovesRead {
-  const lines = text.split(/\r?\n/).map((line) => line.split(SEPARATOR).map((cell) => cell.trim().replace(/^"|"$/g, ""))).filter((cells) => cells.some(Boolean));
+  const lines = text
+    .split(/\r?\n/)
+    .map((line) => line.split(SEPARATOR).map((cell) => cell.trim().replace(/^"|"$/g, "")))
+    .filter((cells) => cells.some(Boolean));
   const [first] = lines;
   if (!first) return { why: "Paste a table: one move in a row." };
   const headed = first.filter(isNumber).length < joints;
@@ -29,9 +35,15 @@ export function parseMoves(text: string, joints: number): MovesRead {
   const units = head ? unitsOf(head.join(" ")) : "";
   const count = rows[0]!.numbers.length;
   const wrong = rows.findIndex(({ numbers }) => numbers.length !== count);
-  if (wrong >= 0) return { why: `Row ${wrong + 1} has ${rows[wrong]!.numbers.length} numbers, the first one ${count}.` };
+  if (wrong >= 0)
+    return {
+      why: `Row ${wrong + 1} has ${rows[wrong]!.numbers.length} numbers, the first one ${count}.`,
+    };
   const moves = movesOf(rows, count, joints, units);
-  if (!moves) return { why: `${count} numbers are in a row: a move has 12 (6 of the start, 6 of the goal), a target 6.` };
+  if (!moves)
+    return {
+      why: `${count} numbers are in a row: a move has 12 (6 of the start, 6 of the goal), a target 6.`,
+    };
   const parsed = parsePose(moves[0]!.start, joints);
   return "why" in parsed ? parsed : { moves, readings: parsed.readings };
 }
@@ -89,15 +101,38 @@ function movesOf(rows: Row[], count: number, joints: number, units: string): Mov
 }
 
 // fields of a request that are not those of the single moves
-const OWN = ["start", "goal", "stops", "path", "order", "before", "together", "closed", "time", "hold", "wait", "duration", "dwell"];
+const OWN = [
+  "start",
+  "goal",
+  "stops",
+  "path",
+  "order",
+  "before",
+  "together",
+  "closed",
+  "time",
+  "hold",
+  "wait",
+  "duration",
+  "dwell",
+];
 
 /** The requests of a job: each move in the cell. Throws Error with the row that cannot be read. */
-export function requestsOf(moves: Move[], reading: Reading, cell: ApiRequest, joints: number): ApiRequest[] {
+export function requestsOf(
+  moves: Move[],
+  reading: Reading,
+  cell: ApiRequest,
+  joints: number,
+): ApiRequest[] {
   const shared = Object.fromEntries(Object.entries(cell).filter(([name]) => !OWN.includes(name)));
   const targetOf = (text: string, row: number) => {
     const parsed = parsePose(text, joints, reading.kind);
-    const own = "readings" in parsed ? (parsed.readings.find(({ echo }) => echo === reading.echo) ?? parsed.readings[0]) : null;
-    if (!own || own.kind !== reading.kind) throw new Error(`Row ${row + 1} cannot be read as ${reading.echo}.`);
+    const own =
+      "readings" in parsed
+        ? (parsed.readings.find(({ echo }) => echo === reading.echo) ?? parsed.readings[0])
+        : null;
+    if (!own || own.kind !== reading.kind)
+      throw new Error(`Row ${row + 1} cannot be read as ${reading.echo}.`);
     return own.kind === "joints" ? { q: own.values } : { pose: poseOfSix(own.values) };
   };
   return moves.map(({ mass, start, goal }, k) => ({

@@ -17,7 +17,12 @@ export async function openFirst(): Promise<void> {
 
 /** A cell as a project of its own; it is computed at once. */
 export async function openCell(cell: Cell, name: string, compute = true): Promise<void> {
-  replaceCell({ project: { id: newId(), name }, request: cell.request, typed: cell.typed, economics: cell.economics });
+  replaceCell({
+    project: { id: newId(), name },
+    request: cell.request,
+    typed: cell.typed,
+    economics: cell.economics,
+  });
   page.value = "cell";
   if (compute) await optimise(cell.request).catch((error) => tell(error, cell.request));
 }
@@ -30,37 +35,67 @@ export async function openLast(): Promise<void> {
 
 /** A saved project, with its answer where the service still has it. */
 export async function openProject(project: Saved): Promise<void> {
-  replaceCell({ project: { id: project.id, name: project.name }, request: project.request, typed: project.typed, economics: project.economics });
+  replaceCell({
+    project: { id: project.id, name: project.name },
+    request: project.request,
+    typed: project.typed,
+    economics: project.economics,
+  });
   page.value = "cell";
   if (!project.answer || !project.asked) return;
   try {
-    const { answer } = await get<{ answer: unknown }>(`answers/${encodeURIComponent(project.answer)}`);
+    const { answer } = await get<{ answer: unknown }>(
+      `answers/${encodeURIComponent(project.answer)}`,
+    );
     await showAnswer(answer, project.asked);
   } catch {
     toast.value = "The answer of this project is no longer kept: optimise again.";
   }
 }
 
-/** A kept answer by its id or path: with its request as it was typed, where this browser has asked for it. Throws Problem. */
+/**
+ * A kept answer by its id or path: with its request as it was typed, where this browser has asked
+ * for it. Throws Problem.
+ */
 export async function openKept(path: string): Promise<void> {
-  const address = path.includes("/") ? path.replace(/^\//, "") : `answers/${encodeURIComponent(path)}`;
+  const address = path.includes("/")
+    ? path.replace(/^\//, "")
+    : `answers/${encodeURIComponent(path)}`;
   const { answer } = await get<{ answer: Solution & Partial<Cycle> }>(address);
-  if (!answer?.branch && !answer?.legs) throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
+  if (!answer?.branch && !answer?.legs)
+    throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
   const known = answer.id ? await askedFor(answer.id) : null;
-  const request = known?.request ?? (answer.legs ? requestOfCycle(answer as unknown as Cycle) : requestOfMove(answer));
-  replaceCell({ project: { id: newId(), name: `Kept ${answer.id?.slice(0, 8) ?? "answer"}` }, request, typed: known?.typed, economics: known?.economics });
+  const request =
+    known?.request ??
+    (answer.legs ? requestOfCycle(answer as unknown as Cycle) : requestOfMove(answer));
+  replaceCell({
+    project: { id: newId(), name: `Kept ${answer.id?.slice(0, 8) ?? "answer"}` },
+    request,
+    typed: known?.typed,
+    economics: known?.economics,
+  });
   page.value = "cell";
   await showAnswer(answer, request);
   if (!known) toast.value = "The request was not typed here: targets are the joints of the answer.";
 }
 
-/** The same arm between the same ends: what the answer does not say of its request stays at the defaults. */
-const requestOfMove = ({ robot, arm, branch }: Solution): ApiRequest => ({ robot, ...arm, start: { q: branch.start.q }, goal: { q: branch.goal.q } });
+/**
+ * The same arm between the same ends: what the answer does not say of its request stays at the
+ * defaults.
+ */
+const requestOfMove = ({ robot, arm, branch }: Solution): ApiRequest => ({
+  robot,
+  ...arm,
+  start: { q: branch.start.q },
+  goal: { q: branch.goal.q },
+});
 
 function requestOfCycle(cycle: Cycle): ApiRequest {
   const places = new Map(stopsOf(cycle).map(({ stop, q }) => [stop ?? "", q]));
-  const dwell = (name: string) => cycle.legs.find((leg) => leg.kind === "dwell" && leg.goal.stop === name)?.duration ?? 0;
-  const stops = cycle.order.filter((name) => places.has(name)).map((name): Stop => ({ name, target: { q: places.get(name) }, dwell: dwell(name) }));
+  const dwell = (name: string) =>
+    cycle.legs.find((leg) => leg.kind === "dwell" && leg.goal.stop === name)?.duration ?? 0;
+  const stops = cycle.order
+    .filter((name) => places.has(name))
+    .map((name): Stop => ({ name, target: { q: places.get(name) }, dwell: dwell(name) }));
   return { robot: cycle.robot, start: { q: cycle.legs[0]!.start.q }, stops };
 }
-

@@ -1,4 +1,5 @@
-// Reads what is pasted as a pose or as joint positions. What can be meant in two ways is asked, never guessed.
+// Reads what is pasted as a pose or as joint positions. What can be meant in two ways is asked,
+// never guessed.
 import { Euler, Quaternion } from "three";
 import { rotvecOf } from "./chain";
 
@@ -18,17 +19,22 @@ const TURN = 2 * Math.PI + 0.01;
 const NEAREST = 0.02;
 const FARTHEST = 4;
 const NUMBER = /[+\-−]?(?:\d+(?:[.]\d*)?|[.]\d+)(?:e[+-]?\d+)?/gi;
-const LABEL = /\b(?:r[xyz]|[xyz]|rpy|roll|pitch|yaw|j\d|q\d|joint ?\d|base|shoulder|elbow|wrist ?\d)\b\s*[:=]?/gi;
+const LABEL =
+  /\b(?:r[xyz]|[xyz]|rpy|roll|pitch|yaw|j\d|q\d|joint ?\d|base|shoulder|elbow|wrist ?\d)\b\s*[:=]?/gi;
 
 const LENGTHS = [
   { inMetre: 1000, name: "mm" },
   { inMetre: 1, name: "m" },
 ];
 
-/** Every way in which a text can be read for an arm of so many joints; `prefer` is the kind of the row it goes to. */
+/**
+ * Every way in which a text can be read for an arm of so many joints; `prefer` is the kind of the
+ * row it goes to.
+ */
 export function parsePose(text: string, joints = 6, prefer?: Reading["kind"]): Parsed {
   const numbers = numbersOf(text);
-  if (!numbers.length) return { why: "No number was found: paste p[…], six numbers or joint positions." };
+  if (!numbers.length)
+    return { why: "No number was found: paste p[…], six numbers or joint positions." };
   const asPose = /\bp\s*\[/i.test(text) || /\br[xyz]\b|\bx\b|\brpy\b|\broll\b/i.test(text);
   const asJoints = /\b(?:j|q|joint ?)1\b|\bbase\b|\bshoulder\b|\bmovej\s*\(\s*\[/i.test(text);
   const poses = asJoints || numbers.length !== 6 ? [] : posesOf(text, numbers);
@@ -36,7 +42,9 @@ export function parsePose(text: string, joints = 6, prefer?: Reading["kind"]): P
   const readings = choose(poses, angles, prefer);
   if (readings.length) return { readings };
   if (numbers.length !== 6 && numbers.length !== joints)
-    return { why: `${numbers.length} numbers were found: a pose has 6, this arm has ${joints} joints.` };
+    return {
+      why: `${numbers.length} numbers were found: a pose has 6, this arm has ${joints} joints.`,
+    };
   return { why: farAway(numbers) };
 }
 
@@ -78,14 +86,22 @@ function posesOf(text: string, numbers: number[]): Reading[] {
 }
 
 /** The ways to read three numbers as an orientation. */
-function turnsOf(text: string, turn: number[], script: boolean): { rotvec: number[]; name: string }[] {
+function turnsOf(
+  text: string,
+  turn: number[],
+  script: boolean,
+): { rotvec: number[]; name: string }[] {
   const radians = { rotvec: turn, name: "RX RY RZ in rad" };
   const vector = { rotvec: turn.map((value) => value * DEGREE), name: "RX RY RZ in degrees" };
   const rpy = { rotvec: ofRpy(turn), name: "roll, pitch, yaw in degrees" };
   if (turn.every((value) => value === 0)) return [{ ...radians, name: "" }];
   const small = turn.every((value) => Math.abs(value) <= TURN);
   if (script) return [radians];
-  const degrees = /\brpy\b|\broll\b/i.test(text) ? [rpy] : same(rpy.rotvec, vector.rotvec) ? [vector] : [vector, rpy];
+  const degrees = /\brpy\b|\broll\b/i.test(text)
+    ? [rpy]
+    : same(rpy.rotvec, vector.rotvec)
+      ? [vector]
+      : [vector, rpy];
   if (/°|\bdeg/.test(text)) return degrees;
   if (/\brad\b/.test(text)) return [radians];
   return small ? [radians, vector] : degrees;
@@ -118,9 +134,15 @@ export interface TableRow {
   text: string;
 }
 
-/** The rows of a pasted table (CSV, tab or semicolon separated) with at least two lines of six numbers; null if it is none. */
+/**
+ * The rows of a pasted table (CSV, tab or semicolon separated) with at least two lines of six
+ * numbers; null if it is none.
+ */
 export function parseTable(text: string): TableRow[] | null {
-  const lines = text.split(/\r?\n/).map((line) => line.trim()).filter(Boolean);
+  const lines = text
+    .split(/\r?\n/)
+    .map((line) => line.trim())
+    .filter(Boolean);
   const rows = lines.map(rowOf).filter((row) => row !== null);
   return rows.length >= 2 ? rows : null;
 }

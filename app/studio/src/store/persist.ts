@@ -26,7 +26,8 @@ function database(): Promise<IDBDatabase> {
   opened ??= new Promise((resolve, reject) => {
     const asked = indexedDB.open("joulepath studio", 1);
     asked.onupgradeneeded = () => {
-      for (const name of ["projects", "asked", "jobs"]) asked.result.createObjectStore(name, { keyPath: "id" });
+      for (const name of ["projects", "asked", "jobs"])
+        asked.result.createObjectStore(name, { keyPath: "id" });
     };
     asked.onsuccess = () => resolve(asked.result);
     asked.onerror = () => reject(asked.error ?? new Error("IndexedDB is not open."));
@@ -34,7 +35,11 @@ function database(): Promise<IDBDatabase> {
   return opened;
 }
 
-async function within<T>(store: string, mode: IDBTransactionMode, act: (store: IDBObjectStore) => IDBRequest<T>): Promise<T> {
+async function within<T>(
+  store: string,
+  mode: IDBTransactionMode,
+  act: (store: IDBObjectStore) => IDBRequest<T>,
+): Promise<T> {
   const open = (await database()).transaction(store, mode).objectStore(store);
   return new Promise((resolve, reject) => {
     const asked = act(open);
@@ -43,7 +48,8 @@ async function within<T>(store: string, mode: IDBTransactionMode, act: (store: I
   });
 }
 
-export const newId = () => crypto.randomUUID?.() ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`;
+export const newId = () =>
+  crypto.randomUUID?.() ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`;
 
 /** All projects, the last saved first. */
 export async function projects(): Promise<Saved[]> {
@@ -51,11 +57,14 @@ export async function projects(): Promise<Saved[]> {
   return all.sort((a, b) => b.savedAt - a.savedAt);
 }
 
-export const deleteProject = (id: string) => within("projects", "readwrite", (store) => store.delete(id));
+export const deleteProject = (id: string) =>
+  within("projects", "readwrite", (store) => store.delete(id));
 
 /** What was asked when an answer was computed here; null for answers of others. */
 export async function askedFor(id: string): Promise<Cell | null> {
-  const found = await within<Asked | undefined>("asked", "readonly", (store) => store.get(id)).catch(() => undefined);
+  const found = await within<Asked | undefined>("asked", "readonly", (store) =>
+    store.get(id),
+  ).catch(() => undefined);
   return found?.cell ?? null;
 }
 
@@ -73,7 +82,8 @@ export interface JobNotes {
   requests: Cell["request"][];
 }
 
-export const keepJob = (notes: JobNotes) => within("jobs", "readwrite", (store) => store.put(notes));
+export const keepJob = (notes: JobNotes) =>
+  within("jobs", "readwrite", (store) => store.put(notes));
 
 export const jobNotes = (id: string) =>
   within<JobNotes | undefined>("jobs", "readonly", (store) => store.get(id)).catch(() => undefined);
@@ -116,7 +126,14 @@ export function followChanges(): void {
     const id = shown?.solution.id;
     if (!shown?.asked || !id) return;
     const { asked } = shown;
-    untracked(() => void keepAsked(id, { request: asked, typed: typed.value, economics: economics.value }).catch(() => undefined));
+    untracked(
+      () =>
+        void keepAsked(id, {
+          request: asked,
+          typed: typed.value,
+          economics: economics.value,
+        }).catch(() => undefined),
+    );
   });
   window.addEventListener("pagehide", () => void saveNow());
 }

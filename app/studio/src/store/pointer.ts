@@ -3,7 +3,10 @@
 export type Pointer = string;
 
 export const keysOf = (pointer: Pointer): string[] =>
-  pointer.split("/").slice(1).map((key) => key.replaceAll("~1", "/").replaceAll("~0", "~"));
+  pointer
+    .split("/")
+    .slice(1)
+    .map((key) => key.replaceAll("~1", "/").replaceAll("~0", "~"));
 
 export const join = (...keys: (string | number)[]): Pointer =>
   keys.map((key) => `/${String(key).replaceAll("~", "~0").replaceAll("/", "~1")}`).join("");
@@ -42,7 +45,8 @@ function changed(value: unknown, keys: string[], next: unknown): unknown {
     return copy;
   }
   const copy: Record<string, unknown> = isObject(value) ? { ...value } : {};
-  const empty = next === undefined && GROUPS.includes(key) && isObject(inner) && !Object.keys(inner).length;
+  const empty =
+    next === undefined && GROUPS.includes(key) && isObject(inner) && !Object.keys(inner).length;
   if (inner === undefined || empty) delete copy[key];
   else copy[key] = inner;
   return copy;
@@ -55,9 +59,13 @@ export function located(request: unknown, loc: (string | number)[]): Pointer {
   const parts = loc[0] === "body" ? loc.slice(1) : loc;
   parts.forEach((part, k) => {
     const next = parts[k + 1];
-    const has = isObject(value) && holds(value, part) && !(next !== undefined && !holds(value[String(part)], next) && holds(value, next));
+    const has =
+      isObject(value) &&
+      holds(value, part) &&
+      !(next !== undefined && !holds(value[String(part)], next) && holds(value, next));
     // a part that the request lacks is the kind of an alternative, or the field that is missing
-    const missing = k === parts.length - 1 && isObject(value) && !Array.isArray(value) && isField(part);
+    const missing =
+      k === parts.length - 1 && isObject(value) && !Array.isArray(value) && isField(part);
     if (!has && !missing) return;
     pointer += join(part);
     value = isObject(value) ? value[String(part)] : undefined;

@@ -5,6 +5,7 @@ import { at, type Pointer } from "./pointer";
 import { robotName, rowsOf, targetAt, poseAt } from "./request";
 import { request } from "./state";
 import type { ApiRequest, IkSolution, Pose } from "./types";
+import { figure } from "./units";
 
 export type Reach =
   | { state: "asking" }
@@ -23,12 +24,26 @@ let round = 0;
 /** What `POST /ik` is asked about a pose of a request. */
 export function ikBody(asked: ApiRequest, pose: Pose, windings: boolean): Record<string, unknown> {
   const { tcp, tool, payload, scene } = asked;
-  const shape = payload?.shape ? { payload: { shape: payload.shape, ...(payload.touches === undefined ? {} : { touches: payload.touches }) } } : {};
-  return JSON.parse(JSON.stringify({ robot: robotName(asked), tcp, tool, scene, pose, windings, ...shape })) as Record<string, unknown>;
+  const shape = payload?.shape
+    ? {
+        payload: {
+          shape: payload.shape,
+          ...(payload.touches === undefined ? {} : { touches: payload.touches }),
+        },
+      }
+    : {};
+  return JSON.parse(
+    JSON.stringify({ robot: robotName(asked), tcp, tool, scene, pose, windings, ...shape }),
+  ) as Record<string, unknown>;
 }
 
 /** All configurations that reach a pose. Throws Problem. */
-export const solutionsOf = async (asked: ApiRequest, pose: Pose, windings = false, signal?: AbortSignal) =>
+export const solutionsOf = async (
+  asked: ApiRequest,
+  pose: Pose,
+  windings = false,
+  signal?: AbortSignal,
+) =>
   (await post<{ solutions: IkSolution[] }>("ik", ikBody(asked, pose, windings), signal)).solutions;
 
 /** Asks about every pose of the request, from now on. */
@@ -44,8 +59,13 @@ export function followReach(): void {
 
 async function askAll(asked: ApiRequest): Promise<void> {
   const own = ++round;
-  const rows = rowsOf(asked).filter((row) => targetAt(asked, row).kind === "pose").slice(0, MOST);
-  const bodies = rows.map((row) => ({ pointer: row.pointer, pose: at(asked, poseAt(row)) as Pose }));
+  const rows = rowsOf(asked)
+    .filter((row) => targetAt(asked, row).kind === "pose")
+    .slice(0, MOST);
+  const bodies = rows.map((row) => ({
+    pointer: row.pointer,
+    pose: at(asked, poseAt(row)) as Pose,
+  }));
   const keys = bodies.map(({ pose }) => JSON.stringify(ikBody(asked, pose, false)));
   const next: Record<Pointer, Reach> = {};
   bodies.forEach(({ pointer }, k) => (next[pointer] = known.get(keys[k]!) ?? { state: "asking" }));
@@ -73,5 +93,7 @@ async function ask(asked: ApiRequest, pose: Pose): Promise<Reach | null> {
 function withoutFigures(text: string): string {
   return text
     .replace(/^The .*? pose is /, "The pose is ")
-    .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b/g, (whole, metres: string) => (Number(metres) < 5 ? `${(Number(metres) * 1000).toPrecision(2)} mm` : whole));
+    .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b/g, (whole, metres: string) =>
+      Number(metres) < 5 ? `${figure(Number(metres) * 1000, 2)} mm` : whole,
+    );
 }

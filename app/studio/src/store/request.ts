@@ -88,11 +88,17 @@ export function targetAt(request: ApiRequest, row: Row): Target {
   if (!isObject(value)) return other(value);
   if (areNumbers(value.q)) return { kind: "joints", q: value.q };
   if (isPose(value.pose)) return { kind: "pose", pose: value.pose };
-  if (Array.isArray(value.any_of)) return { kind: "other", text: `one of ${value.any_of.length} targets` };
-  return isObject(value.pose) ? { kind: "other", text: "a pose with free orientation" } : other(value);
+  if (Array.isArray(value.any_of))
+    return { kind: "other", text: `one of ${value.any_of.length} targets` };
+  return isObject(value.pose)
+    ? { kind: "other", text: "a pose with free orientation" }
+    : other(value);
 }
 
-const other = (value: unknown): Target => ({ kind: "other", text: JSON.stringify(value).slice(0, 60) });
+const other = (value: unknown): Target => ({
+  kind: "other",
+  text: JSON.stringify(value).slice(0, 60),
+});
 
 /** Pointer to the pose of a row. */
 export const poseAt = (row: Row): Pointer => (row.bare ? row.pointer : `${row.pointer}/pose`);
@@ -102,7 +108,9 @@ export function sixOf(pose: Pose): number[] {
   return [...pose.position, ...(pose.rotvec ?? rotvecOf(turnOf(pose)))];
 }
 
-/** A pose with another one of its six numbers. Its orientation keeps its form until it is edited. */
+/**
+ * A pose with another one of its six numbers. Its orientation keeps its form until it is edited.
+ */
 export function withNumber(pose: Pose, index: number, value: number): Pose {
   const six = sixOf(pose).map((old, k) => (k === index ? value : old));
   if (index < 3) return { ...pose, position: six.slice(0, 3) };
@@ -135,4 +143,6 @@ export function lackOf(request: ApiRequest): { pointer: Pointer; text: string } 
 }
 
 export const obstaclesListed = (request: ApiRequest): Obstacle[] =>
-  listOf<Obstacle>(at(request, "/scene/obstacles")).map((each) => (isObject(each) ? (each as Obstacle) : { name: "?", shape: "?" }));
+  listOf<Obstacle>(at(request, "/scene/obstacles")).map((each) =>
+    isObject(each) ? (each as Obstacle) : { name: "?", shape: "?" },
+  );

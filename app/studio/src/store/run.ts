@@ -6,7 +6,19 @@ import { cycleAnswered } from "./cycle";
 import { robotOf } from "./service";
 import { dressedLater } from "./tools";
 import { endpointOf } from "./request";
-import { answered, ghosts, racers, request, run, tab, time, toast, trouble, type Answered, type Run } from "./state";
+import {
+  answered,
+  ghosts,
+  racers,
+  request,
+  run,
+  tab,
+  time,
+  toast,
+  trouble,
+  type Answered,
+  type Run,
+} from "./state";
 import type { ApiRequest, Cycle, Solution } from "./types";
 
 const PATIENCE = 3; // times that a busy service is asked again
@@ -24,9 +36,16 @@ export async function optimise(asked: ApiRequest = request.value): Promise<void>
 }
 
 /** Shows an answer of `POST /optimize` or `POST /cycle` with its request. Throws Problem. */
-export async function showAnswer(answer: unknown, asked: ApiRequest | null, took: number | null = null): Promise<void> {
+export async function showAnswer(
+  answer: unknown,
+  asked: ApiRequest | null,
+  took: number | null = null,
+): Promise<void> {
   const given = answer as Solution | Cycle;
-  const next = "legs" in given ? await cycleAnswered(given, asked, took) : await moveAnswered(given, asked, took);
+  const next =
+    "legs" in given
+      ? await cycleAnswered(given, asked, took)
+      : await moveAnswered(given, asked, took);
   batch(() => {
     answered.value = next;
     racers.value = [];
@@ -36,7 +55,11 @@ export async function showAnswer(answer: unknown, asked: ApiRequest | null, took
 }
 
 /** Without its request, the cell is what the answer says of its arm. */
-async function moveAnswered(solution: Solution, asked: ApiRequest | null, took: number | null): Promise<Answered> {
+async function moveAnswered(
+  solution: Solution,
+  asked: ApiRequest | null,
+  took: number | null,
+): Promise<Answered> {
   const robot = await robotOf(solution.robot);
   const whole = await dressedLater({ ...solution.arm, ...asked, robot: solution.robot });
   const cell = { ...whole, scene: { obstacles: obstaclesOf(whole, robot) } };
@@ -66,10 +89,15 @@ export async function compute(endpoint: string, body: unknown): Promise<unknown>
 
 async function streamed(endpoint: string, body: unknown, signal: AbortSignal): Promise<unknown> {
   let answer: unknown = null;
-  await stream(endpoint, body, (name, data) => {
-    if (name === "answer") answer = data;
-    else if (run.value) run.value = progressed(run.value, name, data as Record<string, number>);
-  }, signal);
+  await stream(
+    endpoint,
+    body,
+    (name, data) => {
+      if (name === "answer") answer = data;
+      else if (run.value) run.value = progressed(run.value, name, data as Record<string, number>);
+    },
+    signal,
+  );
   if (answer) return answer;
   throw new Problem({
     title: "The answer broke off",
@@ -91,7 +119,8 @@ async function patiently<T>(attempt: () => Promise<T>): Promise<T> {
     try {
       return await attempt();
     } catch (error) {
-      const retry = error instanceof Problem && error.details.status === 503 ? error.details.retry : null;
+      const retry =
+        error instanceof Problem && error.details.status === 503 ? error.details.retry : null;
       if (!left || !retry) throw error;
       toast.value = `The service is busy: trying again in ${retry} s.`;
       await new Promise((resolve) => setTimeout(resolve, 1000 * retry));

@@ -23,7 +23,8 @@ export function meshFileOf(name: string): Promise<Uint8Array> {
   });
 }
 
-export const knowMeshes = (name: string, file: Uint8Array) => meshes.set(name, Promise.resolve(file));
+export const knowMeshes = (name: string, file: Uint8Array) =>
+  meshes.set(name, Promise.resolve(file));
 
 function once<T>(known: Map<string, Promise<T>>, name: string, ask: () => Promise<T>): Promise<T> {
   const found = known.get(name);
@@ -51,13 +52,26 @@ interface Example {
 }
 
 export interface OpenApi {
-  paths: Record<string, {
-    post?: {
-      parameters?: { name: string; in: string; description?: string; schema: Record<string, unknown> }[];
-      requestBody?: { content: Record<string, { examples?: Record<string, Example> }> };
-    };
-  }>;
-  components: { schemas: Record<string, { enum?: string[]; properties?: Record<string, { description?: string }> }> };
+  paths: Record<
+    string,
+    {
+      post?: {
+        parameters?: {
+          name: string;
+          in: string;
+          description?: string;
+          schema: Record<string, unknown>;
+        }[];
+        requestBody?: { content: Record<string, { examples?: Record<string, Example> }> };
+      };
+    }
+  >;
+  components: {
+    schemas: Record<
+      string,
+      { enum?: string[]; properties?: Record<string, { description?: string }> }
+    >;
+  };
 }
 
 let document_: Promise<OpenApi> | null = null;

@@ -70,24 +70,46 @@ async function packed(text: string): Promise<string> {
 
 async function unpacked(text: string): Promise<string> {
   const bytes = fromBase64(text.replaceAll("-", "+").replaceAll("_", "/"));
-  return new TextDecoder().decode(await through(new Blob([bytes as BlobPart]), new DecompressionStream("deflate-raw")));
+  return new TextDecoder().decode(
+    await through(new Blob([bytes as BlobPart]), new DecompressionStream("deflate-raw")),
+  );
 }
 
 const through = async (blob: Blob, stream: GenericTransformStream) =>
-  new Uint8Array(await new Response(blob.stream().pipeThrough(stream as ReadableWritablePair<Uint8Array<ArrayBuffer>, Uint8Array<ArrayBuffer>>)).arrayBuffer());
+  new Uint8Array(
+    await new Response(
+      blob
+        .stream()
+        .pipeThrough(
+          stream as ReadableWritablePair<Uint8Array<ArrayBuffer>, Uint8Array<ArrayBuffer>>,
+        ),
+    ).arrayBuffer(),
+  );
 
 /** The motion as a table that `POST /evaluate` reads again. */
 export function csvOf({ t, q, v, a, tau, tau_motor, power }: import("./types").Trajectory): string {
   const joints = (q[0] ?? []).map((_, j) => j + 1);
   const columns = { q, v, a, tau, tau_motor };
-  const head = ["t", ...Object.keys(columns).flatMap((name) => joints.map((j) => `${name}${j}`)), "power"];
-  const lines = t.map((time, k) => [time, ...Object.values(columns).flatMap((rows) => rows[k]!), power[k]].join(","));
+  const head = [
+    "t",
+    ...Object.keys(columns).flatMap((name) => joints.map((j) => `${name}${j}`)),
+    "power",
+  ];
+  const lines = t.map((time, k) =>
+    [time, ...Object.values(columns).flatMap((rows) => rows[k]!), power[k]].join(","),
+  );
   return [head.join(","), ...lines, ""].join("\n");
 }
 
 /** Offers a text or blob as a file. */
-export function save(name: string, content: BlobPart | Blob, type = "application/octet-stream"): void {
-  const url = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+export function save(
+  name: string,
+  content: BlobPart | Blob,
+  type = "application/octet-stream",
+): void {
+  const url = URL.createObjectURL(
+    content instanceof Blob ? content : new Blob([content], { type }),
+  );
   const anchor = Object.assign(document.createElement("a"), { href: url, download: name });
   document.body.append(anchor);
   anchor.click();

@@ -41,7 +41,14 @@ export interface Run {
   began: number;
   done: number;
   total: number;
-  incumbents: { at: number; energy: number; bound: number; gap: number | null; duration: number; q_goal?: number[] }[];
+  incumbents: {
+    at: number;
+    energy: number;
+    bound: number;
+    gap: number | null;
+    duration: number;
+    q_goal?: number[];
+  }[];
 }
 
 /** What went wrong, and the field that caused it. */
@@ -53,7 +60,10 @@ export interface Trouble {
   fields: { pointer: Pointer; text: string }[];
 }
 
-export const EMPTY: ApiRequest = { robot: "ur5e", start: { q: [0, -1.5708, 1.5708, -1.5708, -1.5708, 0] } };
+export const EMPTY: ApiRequest = {
+  robot: "ur5e",
+  start: { q: [0, -1.5708, 1.5708, -1.5708, -1.5708, 0] },
+};
 
 export const project = signal<Project>({ id: "", name: "Untitled cell" });
 export const saved = signal<"" | "saving" | "saved" | "failed">("");
@@ -78,7 +88,15 @@ export const jsonBroken = signal(false);
 
 export const time = signal(0);
 export const playing = signal(false);
-export const show = signal({ ghosts: true, path: true, nearest: true, margins: false, capsules: false, axes: true, fade: true });
+export const show = signal({
+  ghosts: true,
+  path: true,
+  nearest: true,
+  margins: false,
+  capsules: false,
+  axes: true,
+  fade: true,
+});
 /** Ghosts of further configurations, by a colour. */
 export const ghosts = signal<{ q: number[]; colour: number }[]>([]);
 
@@ -90,7 +108,10 @@ export const changes = computed<Change[]>(() => {
 });
 export const stale = computed(() => changes.value.length > 0);
 export const duration = computed(() =>
-  Math.max(answered.value?.solution.duration ?? 1, ...racers.value.map(({ solution }) => solution.duration)),
+  Math.max(
+    answered.value?.solution.duration ?? 1,
+    ...racers.value.map(({ solution }) => solution.duration),
+  ),
 );
 
 interface Snapshot {
@@ -109,7 +130,11 @@ export const canRedo = computed(() => future.value.length > 0);
 const present = (): Snapshot => ({ request: request.value, typed: typed.value });
 
 /** Changes the request. Edits of one `name` within half a second are one step of undo. */
-export function edit(next: ApiRequest, text: Record<Pointer, string> = typed.value, name = ""): void {
+export function edit(
+  next: ApiRequest,
+  text: Record<Pointer, string> = typed.value,
+  name = "",
+): void {
   const now = performance.now();
   const merged = name !== "" && name === lastEdit.name && now - lastEdit.at < 500;
   lastEdit = { name, at: now };
@@ -124,7 +149,11 @@ export function edit(next: ApiRequest, text: Record<Pointer, string> = typed.val
 
 /** Sets one field, and remembers how it was typed. */
 export function write(pointer: Pointer, value: unknown, text?: string): void {
-  edit(put(request.value, pointer, value), text === undefined ? typed.value : { ...typed.value, [pointer]: text }, text === undefined ? pointer : "");
+  edit(
+    put(request.value, pointer, value),
+    text === undefined ? typed.value : { ...typed.value, [pointer]: text },
+    text === undefined ? pointer : "",
+  );
 }
 
 function step(from: typeof past, to: typeof past): void {
@@ -144,7 +173,12 @@ export const undo = () => step(past, future);
 export const redo = () => step(future, past);
 
 /** Puts a whole cell in place of this one; there is nothing to undo in it yet. */
-export function replaceCell(cell: { project: Project; request: ApiRequest; typed?: Record<Pointer, string>; economics?: Economics }): void {
+export function replaceCell(cell: {
+  project: Project;
+  request: ApiRequest;
+  typed?: Record<Pointer, string>;
+  economics?: Economics;
+}): void {
   batch(() => {
     past.value = future.value = [];
     project.value = cell.project;

@@ -23,7 +23,8 @@ const known = new Map<string, Promise<ToolDetail>>();
 export const toolNow = signal<ToolDetail | null>(null);
 
 /** Throws Problem. */
-export const toolList = async (): Promise<ToolSummary[]> => (await get<{ tools: ToolSummary[] }>("tools")).tools;
+export const toolList = async (): Promise<ToolSummary[]> =>
+  (await get<{ tools: ToolSummary[] }>("tools")).tools;
 
 /** Figures of a tool, asked for once. Throws Problem. */
 function toolOf(name: string): Promise<ToolDetail> {
@@ -36,16 +37,25 @@ function toolOf(name: string): Promise<ToolDetail> {
   return asked;
 }
 
-export const toolName = ({ tool }: ApiRequest): string | null => (typeof tool === "string" ? tool : null);
+export const toolName = ({ tool }: ApiRequest): string | null =>
+  typeof tool === "string" ? tool : null;
 
 /** The request with the shape and the TCP of the tool that it names, as it is drawn. */
 export function dressed(asked: ApiRequest, tool: ToolDetail | null): ApiRequest {
   if (toolName(asked) === null) return asked;
   if (tool?.name !== toolName(asked)) return { ...asked, tool: { capsules: [] } };
   const rows = tool.capsules.value as number[][];
-  const capsules = rows.map((row) => ({ start: row.slice(0, 3), end: row.slice(3, 6), radius: row[6]! }));
+  const capsules = rows.map((row) => ({
+    start: row.slice(0, 3),
+    end: row.slice(3, 6),
+    radius: row[6]!,
+  }));
   const own = tool.tcp.value as number[];
-  return { ...asked, tool: { capsules }, tcp: asked.tcp ?? { position: own.slice(0, 3), rpy: own.slice(3, 6) } };
+  return {
+    ...asked,
+    tool: { capsules },
+    tcp: asked.tcp ?? { position: own.slice(0, 3), rpy: own.slice(3, 6) },
+  };
 }
 
 /** The same, with figures that are asked for. Throws Problem. */

@@ -38,18 +38,24 @@ export function tell(error: unknown, asked: ApiRequest = request.value): void {
   if (error instanceof DOMException && error.name === "AbortError") return;
   if (!(error instanceof Problem)) console.error(error);
   const details = error instanceof Problem ? error.details : {};
-  const fields = (details.errors ?? []).map(({ loc, msg }) => ({ pointer: located(asked, loc), text: msg }));
+  const fields = (details.errors ?? []).map(({ loc, msg }) => ({
+    pointer: located(asked, loc),
+    text: msg,
+  }));
   const pointer = pointerOf(details, asked);
   const text = error instanceof Error ? error.message : String(error);
   if (pointer !== null && !fields.length) fields.push({ pointer, text });
   trouble.value = {
     title: details.title ?? "Something went wrong",
     text,
-    link: details.type?.includes("/problems/") ? details.type.slice(details.type.indexOf("problems/")) : null,
+    link: details.type?.includes("/problems/")
+      ? details.type.slice(details.type.indexOf("problems/"))
+      : null,
     pointer,
     fields,
   };
 }
 
 /** Does something that may fail, and says so if it does. */
-export const trying = (act: () => Promise<unknown>) => () => void act().catch((error) => tell(error));
+export const trying = (act: () => Promise<unknown>) => () =>
+  void act().catch((error) => tell(error));

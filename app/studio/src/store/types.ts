@@ -1,4 +1,5 @@
-// What the service takes and answers, as far as the page reads it. Lengths in m, angles in rad, energies in J.
+// What the service takes and answers, as far as the page reads it. Lengths in m, angles in rad,
+// energies in J.
 
 export interface Pose {
   position: number[];

@@ -46,7 +46,7 @@ export const percent = (share: number, digits = 2) => `${figure(share * 100, dig
 export function atMost(share: number): string {
   const places = share < 0.1 ? 1 : 0;
   const scale = 100 * 10 ** places;
-  return `${(Math.ceil(share * scale - 1e-9) / scale * 100).toFixed(places)} %`;
+  return `${((Math.ceil(share * scale - 1e-9) / scale) * 100).toFixed(places)} %`;
 }
 
 /** The number that a text holds; null if it holds none. Commas may stand for points. */

@@ -26,7 +26,14 @@ export function JsonEditor() {
   };
   return (
     <div class="json">
-      <textarea id="json" spellcheck={false} aria-label="Request as JSON" aria-invalid={why ? "true" : undefined} value={own ?? text} onChange={(event) => read(event.currentTarget.value)} />
+      <textarea
+        id="json"
+        spellcheck={false}
+        aria-label="Request as JSON"
+        aria-invalid={why ? "true" : undefined}
+        value={own ?? text}
+        onChange={(event) => read(event.currentTarget.value)}
+      />
       {why && (
         <p class="error" role="alert" id="json-error">
           This is no request. {why}

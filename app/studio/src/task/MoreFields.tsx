@@ -1,23 +1,46 @@
-import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Errors } from "../ui/Errors";
 import { NumberCell } from "../ui/NumberCell";
-import { get } from "../store/client";
 import { at, put } from "../store/pointer";
-import { kindOf, robotName } from "../store/request";
 import { asJson, edit, request, write } from "../store/state";
-import { when, words } from "../store/units";
+import { words } from "../store/units";
+import { BranchField } from "./BranchField";
+import { FiguresField } from "./FiguresField";
 
 // fields that have a control elsewhere
-const SHOWN = ["robot", "start", "goal", "stops", "path", "tcp", "tool", "payload", "scene", "order", "closed", "duration", "dwell", "time"];
-const HERE = ["gravity", "figures", "limits", "branch", "objective", "method", "windings", "collisions", "deadline"];
+const SHOWN = [
+  "robot",
+  "start",
+  "goal",
+  "stops",
+  "path",
+  "tcp",
+  "tool",
+  "payload",
+  "scene",
+  "order",
+  "closed",
+  "duration",
+  "dwell",
+  "time",
+];
+const HERE = [
+  "gravity",
+  "figures",
+  "limits",
+  "branch",
+  "objective",
+  "method",
+  "windings",
+  "collisions",
+  "deadline",
+];
 const MOUNTS = [
   { name: "on the floor", gravity: null },
   { name: "on the ceiling", gravity: [0, 0, 9.81] },
   { name: "on a wall, x up", gravity: [-9.81, 0, 0] },
   { name: "on a wall, y up", gravity: [0, -9.81, 0] },
 ];
-const BRANCHES = { shoulder: ["left", "right"], elbow: ["up", "down"], wrist: ["no_flip", "flip"] };
 const METHODS = ["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"];
 const LIMITS = ["tcp_speed", "elbow_speed"];
 
@@ -30,85 +53,105 @@ export function MoreFields() {
     <div class="field">
       <span>{text}</span>
       <NumberCell label={text} pointer={pointer} value={at(asked, pointer)} unit={unit} withUnit />
-      {at(asked, pointer) !== undefined && at(asked, pointer) !== null && <Button kind="quiet" small icon="close" label={`No ${name}`} onClick={() => write(pointer, undefined)} />}
+      {at(asked, pointer) !== undefined && at(asked, pointer) !== null && (
+        <Button
+          kind="quiet"
+          small
+          icon="close"
+          label={`No ${name}`}
+          onClick={() => write(pointer, undefined)}
+        />
+      )}
     </div>
   );
   return (
     <details class="section fold" id="more">
       <summary>
-        <b>More</b> <small>{set.length ? set.map(words).join(", ") : "limits, mounting, branches: all as usual"}</small>
+        <b>More</b>{" "}
+        <small>
+          {set.length ? set.map(words).join(", ") : "limits, mounting, branches: all as usual"}
+        </small>
       </summary>
       <div class="fields">
         <Mount />
-        <Figures />
-        {LIMITS.map((name) => <div key={name}>{field(words(name), `Largest ${words(name).replace("tcp", "TCP")}`, `/limits/${name}`, "mmps")}</div>)}
-        <Branch />
+        <FiguresField />
+        {LIMITS.map((name) => (
+          <div key={name}>
+            {field(
+              words(name),
+              `Largest ${words(name).replace("tcp", "TCP")}`,
+              `/limits/${name}`,
+              "mmps",
+            )}
+          </div>
+        ))}
+        <BranchField />
         <Pick name="objective" options={["electrical", "mechanical"]} />
         <Pick name="method" options={METHODS} />
         <Tick name="windings" text="full turns of joints count" />
         <Tick name="collisions" text="collisions are checked" />
         {field("deadline", "Time to compute", "/deadline", "s")}
       </div>
-      {["limits", "branch", "gravity", "objective", "method", "deadline", "windings", "collisions"].map((name) => <Errors key={name} under={`/${name}`} />)}
+      {[
+        "limits",
+        "branch",
+        "gravity",
+        "objective",
+        "method",
+        "deadline",
+        "windings",
+        "collisions",
+      ].map((name) => (
+        <Errors key={name} under={`/${name}`} />
+      ))}
       {others.length > 0 && (
         <p class="hint">
-          Also set: {others.map((name) => <code key={name} data-path={name}>{name} </code>)}
-          <Button kind="link" onClick={() => (asJson.value = true)}>edit as JSON</Button>
+          Also set:{" "}
+          {others.map((name) => (
+            <code key={name} data-path={name}>
+              {name}{" "}
+            </code>
+          ))}
+          <Button kind="link" onClick={() => (asJson.value = true)}>
+            edit as JSON
+          </Button>
         </p>
       )}
-      {others.map((name) => <Errors key={name} under={`/${name}`} />)}
+      {others.map((name) => (
+        <Errors key={name} under={`/${name}`} />
+      ))}
     </details>
   );
 }
 
 function Mount() {
   const now = JSON.stringify(request.value.gravity ?? null);
-  const index = MOUNTS.findIndex(({ gravity }) => JSON.stringify(gravity) === now || (gravity === null && now === "[0,0,-9.81]"));
+  const index = MOUNTS.findIndex(
+    ({ gravity }) => JSON.stringify(gravity) === now || (gravity === null && now === "[0,0,-9.81]"),
+  );
   return (
     <label class="field">
       <span>Mounted</span>
-      <select value={index} onChange={(event) => edit(put(request.value, "/gravity", MOUNTS[Number(event.currentTarget.value)]!.gravity ?? undefined))}>
-        {MOUNTS.map(({ name }, k) => <option key={name} value={k}>{name}</option>)}
+      <select
+        value={index}
+        onChange={(event) =>
+          edit(
+            put(
+              request.value,
+              "/gravity",
+              MOUNTS[Number(event.currentTarget.value)]!.gravity ?? undefined,
+            ),
+          )
+        }
+      >
+        {MOUNTS.map(({ name }, k) => (
+          <option key={name} value={k}>
+            {name}
+          </option>
+        ))}
         {index < 0 && <option value={-1}>as in JSON</option>}
       </select>
     </label>
-  );
-}
-
-/** Figures that were identified on an arm of this type. */
-function Figures() {
-  const [known, setKnown] = useState<{ id: string; created: string }[] | null>(null);
-  const own = request.value.figures;
-  const load = () => {
-    if (known) return;
-    get<{ figures: { id: string; robot: string; created: string }[] }>("figures")
-      .then(({ figures }) => setKnown(figures.filter(({ robot }) => robot === robotName(request.value))))
-      .catch(() => setKnown([]));
-  };
-  return (
-    <label class="field">
-      <span>Figures</span>
-      <select value={own ?? ""} onFocus={load} onChange={(event) => edit(put(request.value, "/figures", event.currentTarget.value || undefined))}>
-        <option value="">of the type</option>
-        {known?.map(({ id, created }) => <option key={id} value={id}>yours, {when(created)}</option>)}
-        {own && !known?.some(({ id }) => id === own) && <option value={own}>yours, {own.slice(0, 8)}</option>}
-      </select>
-    </label>
-  );
-}
-
-function Branch() {
-  if (kindOf(request.value) === "path") return null;
-  return (
-    <div class="field">
-      <span>Posture</span>
-      {Object.entries(BRANCHES).map(([part, options]) => (
-        <select key={part} aria-label={words(part)} value={String(at(request.value, `/branch/${part}`) ?? "")} onChange={(event) => edit(put(request.value, `/branch/${part}`, event.currentTarget.value || undefined))}>
-          <option value="">any {part}</option>
-          {options.map((each) => <option key={each} value={each}>{words(each)}</option>)}
-        </select>
-      ))}
-    </div>
   );
 }
 
@@ -116,8 +159,24 @@ function Pick({ name, options }: { name: string; options: string[] }) {
   return (
     <label class="field">
       <span>{name === "method" ? "Method" : "Least"}</span>
-      <select value={String(request.value[name] ?? options[0])} onChange={(event) => edit(put(request.value, `/${name}`, event.currentTarget.value === options[0] ? undefined : event.currentTarget.value))}>
-        {options.map((each) => <option key={each} value={each}>{words(each)}{name === "objective" ? " energy" : ""}</option>)}
+      <select
+        value={String(request.value[name] ?? options[0])}
+        onChange={(event) =>
+          edit(
+            put(
+              request.value,
+              `/${name}`,
+              event.currentTarget.value === options[0] ? undefined : event.currentTarget.value,
+            ),
+          )
+        }
+      >
+        {options.map((each) => (
+          <option key={each} value={each}>
+            {words(each)}
+            {name === "objective" ? " energy" : ""}
+          </option>
+        ))}
       </select>
     </label>
   );
@@ -126,7 +185,13 @@ function Pick({ name, options }: { name: string; options: string[] }) {
 function Tick({ name, text }: { name: string; text: string }) {
   return (
     <label class="field">
-      <input type="checkbox" checked={request.value[name] !== false} onChange={(event) => edit(put(request.value, `/${name}`, event.currentTarget.checked ? undefined : false))} />
+      <input
+        type="checkbox"
+        checked={request.value[name] !== false}
+        onChange={(event) =>
+          edit(put(request.value, `/${name}`, event.currentTarget.checked ? undefined : false))
+        }
+      />
       <span>{text}</span>
     </label>
   );

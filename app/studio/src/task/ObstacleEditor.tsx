@@ -15,15 +15,27 @@ export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
   const obstacle = at(request.value, pointer);
   if (!isObject(obstacle)) return null;
   const given = obstacle as unknown as Obstacle;
-  const pose: Pose = isObject(given.pose) ? { ...given.pose, position: listOf<number>(given.pose.position) } : { position: [0, 0, 0], rotvec: [0, 0, 0] };
-  const cell = (label: string, field: string, value: unknown = at(request.value, `${pointer}/${field}`)) => (
+  const pose: Pose = isObject(given.pose)
+    ? { ...given.pose, position: listOf<number>(given.pose.position) }
+    : { position: [0, 0, 0], rotvec: [0, 0, 0] };
+  const cell = (
+    label: string,
+    field: string,
+    value: unknown = at(request.value, `${pointer}/${field}`),
+  ) => (
     <NumberCell label={label} pointer={`${pointer}/${field}`} value={value} unit="mm" withUnit />
   );
   return (
     <div class="obstacle-editor">
       <label class="field">
         <span>Name</span>
-        <input type="text" value={String(given.name)} onChange={(event) => edit(put(request.value, `${pointer}/name`, event.currentTarget.value))} />
+        <input
+          type="text"
+          value={String(given.name)}
+          onChange={(event) =>
+            edit(put(request.value, `${pointer}/name`, event.currentTarget.value))
+          }
+        />
       </label>
       {Array.isArray(given.size) && (
         <div class="field">
@@ -31,23 +43,52 @@ export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
           {AXES.map((axis, k) => cell(`Size ${axis}`, `size/${k}`))}
         </div>
       )}
-      {"radius" in given && given.radius !== undefined && <div class="field"><span>Radius</span>{cell("Radius", "radius")}</div>}
-      {"length" in given && given.length !== undefined && <div class="field"><span>Length, along its z</span>{cell("Length", "length")}</div>}
-      <p class="hint">{given.shape === "half_space" ? "A point of its surface; its z points out of it" : "Its middle, in the base frame"}</p>
+      {"radius" in given && given.radius !== undefined && (
+        <div class="field">
+          <span>Radius</span>
+          {cell("Radius", "radius")}
+        </div>
+      )}
+      {"length" in given && given.length !== undefined && (
+        <div class="field">
+          <span>Length, along its z</span>
+          {cell("Length", "length")}
+        </div>
+      )}
+      <p class="hint">
+        {given.shape === "half_space"
+          ? "A point of its surface; its z points out of it"
+          : "Its middle, in the base frame"}
+      </p>
       <PoseCells
         name={String(given.name)}
         pointer={`${pointer}/pose`}
         six={sixOf(pose)}
-        onNumber={(index, value, text, where) => edit(put(request.value, `${pointer}/pose`, withNumber(pose, index, value)), { ...typed.value, [where]: text })}
+        onNumber={(index, value, text, where) =>
+          edit(put(request.value, `${pointer}/pose`, withNumber(pose, index, value)), {
+            ...typed.value,
+            [where]: text,
+          })
+        }
       />
       <div class="field">
         <span>Margin</span>
         {cell("Margin", "margin", given.margin ?? DEFAULT_MARGIN)}
       </div>
       <div class="row">
-        <Button small icon="move" onClick={() => (tool.value = "move")}>Drag</Button>
-        <Button small icon="turn" onClick={() => (tool.value = "turn")}>Turn</Button>
-        <Button small icon="copy" onClick={() => edit(withObstacle(request.value, given, given.name), untyped(pointer))}>Duplicate</Button>
+        <Button small icon="move" onClick={() => (tool.value = "move")}>
+          Drag
+        </Button>
+        <Button small icon="turn" onClick={() => (tool.value = "turn")}>
+          Turn
+        </Button>
+        <Button
+          small
+          icon="copy"
+          onClick={() => edit(withObstacle(request.value, given, given.name), untyped(pointer))}
+        >
+          Duplicate
+        </Button>
       </div>
     </div>
   );

@@ -7,9 +7,15 @@ import { parseNumber } from "../store/units";
 /** The links of a URDF at which an arm may end: those that carry nothing. */
 function tipsOf(urdf: string): string[] {
   const tree = new DOMParser().parseFromString(urdf, "application/xml");
-  const parents = new Set([...tree.querySelectorAll("joint > parent")].map((each) => each.getAttribute("link")));
-  const links = [...tree.querySelectorAll("robot > link")].map((each) => each.getAttribute("name") ?? "");
-  return links.filter((name) => name && !parents.has(name)).concat(links.filter((name) => parents.has(name)).reverse());
+  const parents = new Set(
+    [...tree.querySelectorAll("joint > parent")].map((each) => each.getAttribute("link")),
+  );
+  const links = [...tree.querySelectorAll("robot > link")].map(
+    (each) => each.getAttribute("name") ?? "",
+  );
+  return links
+    .filter((name) => name && !parents.has(name))
+    .concat(links.filter((name) => parents.has(name)).reverse());
 }
 
 /** A robot of the user's own: its URDF, its meshes, and what a URDF does not say. */
@@ -20,14 +26,24 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
   const [form, setForm] = useState({ name: "", tip: "", acceleration: "10", payload: "" });
   const [why, setWhy] = useState<{ field: string; text: string }[]>([]);
   const [busy, setBusy] = useState(false);
-  const set = (field: keyof typeof form) => (event: { currentTarget: { value: string } }) => setForm({ ...form, [field]: event.currentTarget.value });
+  const set = (field: keyof typeof form) => (event: { currentTarget: { value: string } }) =>
+    setForm({ ...form, [field]: event.currentTarget.value });
   const read = async (file: File | undefined) => {
     if (!file) return;
     const text = await file.text();
     const found = tipsOf(text);
     setUrdf(text);
     setTips(found);
-    setForm({ ...form, tip: found[0] ?? "", name: form.name || file.name.replace(/\.\w+$/, "").toLowerCase().replace(/[^a-z0-9_-]+/g, "_") });
+    setForm({
+      ...form,
+      tip: found[0] ?? "",
+      name:
+        form.name ||
+        file.name
+          .replace(/\.\w+$/, "")
+          .toLowerCase()
+          .replace(/[^a-z0-9_-]+/g, "_"),
+    });
     setWhy(found.length ? [] : [{ field: "urdf", text: "No link was found: choose a URDF file." }]);
   };
   const add = async () => {
@@ -41,30 +57,100 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
     if (missing.length) return;
     setBusy(true);
     try {
-      await post("robots", { name: form.name, urdf, tip: form.tip, acceleration, payload, ...(meshes ? { meshes } : {}) });
+      await post("robots", {
+        name: form.name,
+        urdf,
+        tip: form.tip,
+        acceleration,
+        payload,
+        ...(meshes ? { meshes } : {}),
+      });
       onAdded(form.name);
     } catch (error) {
       const fields = error instanceof Problem ? (error.details.errors ?? []) : [];
-      setWhy(fields.length ? fields.map(({ loc, msg }) => ({ field: String(loc.at(1) ?? ""), text: msg })) : [{ field: "", text: (error as Error).message }]);
+      setWhy(
+        fields.length
+          ? fields.map(({ loc, msg }) => ({ field: String(loc.at(1) ?? ""), text: msg }))
+          : [{ field: "", text: (error as Error).message }],
+      );
     } finally {
       setBusy(false);
     }
   };
-  const said = (field: string) => why.filter((each) => each.field === field).map(({ text }) => <small class="error" role="alert" key={text}>{text}</small>);
+  const said = (field: string) =>
+    why
+      .filter((each) => each.field === field)
+      .map(({ text }) => (
+        <small class="error" role="alert" key={text}>
+          {text}
+        </small>
+      ));
   const known = ["urdf", "name", "tip", "acceleration", "payload", "meshes"];
   return (
     <div class="fields own-arm">
-      <label>URDF file <input type="file" accept=".urdf,.xml" onChange={(event) => void read(event.currentTarget.files?.[0])} />{said("urdf")}</label>
-      <label>Meshes that it names, as a zip <input type="file" accept=".zip" onChange={async (event) => { const file = event.currentTarget.files?.[0]; setMeshes(file ? base64(new Uint8Array(await file.arrayBuffer())) : null); }} />{said("meshes")}</label>
-      <label>Name <input type="text" value={form.name} onChange={set("name")} />{said("name")}</label>
-      <label>Link at the end of the arm, the flange
-        <select value={form.tip} onChange={set("tip")}>{tips.map((tip) => <option key={tip}>{tip}</option>)}</select>{said("tip")}
+      <label>
+        URDF file{" "}
+        <input
+          type="file"
+          accept=".urdf,.xml"
+          onChange={(event) => void read(event.currentTarget.files?.[0])}
+        />
+        {said("urdf")}
       </label>
-      <label>Largest joint acceleration, rad/s² <input type="text" inputMode="decimal" value={form.acceleration} onChange={set("acceleration")} />{said("acceleration")}</label>
-      <label>Largest payload, kg <input type="text" inputMode="decimal" value={form.payload} onChange={set("payload")} />{said("payload")}</label>
-      {why.filter(({ field }) => !known.includes(field)).map(({ field, text }) => <p class="error" role="alert" key={text}>{field} {text}</p>)}
-      <p class="hint">Figures that a URDF does not hold (friction, rotors, electronics) are engineering defaults until logs of your arm tell them.</p>
-      <Button kind="primary" disabled={busy} onClick={add}>Add the arm</Button>
+      <label>
+        Meshes that it names, as a zip{" "}
+        <input
+          type="file"
+          accept=".zip"
+          onChange={async (event) => {
+            const file = event.currentTarget.files?.[0];
+            setMeshes(file ? base64(new Uint8Array(await file.arrayBuffer())) : null);
+          }}
+        />
+        {said("meshes")}
+      </label>
+      <label>
+        Name <input type="text" value={form.name} onChange={set("name")} />
+        {said("name")}
+      </label>
+      <label>
+        Link at the end of the arm, the flange
+        <select value={form.tip} onChange={set("tip")}>
+          {tips.map((tip) => (
+            <option key={tip}>{tip}</option>
+          ))}
+        </select>
+        {said("tip")}
+      </label>
+      <label>
+        Largest joint acceleration, rad/s²{" "}
+        <input
+          type="text"
+          inputMode="decimal"
+          value={form.acceleration}
+          onChange={set("acceleration")}
+        />
+        {said("acceleration")}
+      </label>
+      <label>
+        Largest payload, kg{" "}
+        <input type="text" inputMode="decimal" value={form.payload} onChange={set("payload")} />
+        {said("payload")}
+      </label>
+      {why
+        .filter(({ field }) => !known.includes(field))
+        .map(({ field, text }) => (
+          <p class="error" role="alert" key={text}>
+            {field} {text}
+          </p>
+        ))}
+      <p class="hint">
+        Figures that a URDF does not hold (friction, rotors, electronics) are engineering defaults
+        until logs of your arm tell them.
+      </p>
+      <Button kind="primary" disabled={busy} onClick={add}>
+        Add the arm
+      </Button>
     </div>
   );
 }

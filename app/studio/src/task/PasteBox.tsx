@@ -22,7 +22,11 @@ export function PasteBox() {
           event.currentTarget.value = "";
         }}
       />
-      {pasteWrong.value && <p class="error" role="alert">{pasteWrong.value}</p>}
+      {pasteWrong.value && (
+        <p class="error" role="alert">
+          {pasteWrong.value}
+        </p>
+      )}
       {asked && (
         <Note>
           <b>How is this meant?</b>

@@ -8,11 +8,11 @@ import { duplicated, entryOf, moved, withoutRow, withTarget } from "../store/edi
 import { at, put } from "../store/pointer";
 import { reached } from "../store/reach";
 import { poseAt, sixOf, targetAt, withNumber, type Row, type Target } from "../store/request";
-import { changes, edit, request, selected, typed } from "../store/state";
+import { changes, edit, request, selected, trouble, typed } from "../store/state";
 import { JointSliders } from "./JointSliders";
 import { pasteInto } from "./paste";
 import { PoseCells } from "./PoseCells";
-import { StopFields } from "./StopFields";
+import { deedText, StopFields } from "./StopFields";
 import { jointsOf, poseAtJoints, presentTarget } from "./take";
 
 /** One target: its name, whether it is reached, and its numbers. */
@@ -21,7 +21,9 @@ export function PoseRow({ row, index }: { row: Row; index: number }) {
   const target = targetAt(request.value, row);
   const chosen = selected.value === row.pointer;
   const stopAt = row.pointer.replace(/\/target$/, "");
-  const changed = changes.value.some(({ pointer }) => pointer.startsWith(row.role === "stop" ? `${stopAt}/` : row.pointer));
+  const changed = changes.value.some(({ pointer }) =>
+    pointer.startsWith(row.role === "stop" ? `${stopAt}/` : row.pointer),
+  );
   const choose = () => (selected.value = row.pointer);
   const onKeyDown = (event: KeyboardEvent) => {
     const act = rowKey(event, row);
@@ -30,12 +32,21 @@ export function PoseRow({ row, index }: { row: Row; index: number }) {
     act();
   };
   return (
-    <div class={`target ${row.role}${chosen ? " chosen" : ""}`} data-row={row.pointer} onFocusCapture={choose} onClick={choose} onKeyDown={onKeyDown} role="group" aria-label={row.name}>
+    <div
+      class={`target ${row.role}${chosen ? " chosen" : ""}`}
+      data-row={row.pointer}
+      onFocusCapture={choose}
+      onClick={choose}
+      onKeyDown={onKeyDown}
+      role="group"
+      aria-label={row.name}
+    >
       <div class="target-head">
         <i class={`mark ${row.role}`} aria-hidden="true">
           {row.role === "stop" ? index : ""}
         </i>
         {row.role === "stop" ? <StopName row={row} /> : <b>{row.name}</b>}
+        {row.role === "stop" && <small class="deed">{deedText(at(request.value, stopAt))}</small>}
         {changed && <small class="was">changed</small>}
         <span class="space" />
         <ReachText row={row} target={target} />
@@ -53,14 +64,24 @@ function rowKey(event: KeyboardEvent, row: Row): (() => void) | null {
   if (!entryOf(row)) return null;
   const inside = (event.target as HTMLElement).matches("input, select, textarea");
   if (event.altKey && event.key === "ArrowUp") return () => edit(moved(request.value, row, -1), {});
-  if (event.altKey && event.key === "ArrowDown") return () => edit(moved(request.value, row, 1), {});
-  if ((event.ctrlKey || event.metaKey) && event.key === "d") return () => edit(duplicated(request.value, row), {});
+  if (event.altKey && event.key === "ArrowDown")
+    return () => edit(moved(request.value, row, 1), {});
+  if ((event.ctrlKey || event.metaKey) && event.key === "d")
+    return () => edit(duplicated(request.value, row), {});
   return event.key === "Delete" && !inside ? () => edit(withoutRow(request.value, row), {}) : null;
 }
 
 function StopName({ row }: { row: Row }) {
   const pointer = `${row.pointer.replace(/\/target$/, "")}/name`;
-  return <input type="text" class="name" aria-label={`Name of ${row.name}`} value={row.name} onChange={(event) => edit(put(request.value, pointer, event.currentTarget.value))} />;
+  return (
+    <input
+      type="text"
+      class="name"
+      aria-label={`Name of ${row.name}`}
+      value={row.name}
+      onChange={(event) => edit(put(request.value, pointer, event.currentTarget.value))}
+    />
+  );
 }
 
 function ReachText({ row, target }: { row: Row; target: Target }) {
@@ -69,7 +90,12 @@ function ReachText({ row, target }: { row: Row; target: Target }) {
   if (reach.state === "asking") return <small class="hint">checking …</small>;
   if (reach.state === "refused") return null;
   const free = reach.solutions.filter(({ collides }) => !collides).length;
-  if (free) return <small class="hint">{free} of {reach.solutions.length} postures free</small>;
+  if (free)
+    return (
+      <small class="hint">
+        {free} of {reach.solutions.length} postures free
+      </small>
+    );
   return <small class="warning-text">every posture collides</small>;
 }
 
@@ -77,7 +103,8 @@ function Numbers({ row, target }: { row: Row; target: Target }) {
   const paste = (text: string) => pasteInto(row, text);
   if (target.kind === "pose") {
     const reach = reached.value[row.pointer];
-    const refused = reach?.state === "refused" ? reach.text : null;
+    const told = trouble.value?.fields.some(({ pointer }) => pointer.startsWith(row.pointer));
+    const refused = reach?.state === "refused" && !told ? reach.text : null;
     return (
       <>
         <PoseCells
@@ -85,7 +112,12 @@ function Numbers({ row, target }: { row: Row; target: Target }) {
           pointer={poseAt(row)}
           six={sixOf(target.pose)}
           onPaste={paste}
-          onNumber={(k, value, text, pointer) => edit(put(request.value, poseAt(row), withNumber(target.pose, k, value)), { ...typed.value, [pointer]: text })}
+          onNumber={(k, value, text, pointer) =>
+            edit(put(request.value, poseAt(row), withNumber(target.pose, k, value)), {
+              ...typed.value,
+              [pointer]: text,
+            })
+          }
         />
         {refused && <p class="error">{refused}</p>}
       </>
@@ -97,7 +129,13 @@ function Numbers({ row, target }: { row: Row; target: Target }) {
         {target.q.map((value, k) => (
           <label key={k} class="six-cell">
             <span aria-hidden="true">J{k + 1} °</span>
-            <NumberCell label={`${row.name} joint ${k + 1}`} pointer={`${row.pointer}/q/${k}`} value={value} unit="deg" onPaste={paste} />
+            <NumberCell
+              label={`${row.name} joint ${k + 1}`}
+              pointer={`${row.pointer}/q/${k}`}
+              value={value}
+              unit="deg"
+              onPaste={paste}
+            />
           </label>
         ))}
       </div>
@@ -118,26 +156,65 @@ function Numbers({ row, target }: { row: Row; target: Target }) {
 }
 
 function RowMenu({ row, target, onSliders }: { row: Row; target: Target; onSliders: () => void }) {
-  const set = (next: ReturnType<typeof presentTarget>) => next && edit(withTarget(request.value, row, next), untyped(row.pointer));
+  const set = (next: ReturnType<typeof presentTarget>) =>
+    next && edit(withTarget(request.value, row, next), untyped(row.pointer));
   const q = target.kind === "joints" ? target.q : jointsOf(row);
   const asPose = () => {
     const pose = q && poseAtJoints(q);
     if (pose) set({ pose });
   };
-  const copy = () => void navigator.clipboard?.writeText(target.kind === "joints" ? `[${target.q.join(", ")}]` : target.kind === "pose" ? `p[${sixOf(target.pose).join(", ")}]` : JSON.stringify(at(request.value, row.pointer)));
+  const copy = () =>
+    void navigator.clipboard?.writeText(
+      target.kind === "joints"
+        ? `[${target.q.join(", ")}]`
+        : target.kind === "pose"
+          ? `p[${sixOf(target.pose).join(", ")}]`
+          : JSON.stringify(at(request.value, row.pointer)),
+    );
   return (
     <Menu label="" name={`More for ${row.name}`} icon="more" quiet>
-      <Button kind="quiet" onClick={() => set(presentTarget(target.kind === "joints" ? "joints" : "pose"))}>Take from the picture</Button>
-      {!row.bare && target.kind === "pose" && q && <Button kind="quiet" onClick={() => set({ q })}>As joint positions</Button>}
-      {target.kind === "joints" && <Button kind="quiet" onClick={asPose}>As a pose</Button>}
-      {!row.bare && <Button kind="quiet" onClick={onSliders}>Joint sliders</Button>}
-      <Button kind="quiet" onClick={copy}>Copy</Button>
+      <Button
+        kind="quiet"
+        onClick={() => set(presentTarget(target.kind === "joints" ? "joints" : "pose"))}
+      >
+        Take from the picture
+      </Button>
+      {!row.bare && target.kind === "pose" && q && (
+        <Button kind="quiet" onClick={() => set({ q })}>
+          As joint positions
+        </Button>
+      )}
+      {target.kind === "joints" && (
+        <Button kind="quiet" onClick={asPose}>
+          As a pose
+        </Button>
+      )}
+      {!row.bare && (
+        <Button kind="quiet" onClick={onSliders}>
+          Joint sliders
+        </Button>
+      )}
+      <Button kind="quiet" onClick={copy}>
+        Copy
+      </Button>
       {entryOf(row) && (
         <>
-          <Button kind="quiet" onClick={() => edit(duplicated(request.value, row), {})}>Duplicate</Button>
-          <Button kind="quiet" onClick={() => edit(moved(request.value, row, -1), {})}>Move up</Button>
-          <Button kind="quiet" onClick={() => edit(moved(request.value, row, 1), {})}>Move down</Button>
-          <Button kind="quiet" icon="trash" onClick={() => edit(withoutRow(request.value, row), {})}>Delete</Button>
+          <Button kind="quiet" onClick={() => edit(duplicated(request.value, row), {})}>
+            Duplicate
+          </Button>
+          <Button kind="quiet" onClick={() => edit(moved(request.value, row, -1), {})}>
+            Move up
+          </Button>
+          <Button kind="quiet" onClick={() => edit(moved(request.value, row, 1), {})}>
+            Move down
+          </Button>
+          <Button
+            kind="quiet"
+            icon="trash"
+            onClick={() => edit(withoutRow(request.value, row), {})}
+          >
+            Delete
+          </Button>
         </>
       )}
     </Menu>

@@ -24,7 +24,11 @@ export function RobotCard() {
         </p>
         <p class="hint">
           {own ? "Your own figures" : "Figures of the type"} ·{" "}
-          <Button kind="link" onClick={() => (page.value = "logs")} title="From logs of your own arm">
+          <Button
+            kind="link"
+            onClick={() => (page.value = "logs")}
+            title="From logs of your own arm"
+          >
             use yours
           </Button>
         </p>

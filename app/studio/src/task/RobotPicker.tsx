@@ -17,23 +17,51 @@ export function RobotPicker({ onClose }: { onClose: () => void }) {
   useEffect(() => void load(), []);
   const choose = (name: string) => {
     // figures were identified on one arm of one type
-    if (name !== robotName(request.value)) edit(put(put(request.value, "/robot", name), "/figures", undefined));
+    if (name !== robotName(request.value))
+      edit(put(put(request.value, "/robot", name), "/figures", undefined));
     onClose();
   };
-  const shown = (robots ?? []).filter(({ name, title }) => `${name} ${title}`.toLowerCase().includes(filter.toLowerCase()));
+  const shown = (robots ?? []).filter(({ name, title }) =>
+    `${name} ${title}`.toLowerCase().includes(filter.toLowerCase()),
+  );
   return (
-    <Dialog title="Robot" onClose={onClose} wide footer={<Button onClick={() => setAdding(!adding)}>{adding ? "Back to the list" : "Add your own arm (URDF)"}</Button>}>
+    <Dialog
+      title="Robot"
+      onClose={onClose}
+      wide
+      footer={
+        <Button onClick={() => setAdding(!adding)}>
+          {adding ? "Back to the list" : "Add your own arm (URDF)"}
+        </Button>
+      }
+    >
       {adding ? (
         <OwnArm onAdded={choose} />
       ) : (
         <>
-          <input type="search" class="search" placeholder="Search robots" aria-label="Search robots" value={filter} onInput={(event) => setFilter(event.currentTarget.value)} />
-          {why && <p class="error" role="alert">{why}</p>}
+          <input
+            type="search"
+            class="search"
+            placeholder="Search robots"
+            aria-label="Search robots"
+            value={filter}
+            onInput={(event) => setFilter(event.currentTarget.value)}
+          />
+          {why && (
+            <p class="error" role="alert">
+              {why}
+            </p>
+          )}
           {!robots && !why && <p class="hint">…</p>}
           <ul class="robots">
             {shown.map(({ name, title, joints, added, energy_trust: trust }) => (
               <li key={name}>
-                <button type="button" class="choice" aria-pressed={name === robotName(request.value)} onClick={() => choose(name)}>
+                <button
+                  type="button"
+                  class="choice"
+                  aria-pressed={name === robotName(request.value)}
+                  onClick={() => choose(name)}
+                >
                   <b>{title}</b>
                   <small>
                     {name} · {joints.length} joints{added ? " · yours" : ""}

@@ -26,7 +26,13 @@ export function RunBar() {
         <Progress />
       ) : (
         <>
-          <button type="button" id="optimise" class={`button big${fresh ? "" : " primary"}`} disabled={Boolean(lack) || jsonBroken.value} onClick={send}>
+          <button
+            type="button"
+            id="optimise"
+            class={`button big${fresh ? "" : " primary"}`}
+            disabled={Boolean(lack) || jsonBroken.value}
+            onClick={send}
+          >
             {changes.value.length ? "Optimise again" : "Optimise"} <kbd>Ctrl ↵</kbd>
           </button>
           <p class="hint" role="status" id="run-state">
@@ -43,7 +49,8 @@ function stateText(): string {
   const count = changes.value.length;
   if (count) return `${count} ${count === 1 ? "change" : "changes"} since the last answer`;
   const took = answered.value?.took;
-  if (answered.value) return `The answer belongs to this request${took ? ` · took ${figure(took, 2)} s` : ""}`;
+  if (answered.value)
+    return `The answer belongs to this request${took ? ` · took ${figure(took, 2)} s` : ""}`;
   return "Not computed yet";
 }
 
@@ -54,7 +61,17 @@ function Wrong() {
   const elsewhere = now.fields.filter(({ text }) => text !== now.text);
   return (
     <div id="problem">
-      <Note kind="error" action={<Button kind="quiet" icon="close" label="Dismiss" onClick={() => (trouble.value = null)} />}>
+      <Note
+        kind="error"
+        action={
+          <Button
+            kind="quiet"
+            icon="close"
+            label="Dismiss"
+            onClick={() => (trouble.value = null)}
+          />
+        }
+      >
         <b>{now.title}.</b> {now.text}
         {elsewhere.length > 0 && (
           <ul>

@@ -20,18 +20,40 @@ export function SceneList() {
   const [open, setOpen] = useState<number | null>(null);
   const [why, setWhy] = useState("");
   const add = (name: keyof typeof OBSTACLES) => {
-    const place = { position: name === "half_space" ? [0, 0, 0] : [0.5, 0, 0.1], rotvec: [0, 0, 0] };
-    edit(withObstacle(request.value, { ...OBSTACLES[name], size: name === "box" ? [...OBSTACLES.box.size] : undefined, pose: place }, name === "half_space" ? "table" : name), {});
+    const place = {
+      position: name === "half_space" ? [0, 0, 0] : [0.5, 0, 0.1],
+      rotvec: [0, 0, 0],
+    };
+    edit(
+      withObstacle(
+        request.value,
+        {
+          ...OBSTACLES[name],
+          size: name === "box" ? [...OBSTACLES.box.size] : undefined,
+          pose: place,
+        },
+        name === "half_space" ? "table" : name,
+      ),
+      {},
+    );
     setOpen(obstacles.length);
     selected.value = join("scene", "obstacles", obstacles.length);
   };
   const upload = async (file: File | undefined) => {
     const format = file?.name.split(".").at(-1)?.toLowerCase();
     if (!file) return;
-    if (!["stl", "obj", "glb"].includes(format ?? "")) return setWhy("Choose an STL, OBJ or GLB file.");
+    if (!["stl", "obj", "glb"].includes(format ?? ""))
+      return setWhy("Choose an STL, OBJ or GLB file.");
     setWhy("");
     const data = base64(new Uint8Array(await file.arrayBuffer()));
-    edit(withObstacle(request.value, { shape: "mesh_file", format, data, pose: { position: [0.5, 0, 0], rotvec: [0, 0, 0] } }, file.name.replace(/\.\w+$/, "").slice(0, 40)), {});
+    edit(
+      withObstacle(
+        request.value,
+        { shape: "mesh_file", format, data, pose: { position: [0.5, 0, 0], rotvec: [0, 0, 0] } },
+        file.name.replace(/\.\w+$/, "").slice(0, 40),
+      ),
+      {},
+    );
   };
   return (
     <Section
@@ -40,19 +62,38 @@ export function SceneList() {
       note={obstacles.length ? `${obstacles.length} obstacles` : "nothing around the arm"}
       action={
         <Menu label="Add" icon="plus" quiet>
-          <Button kind="quiet" onClick={() => add("box")}>Box</Button>
-          <Button kind="quiet" onClick={() => add("cylinder")}>Cylinder</Button>
-          <Button kind="quiet" onClick={() => add("sphere")}>Sphere</Button>
-          <Button kind="quiet" onClick={() => add("half_space")}>Table or wall (half space)</Button>
-          <Button kind="quiet" onClick={() => (tool.value = "box")}>Draw a box in the picture</Button>
+          <Button kind="quiet" onClick={() => add("box")}>
+            Box
+          </Button>
+          <Button kind="quiet" onClick={() => add("cylinder")}>
+            Cylinder
+          </Button>
+          <Button kind="quiet" onClick={() => add("sphere")}>
+            Sphere
+          </Button>
+          <Button kind="quiet" onClick={() => add("half_space")}>
+            Table or wall (half space)
+          </Button>
+          <Button kind="quiet" onClick={() => (tool.value = "box")}>
+            Draw a box in the picture
+          </Button>
           <label class="button quiet">
             Mesh file …
-            <input type="file" class="unseen" accept=".stl,.obj,.glb" onChange={(event) => void upload(event.currentTarget.files?.[0])} />
+            <input
+              type="file"
+              class="unseen"
+              accept=".stl,.obj,.glb"
+              onChange={(event) => void upload(event.currentTarget.files?.[0])}
+            />
           </label>
         </Menu>
       }
     >
-      {why && <p class="error" role="alert">{why}</p>}
+      {why && (
+        <p class="error" role="alert">
+          {why}
+        </p>
+      )}
       <ul class="obstacles">
         {obstacles.slice(0, MOST).map((obstacle, k) => {
           const pointer = join("scene", "obstacles", k);
@@ -70,11 +111,23 @@ export function SceneList() {
                     selected.value = pointer;
                   }}
                 >
-                  {String(obstacle.name)} <small>{words(String(obstacle.shape))}, margin {figure(margin * 1000)} mm</small>
+                  {String(obstacle.name)}{" "}
+                  <small>
+                    {words(String(obstacle.shape))}, margin {figure(margin * 1000)} mm
+                  </small>
                 </button>
                 {changed && <small class="was">changed</small>}
                 <span class="space" />
-                <Button kind="quiet" small icon="trash" label={`Delete ${String(obstacle.name)}`} onClick={() => { setOpen(null); edit(withoutObstacle(request.value, k), {}); }} />
+                <Button
+                  kind="quiet"
+                  small
+                  icon="trash"
+                  label={`Delete ${String(obstacle.name)}`}
+                  onClick={() => {
+                    setOpen(null);
+                    edit(withoutObstacle(request.value, k), {});
+                  }}
+                />
               </div>
               {open === k && <ObstacleEditor pointer={pointer} />}
               <Errors under={pointer} />

@@ -29,6 +29,14 @@ function withDeed(stop: Stop, deed: Deed): Stop {
   return { ...passing, via: true };
 }
 
+/** What the arm does at a stop, in a few words. */
+export function deedText(stop: unknown): string {
+  if (!isObject(stop)) return "";
+  const deed = deedOf(stop as Stop);
+  if (deed === "takes") return `takes ${(stop as Stop).payload?.mass ?? "?"} kg`;
+  return deed === "puts" ? "puts down" : deed === "passes" ? "passes" : "";
+}
+
 /** What the arm does at a stop. */
 export function StopFields({ pointer }: { pointer: Pointer }) {
   const stop = at(request.value, pointer);
@@ -36,31 +44,73 @@ export function StopFields({ pointer }: { pointer: Pointer }) {
   const deed = deedOf(stop as Stop);
   const line = (field: "approach" | "retreat") => {
     const given = isObject(stop[field]);
-    const set = (on: boolean) => edit(put(request.value, `${pointer}/${field}`, on ? { direction: [0, 0, field === "approach" ? 1 : -1], distance: 0.05 } : undefined));
+    const set = (on: boolean) =>
+      edit(
+        put(
+          request.value,
+          `${pointer}/${field}`,
+          on ? { direction: [0, 0, field === "approach" ? 1 : -1], distance: 0.05 } : undefined,
+        ),
+      );
     return (
       <label class="field">
-        <input type="checkbox" checked={given} onChange={(event) => set(event.currentTarget.checked)} />
+        <input
+          type="checkbox"
+          checked={given}
+          onChange={(event) => set(event.currentTarget.checked)}
+        />
         <span>straight {field === "approach" ? "in" : "out"}, along the tool</span>
-        {given && <NumberCell label={field} pointer={`${pointer}/${field}/distance`} value={at(request.value, `${pointer}/${field}/distance`)} unit="mm" withUnit />}
+        {given && (
+          <NumberCell
+            label={field}
+            pointer={`${pointer}/${field}/distance`}
+            value={at(request.value, `${pointer}/${field}/distance`)}
+            unit="mm"
+            withUnit
+          />
+        )}
       </label>
     );
   };
   return (
     <div class="stop-fields">
-      <Segment label="Here the arm" options={DEEDS} value={deed} onChange={(next) => edit(put(request.value, pointer, withDeed(stop as Stop, next)))} />
+      <Segment
+        label="Here the arm"
+        options={DEEDS}
+        value={deed}
+        onChange={(next) => edit(put(request.value, pointer, withDeed(stop as Stop, next)))}
+      />
       {deed === "takes" && (
         <div class="field">
           <span>what weighs</span>
-          <NumberCell label="Payload mass" pointer={`${pointer}/payload/mass`} value={at(request.value, `${pointer}/payload/mass`)} unit="kg" withUnit />
+          <NumberCell
+            label="Payload mass"
+            pointer={`${pointer}/payload/mass`}
+            value={at(request.value, `${pointer}/payload/mass`)}
+            unit="kg"
+            withUnit
+          />
           <span>centre Z</span>
-          <NumberCell label="Centre of mass Z" pointer={`${pointer}/payload/com/2`} value={at(request.value, `${pointer}/payload/com/2`) ?? 0} unit="mm" withUnit />
+          <NumberCell
+            label="Centre of mass Z"
+            pointer={`${pointer}/payload/com/2`}
+            value={at(request.value, `${pointer}/payload/com/2`) ?? 0}
+            unit="mm"
+            withUnit
+          />
         </div>
       )}
       {deed !== "passes" && (
         <>
           <div class="field">
             <span>stands for</span>
-            <NumberCell label="Dwell" pointer={`${pointer}/dwell`} value={stop.dwell ?? 0} unit="s" withUnit />
+            <NumberCell
+              label="Dwell"
+              pointer={`${pointer}/dwell`}
+              value={stop.dwell ?? 0}
+              unit="s"
+              withUnit
+            />
           </div>
           {line("approach")}
           {line("retreat")}

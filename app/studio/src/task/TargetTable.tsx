@@ -21,7 +21,11 @@ export function TargetTable() {
     else edit(withStop(request.value), typed.value);
   };
   return (
-    <Section title={round ? "Stops" : "Targets"} note={round ? `${rows.length - 1}` : "mm and rad, as on the pendant"} id="targets">
+    <Section
+      title={round ? "Stops" : "Targets"}
+      note={round ? `${rows.length - 1}` : "mm and rad, as on the pendant"}
+      id="targets"
+    >
       {round && <Order />}
       {rows.map((row, k) => (
         <PoseRow key={row.pointer} row={row} index={k} />
@@ -31,10 +35,21 @@ export function TargetTable() {
         <Button kind="link" icon="plus" onClick={add}>
           {path ? "Add a pose on the way" : "Add a stop"}
         </Button>
-        <Button kind="link" icon="target" onClick={takePose} title="Where the arm stands in the picture now">
+        <Button
+          kind="link"
+          icon="target"
+          onClick={takePose}
+          title="Where the arm stands in the picture now"
+        >
           Take from the picture
         </Button>
-        <Button kind="link" icon="move" disabled={!selected.value} title="Choose a target first" onClick={() => (tool.value = "move")}>
+        <Button
+          kind="link"
+          icon="move"
+          disabled={!selected.value}
+          title="Choose a target first"
+          onClick={() => (tool.value = "move")}
+        >
           Drag
         </Button>
       </div>
@@ -51,13 +66,24 @@ function Order() {
     <div class="row">
       <label>
         order{" "}
-        <select aria-label="Order of the stops" value={order === "free" ? "free" : "given"} onChange={(event) => edit(put(request.value, "/order", event.currentTarget.value))}>
+        <select
+          aria-label="Order of the stops"
+          value={order === "free" ? "free" : "given"}
+          onChange={(event) => edit(put(request.value, "/order", event.currentTarget.value))}
+        >
           <option value="given">as listed</option>
           <option value="free">the best</option>
         </select>
       </label>
       <label>
-        <input type="checkbox" checked={closed !== false} onChange={(event) => edit(put(request.value, "/closed", event.currentTarget.checked ? undefined : false))} /> back to the start
+        <input
+          type="checkbox"
+          checked={closed !== false}
+          onChange={(event) =>
+            edit(put(request.value, "/closed", event.currentTarget.checked ? undefined : false))
+          }
+        />{" "}
+        back to the start
       </label>
     </div>
   );

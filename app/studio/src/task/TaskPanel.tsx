@@ -24,8 +24,19 @@ export function TaskPanel() {
   return (
     <aside class="task" id="task" aria-label="Task">
       <div class="task-head">
-        <Segment label="Kind of task" options={KINDS} value={kind.value} onChange={(next) => edit(asKind(request.value, next), {})} />
-        <Button kind="quiet" small id="json-toggle" pressed={asJson.value} onClick={() => (asJson.value = !asJson.value)}>
+        <Segment
+          label="Kind of task"
+          options={KINDS}
+          value={kind.value}
+          onChange={(next) => edit(asKind(request.value, next), {})}
+        />
+        <Button
+          kind="quiet"
+          small
+          id="json-toggle"
+          pressed={asJson.value}
+          onClick={() => (asJson.value = !asJson.value)}
+        >
           {"{ }"} JSON
         </Button>
       </div>

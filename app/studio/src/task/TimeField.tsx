@@ -10,7 +10,13 @@ import type { ApiRequest } from "../store/types";
 
 type Choice = "free" | "cycle" | "most" | "exact" | "other";
 
-const TEXTS: Record<Choice, string> = { free: "Least energy", cycle: "Whole cycle", most: "At most", exact: "Exactly", other: "as in JSON" };
+const TEXTS: Record<Choice, string> = {
+  free: "Least energy",
+  cycle: "Whole cycle",
+  most: "At most",
+  exact: "Exactly",
+  other: "as in JSON",
+};
 
 function choiceOf(asked: ApiRequest, field: string): Choice {
   if (isObject(asked.dwell)) return "cycle";
@@ -25,7 +31,8 @@ export function withTime(asked: ApiRequest, choice: Choice, seconds: number): Ap
   const round = asked.stops !== undefined;
   const field = round ? "/time" : "/duration";
   const free = put(put(asked, field, undefined), "/dwell", undefined);
-  if (choice === "cycle") return put(free, "/dwell", { ...(isObject(asked.dwell) ? asked.dwell : {}), time: seconds });
+  if (choice === "cycle")
+    return put(free, "/dwell", { ...(isObject(asked.dwell) ? asked.dwell : {}), time: seconds });
   if (choice === "most") return put(free, field, { max: seconds });
   return choice === "exact" ? put(free, field, seconds) : free;
 }
@@ -36,10 +43,16 @@ export function TimeField() {
   const round = kind.value === "round";
   const field = round ? "/time" : "/duration";
   const choice = choiceOf(asked, field);
-  const seconds = { cycle: "/dwell/time", most: `${field}/max`, exact: field, free: "", other: "" }[choice];
-  const options: Choice[] = [...(["free", ...(round ? [] : ["cycle"]), "most", "exact"] as Choice[]), ...(choice === "other" ? (["other"] as Choice[]) : [])];
+  const seconds = { cycle: "/dwell/time", most: `${field}/max`, exact: field, free: "", other: "" }[
+    choice
+  ];
+  const options: Choice[] = [
+    ...(["free", ...(round ? [] : ["cycle"]), "most", "exact"] as Choice[]),
+    ...(choice === "other" ? (["other"] as Choice[]) : []),
+  ];
   const usual = () => {
-    const now = (at(asked, seconds) as number | undefined) ?? answered.value?.solution.duration ?? 2;
+    const now =
+      (at(asked, seconds) as number | undefined) ?? answered.value?.solution.duration ?? 2;
     return Math.ceil(now * 100) / 100;
   };
   const choose = (next: Choice) => {
@@ -49,7 +62,12 @@ export function TimeField() {
   };
   return (
     <Section title="Time" action={<Every />}>
-      <Segment label="Time" value={choice} onChange={choose} options={options.map((value) => ({ value, text: TEXTS[value] }))} />
+      <Segment
+        label="Time"
+        value={choice}
+        onChange={choose}
+        options={options.map((value) => ({ value, text: TEXTS[value] }))}
+      />
       {seconds && (
         <div class="field">
           <span>{choice === "cycle" ? "from start to start" : "seconds"}</span>
@@ -67,12 +85,21 @@ function Every() {
   const value = economics.value.cycle;
   const set = (text: string) => {
     const number = parseNumber(text);
-    if (text.trim() === "" || (number !== null && number > 0)) economics.value = { ...economics.value, cycle: text.trim() === "" ? null : number };
+    if (text.trim() === "" || (number !== null && number > 0))
+      economics.value = { ...economics.value, cycle: text.trim() === "" ? null : number };
   };
   return (
     <label class="every">
       one {kind.value === "round" ? "round" : "move"} every{" "}
-      <input type="text" inputMode="decimal" aria-label="One move every so many seconds" placeholder="–" value={value ?? ""} onChange={(event) => set(event.currentTarget.value)} /> s
+      <input
+        type="text"
+        inputMode="decimal"
+        aria-label="One move every so many seconds"
+        placeholder="–"
+        value={value ?? ""}
+        onChange={(event) => set(event.currentTarget.value)}
+      />{" "}
+      s
     </label>
   );
 }

@@ -28,8 +28,19 @@ export function ToolPayload() {
     <section class="section" aria-label="Tool and payload">
       <details class="fold" id="tool-fold">
         <summary>
-          <span class="fold-name">Tool</span> <b>{named ? (toolNow.value?.title ?? asked.tool as string) : `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm`}</b>
-          <small>{named ? `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm` : count ? `${count} capsules` : "no shape"}</small>
+          <span class="fold-name">Tool</span>{" "}
+          <b>
+            {named
+              ? (toolNow.value?.title ?? (asked.tool as string))
+              : `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm`}
+          </b>
+          <small>
+            {named
+              ? `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm`
+              : count
+                ? `${count} capsules`
+                : "no shape"}
+          </small>
         </summary>
         <ToolPicker />
         <TcpCells tcp={tcp} />
@@ -37,8 +48,21 @@ export function ToolPayload() {
       </details>
       <div class="field payload">
         <span class="fold-name">Payload</span>
-        <NumberCell label="Payload mass" pointer="/payload/mass" value={mass ?? 0} unit="kg" withUnit onValue={(value, text) => setMass(value, text)} />
-        <small>{isObject(at(asked, "/payload/shape")) ? String(at(asked, "/payload/shape/shape")) : mass ? "no shape" : "nothing carried"}</small>
+        <NumberCell
+          label="Payload mass"
+          pointer="/payload/mass"
+          value={mass ?? 0}
+          unit="kg"
+          withUnit
+          onValue={(value, text) => setMass(value, text)}
+        />
+        <small>
+          {isObject(at(asked, "/payload/shape"))
+            ? String(at(asked, "/payload/shape/shape"))
+            : mass
+              ? "no shape"
+              : "nothing carried"}
+        </small>
       </div>
       {typeof mass === "number" && typeof rated === "number" && mass > rated && (
         <p class="warning-text">
@@ -56,7 +80,10 @@ export function ToolPayload() {
 /** A payload without mass is none; a first one has its centre 50 mm before the flange. */
 function setMass(value: number, text: string): void {
   const { payload } = request.value;
-  const next = value === 0 ? undefined : { ...(isObject(payload) ? payload : { com: [0, 0, 0.05] }), mass: value };
+  const next =
+    value === 0
+      ? undefined
+      : { ...(isObject(payload) ? payload : { com: [0, 0, 0.05] }), mass: value };
   edit(put(request.value, "/payload", next), { ...untyped("/payload"), "/payload/mass": text });
 }
 
@@ -69,27 +96,63 @@ function TcpCells({ tcp }: { tcp: Pose }) {
         name="TCP"
         pointer="/tcp"
         six={six}
-        onNumber={(index, value, text, pointer) => edit(put(request.value, "/tcp", withNumber(tcp, index, value)), { ...untyped(""), [pointer]: text })}
+        onNumber={(index, value, text, pointer) =>
+          edit(put(request.value, "/tcp", withNumber(tcp, index, value)), {
+            ...untyped(""),
+            [pointer]: text,
+          })
+        }
       />
     </>
   );
 }
 
 function Capsules() {
-  const capsules = listOf<NonNullable<Tool["capsules"]>[number]>(at(request.value, "/tool/capsules"));
-  const set = (next: unknown[]) => edit(put(request.value, "/tool", { ...(isObject(request.value.tool) ? request.value.tool : {}), capsules: next }), untyped("/tool"));
+  const capsules = listOf<NonNullable<Tool["capsules"]>[number]>(
+    at(request.value, "/tool/capsules"),
+  );
+  const set = (next: unknown[]) =>
+    edit(
+      put(request.value, "/tool", {
+        ...(isObject(request.value.tool) ? request.value.tool : {}),
+        capsules: next,
+      }),
+      untyped("/tool"),
+    );
   const add = () => set([...capsules, { start: [0, 0, 0.02], end: [0, 0, 0.12], radius: 0.03 }]);
   return (
     <>
       {capsules.map((_, k) => (
         <div class="field" key={k}>
           <span>Capsule {k + 1}, z from</span>
-          <NumberCell label={`Capsule ${k + 1} start`} pointer={join("tool", "capsules", k, "start", 2)} value={at(request.value, join("tool", "capsules", k, "start", 2))} unit="mm" />
+          <NumberCell
+            label={`Capsule ${k + 1} start`}
+            pointer={join("tool", "capsules", k, "start", 2)}
+            value={at(request.value, join("tool", "capsules", k, "start", 2))}
+            unit="mm"
+          />
           <span>to</span>
-          <NumberCell label={`Capsule ${k + 1} end`} pointer={join("tool", "capsules", k, "end", 2)} value={at(request.value, join("tool", "capsules", k, "end", 2))} unit="mm" />
+          <NumberCell
+            label={`Capsule ${k + 1} end`}
+            pointer={join("tool", "capsules", k, "end", 2)}
+            value={at(request.value, join("tool", "capsules", k, "end", 2))}
+            unit="mm"
+          />
           <span>radius</span>
-          <NumberCell label={`Capsule ${k + 1} radius`} pointer={join("tool", "capsules", k, "radius")} value={at(request.value, join("tool", "capsules", k, "radius"))} unit="mm" withUnit />
-          <Button kind="quiet" small icon="trash" label={`Remove capsule ${k + 1}`} onClick={() => set(capsules.filter((__, other) => other !== k))} />
+          <NumberCell
+            label={`Capsule ${k + 1} radius`}
+            pointer={join("tool", "capsules", k, "radius")}
+            value={at(request.value, join("tool", "capsules", k, "radius"))}
+            unit="mm"
+            withUnit
+          />
+          <Button
+            kind="quiet"
+            small
+            icon="trash"
+            label={`Remove capsule ${k + 1}`}
+            onClick={() => set(capsules.filter((__, other) => other !== k))}
+          />
         </div>
       ))}
       <Button kind="link" icon="plus" onClick={add}>
@@ -111,10 +174,14 @@ function PayloadFields({ payload }: { payload: Payload }) {
   const choose = (name: string) => {
     const next = SHAPES[name];
     // about the centre of mass
-    const placed = next ? { ...next, pose: { position: payload.com ?? [0, 0, 0], rotvec: [0, 0, 0] } } : null;
+    const placed = next
+      ? { ...next, pose: { position: payload.com ?? [0, 0, 0], rotvec: [0, 0, 0] } }
+      : null;
     edit(put(request.value, "/payload", { ...payload, shape: placed }), untyped("/payload/shape"));
   };
-  const cell = (name: string, pointer: string) => <NumberCell label={name} pointer={pointer} value={at(request.value, pointer) ?? 0} unit="mm" />;
+  const cell = (name: string, pointer: string) => (
+    <NumberCell label={name} pointer={pointer} value={at(request.value, pointer) ?? 0} unit="mm" />
+  );
   return (
     <details class="fold">
       <summary>
@@ -126,18 +193,31 @@ function PayloadFields({ payload }: { payload: Payload }) {
       </div>
       <div class="field">
         <span>Shape</span>
-        <select aria-label="Shape of the payload" value={shape ? (String(shape.shape) in SHAPES ? String(shape.shape) : "other") : "none"} onChange={(event) => choose(event.currentTarget.value)}>
-          {Object.keys(SHAPES).map((name) => <option key={name}>{name}</option>)}
-          {shape && !(String(shape.shape) in SHAPES) && <option value="other">{String(shape.shape)}, see JSON</option>}
+        <select
+          aria-label="Shape of the payload"
+          value={shape ? (String(shape.shape) in SHAPES ? String(shape.shape) : "other") : "none"}
+          onChange={(event) => choose(event.currentTarget.value)}
+        >
+          {Object.keys(SHAPES).map((name) => (
+            <option key={name}>{name}</option>
+          ))}
+          {shape && !(String(shape.shape) in SHAPES) && (
+            <option value="other">{String(shape.shape)}, see JSON</option>
+          )}
         </select>
-        {shape?.shape === "box" && ["X", "Y", "Z"].map((axis, k) => cell(`Payload size ${axis}`, `/payload/shape/size/${k}`))}
+        {shape?.shape === "box" &&
+          ["X", "Y", "Z"].map((axis, k) =>
+            cell(`Payload size ${axis}`, `/payload/shape/size/${k}`),
+          )}
         {shape && "radius" in shape && cell("Payload radius", "/payload/shape/radius")}
         {shape && "length" in shape && cell("Payload length", "/payload/shape/length")}
       </div>
       {shape && (
         <div class="field">
           <span>Its middle at, mm</span>
-          {["X", "Y", "Z"].map((axis, k) => cell(`Payload middle ${axis}`, `/payload/shape/pose/position/${k}`))}
+          {["X", "Y", "Z"].map((axis, k) =>
+            cell(`Payload middle ${axis}`, `/payload/shape/pose/position/${k}`),
+          )}
         </div>
       )}
     </details>

@@ -9,10 +9,16 @@ import { figure } from "../store/units";
 
 const tools = signal<ToolSummary[] | null>(null);
 
-/** Common grippers by name; each brings its shape, TCP and mass, with the letters of its figures. */
+/**
+ * Common grippers by name; each brings its shape, TCP and mass, with the letters of its figures.
+ */
 export function ToolPicker() {
   useEffect(() => {
-    if (!tools.value) toolList().then((found) => (tools.value = found), (error) => tell(error));
+    if (!tools.value)
+      toolList().then(
+        (found) => (tools.value = found),
+        (error) => tell(error),
+      );
   }, []);
   const name = toolName(request.value);
   const choose = (next: string) => {
@@ -23,10 +29,20 @@ export function ToolPicker() {
     <>
       <label class="field">
         <span>Gripper</span>
-        <select id="tool" value={name ?? ""} onChange={(event) => choose(event.currentTarget.value)}>
+        <select
+          id="tool"
+          value={name ?? ""}
+          onChange={(event) => choose(event.currentTarget.value)}
+        >
           <option value="">none of these: own TCP and shape</option>
-          {tools.value?.map((each) => <option key={each.name} value={each.name}>{each.title}</option>)}
-          {name !== null && !tools.value?.some((each) => each.name === name) && <option value={name}>{name}</option>}
+          {tools.value?.map((each) => (
+            <option key={each.name} value={each.name}>
+              {each.title}
+            </option>
+          ))}
+          {name !== null && !tools.value?.some((each) => each.name === name) && (
+            <option value={name}>{name}</option>
+          )}
         </select>
       </label>
       {toolNow.value && <Figures />}
@@ -36,10 +52,16 @@ export function ToolPicker() {
 
 function Figures() {
   const { mass, tcp, capsules, trust } = toolNow.value!;
-  const letter = (figure_: Parameter) => <abbr title={`${trust[figure_.trust] ?? ""}: ${figure_.source}. ${figure_.note}`}>{figure_.trust}</abbr>;
+  const letter = (figure_: Parameter) => (
+    <abbr title={`${trust[figure_.trust] ?? ""}: ${figure_.source}. ${figure_.note}`}>
+      {figure_.trust}
+    </abbr>
+  );
   return (
     <p class="hint" id="tool-figures">
-      {figure(mass.value as number)} kg {letter(mass)}, TCP {letter(tcp)}, shape of {(capsules.value as unknown[]).length} capsules {letter(capsules)}. The payload is the part alone.
+      {figure(mass.value as number)} kg {letter(mass)}, TCP {letter(tcp)}, shape of{" "}
+      {(capsules.value as unknown[]).length} capsules {letter(capsules)}. The payload is the part
+      alone.
     </p>
   );
 }

@@ -65,7 +65,10 @@ export function answer({ row, table }: Question, reading: Reading): void {
     return;
   }
   const target = targetOfReading(reading);
-  edit(row ? withTarget(request.value, row, target) : withStop(request.value, target), untyped(row?.pointer ?? "/none"));
+  edit(
+    row ? withTarget(request.value, row, target) : withStop(request.value, target),
+    untyped(row?.pointer ?? "/none"),
+  );
   toast.value = `Read as ${reading.echo}.`;
 }
 
@@ -75,12 +78,16 @@ function withRows(asked: ApiRequest, table: TableRow[], reading: Reading): [ApiR
   let count = 0;
   for (const { name, text } of table) {
     const parsed = parsePose(text, joints(), reading.kind);
-    const own = "readings" in parsed ? (parsed.readings.find(({ echo }) => echo === reading.echo) ?? parsed.readings[0]) : null;
+    const own =
+      "readings" in parsed
+        ? (parsed.readings.find(({ echo }) => echo === reading.echo) ?? parsed.readings[0])
+        : null;
     if (!own) continue;
     next = withStop(next, targetOfReading(own), name ?? "stop 1");
     count += 1;
   }
   // stops that were empty before have no place in the table
-  const stops = kindOf(next) === "round" ? next.stops?.filter(({ target, path }) => target || path) : undefined;
+  const stops =
+    kindOf(next) === "round" ? next.stops?.filter(({ target, path }) => target || path) : undefined;
   return [stops ? { ...next, stops } : next, count];
 }

@@ -36,13 +36,21 @@ export function presentTarget(kind: "pose" | "joints"): { q: number[] } | { pose
 }
 
 /** The joint positions that stand for a row: its own, or one of those that reach it. */
-export const jointsOf = (row: Row): number[] | null => configurationOf(row, pictured.value?.start ?? null);
+export const jointsOf = (row: Row): number[] | null =>
+  configurationOf(row, pictured.value?.start ?? null);
 
-/** Puts the pose of the arm in the picture into the target that is chosen; without one, into a new stop. */
+/**
+ * Puts the pose of the arm in the picture into the target that is chosen; without one, into a new
+ * stop.
+ */
 export function takePose(): void {
   const present = presentTarget("pose");
   if (!present) return;
   const row = rowsOf(request.value).find(({ pointer }) => pointer === selected.value);
   if (!row) edit(withStop(request.value, present));
-  else edit(put(request.value, row.pointer, row.bare && "pose" in present ? present.pose : present), {});
+  else
+    edit(
+      put(request.value, row.pointer, row.bare && "pose" in present ? present.pose : present),
+      {},
+    );
 }

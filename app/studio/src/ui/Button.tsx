@@ -16,10 +16,30 @@ interface Props {
   small?: boolean;
 }
 
-export function Button({ onClick, children, icon, kind, label, title, id, disabled, pressed, small }: Props) {
+export function Button({
+  onClick,
+  children,
+  icon,
+  kind,
+  label,
+  title,
+  id,
+  disabled,
+  pressed,
+  small,
+}: Props) {
   const names = ["button", kind, small && "small", !children && "bare"].filter(Boolean).join(" ");
   return (
-    <button type="button" id={id} class={names} onClick={() => void onClick()} disabled={disabled} aria-label={label} title={title ?? (children ? undefined : label)} aria-pressed={pressed}>
+    <button
+      type="button"
+      id={id}
+      class={names}
+      onClick={() => void onClick()}
+      disabled={disabled}
+      aria-label={label}
+      title={title ?? (children ? undefined : label)}
+      aria-pressed={pressed}
+    >
       {icon && <Icon name={icon} />}
       {children}
     </button>

@@ -4,7 +4,9 @@ import type { Pointer } from "../store/pointer";
 /** What the service says of a field and of those below it. */
 export function Errors({ under, except }: { under: Pointer; except?: Pointer[] }) {
   const own = (trouble.value?.fields ?? []).filter(
-    ({ pointer }) => (pointer === under || pointer.startsWith(`${under}/`)) && !except?.some((each) => pointer.startsWith(each)),
+    ({ pointer }) =>
+      (pointer === under || pointer.startsWith(`${under}/`)) &&
+      !except?.some((each) => pointer.startsWith(each)),
   );
   return (
     <>

@@ -20,7 +20,8 @@ export function Menu({ label, children, name, icon, id, align = "right", quiet }
     const away = (event: Event) => {
       const { current } = box;
       const inside = current?.contains(event.target as Node);
-      const chosen = inside && (event.target as HTMLElement).closest(".drop button:not([data-stays])");
+      const chosen =
+        inside && (event.target as HTMLElement).closest(".drop button:not([data-stays])");
       if (current?.open && (!inside || chosen)) setTimeout(() => (current.open = false));
     };
     const escape = (event: KeyboardEvent) => {
@@ -31,7 +32,11 @@ export function Menu({ label, children, name, icon, id, align = "right", quiet }
     };
     const filed = (event: Event) => {
       const { current } = box;
-      if (current?.contains(event.target as Node) && (event.target as HTMLInputElement).type === "file") current.open = false;
+      if (
+        current?.contains(event.target as Node) &&
+        (event.target as HTMLInputElement).type === "file"
+      )
+        current.open = false;
     };
     document.addEventListener("click", away);
     document.addEventListener("change", filed);

@@ -46,7 +46,10 @@ export function NumberCell({ label, pointer, value, unit, onValue, onPaste, with
     commit(stepped(input.value, up * (event.shiftKey ? 10 : 1)));
   };
   return (
-    <span class={`number-cell${change ? " changed" : ""}`} title={change ? `was ${change.before}` : undefined}>
+    <span
+      class={`number-cell${change ? " changed" : ""}`}
+      title={change ? `was ${change.before}` : undefined}
+    >
       <input
         type="text"
         inputMode="decimal"
@@ -63,7 +66,11 @@ export function NumberCell({ label, pointer, value, unit, onValue, onPaste, with
         }}
       />
       {withUnit && sign && <small>{sign}</small>}
-      {wrong !== null && <small class="error" role="alert">No number</small>}
+      {wrong !== null && (
+        <small class="error" role="alert">
+          No number
+        </small>
+      )}
     </span>
   );
 }

@@ -12,7 +12,10 @@ export function Segment<T extends string>({ label, options, value, onChange }: P
     if (!step) return;
     event.preventDefault();
     const all = [...(event.currentTarget as HTMLElement).querySelectorAll("button")];
-    const next = all[(all.indexOf(document.activeElement as HTMLButtonElement) + step + all.length) % all.length];
+    const next =
+      all[
+        (all.indexOf(document.activeElement as HTMLButtonElement) + step + all.length) % all.length
+      ];
     next?.focus();
     next?.click();
   };

@@ -14,14 +14,25 @@ export function Tabs<T extends string>({ label, options, value, onChange, contro
     event.preventDefault();
     event.stopPropagation();
     const all = [...(event.currentTarget as HTMLElement).querySelectorAll("button")];
-    const next = all[(all.indexOf(document.activeElement as HTMLButtonElement) + step + all.length) % all.length];
+    const next =
+      all[
+        (all.indexOf(document.activeElement as HTMLButtonElement) + step + all.length) % all.length
+      ];
     next?.focus();
     next?.click();
   };
   return (
     <div class="tabs" role="tablist" aria-label={label} onKeyDown={onKeyDown}>
       {options.map((option) => (
-        <button type="button" role="tab" key={option.value} aria-selected={option.value === value} aria-controls={controls} tabIndex={option.value === value ? 0 : -1} onClick={() => onChange(option.value)}>
+        <button
+          type="button"
+          role="tab"
+          key={option.value}
+          aria-selected={option.value === value}
+          aria-controls={controls}
+          tabIndex={option.value === value ? 0 : -1}
+          onClick={() => onChange(option.value)}
+        >
           {option.text}
         </button>
       ))}

@@ -1,0 +1,301 @@
+"""The functions of the library over HTTP."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
+
+import orjson
+
+from joulepath.app.exceptions.base import InternalError, ServiceError
+from joulepath.app.exceptions.error_types import types_of_error
+from joulepath.optimizer.exceptions import DeclaredError, JoulepathError
+from joulepath.optimizer.presentation.extras import required
+
+Json = dict[str, Any]
+ENDED = ("done", "cancelled")
+"""States of a job whose requests have all ended."""
+
+
+@dataclass(eq=False)
+class ServiceUnreachable(ServiceError, JoulepathError):
+    """No service answers at this address, or the connection broke."""
+
+    url: str
+    """Address of the service."""
+    reason: str
+    """What happened instead."""
+
+    def __str__(self) -> str:
+        return (
+            f"No service answers at {self.url}: {self.reason}. Check the address; "
+            "`joulepath serve` starts a service."
+        )
+
+
+class Client:
+    """A connection to the service.
+
+    Requests are dictionaries, or keyword arguments, with the fields of the HTTP contract; answers
+    are the dictionaries of its JSON. Errors are the library's own, such as `UnreachablePose`, or
+    those of the service, such as `InvalidRequest`; each is a `JoulepathError`. Their data are plain
+    values.
+
+        client = joulepath.Client("http://127.0.0.1:8000")
+        answer = client.optimize(robot="ur10e", start={"q": […]}, goal={"pose": {…}})
+
+    A client is a context manager, and may be shared by threads.
+    """
+
+    def __init__(self, url: str, key: str | None = None, *, http: Any = None) -> None:
+        """Make a client; no request is sent.
+
+        Args:
+            url: address of the service.
+            key: API key, if the service asks for one.
+            http: client of httpx to send requests with, for its proxies or certificates; its own
+                base address and timeouts are kept.
+
+        Raises:
+            ModuleNotFoundError: httpx is not installed.
+        """
+        self._url = url.rstrip("/")
+        self._headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+        self._httpx = required("httpx2", "Client", "joulepath[client]")
+        # the deadline of a request bounds the time of its answer
+        timeout = self._httpx.Timeout(10.0, read=None)
+        self._http = http or self._httpx.Client(timeout=timeout)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._http.close()
+
+    def optimize(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Find the motion of least energy: `POST /optimize`."""
+        return self._post("/optimize", request, fields)
+
+    def compare(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Solve one request by several methods: `POST /compare`."""
+        return self._post("/compare", request, fields)
+
+    def pareto(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Find the front of energy over duration: `POST /pareto`."""
+        return self._post("/pareto", request, fields)
+
+    def plan_cycle(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Find the cycle of least energy: `POST /cycle`."""
+        return self._post("/cycle", request, fields)
+
+    def evaluate(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Compute the energy of a given motion: `POST /evaluate`."""
+        return self._post("/evaluate", request, fields)
+
+    def what_if(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Compare a motion on changed arms: `POST /whatif`."""
+        return self._post("/whatif", request, fields)
+
+    def inverse_kinematics(
+        self, request: Mapping[str, Any] | None = None, /, **fields: Any
+    ) -> Json:
+        """Find all configurations of a pose: `POST /ik`."""
+        return self._post("/ik", request, fields)
+
+    def replay(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Play a motion in MuJoCo: `POST /replay`."""
+        return self._post("/replay", request, fields)
+
+    def excitation(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Find a motion that tells an arm's parameters apart: `POST /excitation`."""
+        return self._post("/excitation", request, fields)
+
+    def export(self, format: str, answer: Mapping[str, Any] | str, **options: Any) -> bytes:
+        """Write a motion as a file for a controller: `POST /export/{format}`.
+
+        Args:
+            format: name of the format.
+            answer: an answer, or its id.
+            options: further fields, such as `speed_scale`.
+
+        Returns:
+            The content of the file.
+        """
+        body = {"answer": answer, **options}
+        content: bytes = self._send("POST", f"/export/{format}", json=body).content
+        return content
+
+    def read_log(self, file: str | PathLike[str], **settings: Any) -> Json:
+        """Add a log of an arm: `POST /logs`.
+
+        Args:
+            file: CSV file, or one packed by gzip.
+            settings: settings of the log, such as `robot` and `units`.
+
+        Returns:
+            The log; its `id` stands for it in `identify`.
+        """
+        query = {name: orjson.dumps(value).decode() for name, value in settings.items()}
+        headers = {"Content-Type": "text/csv"}
+        return self._json(
+            "POST", "/logs", params=query, content=Path(file).read_bytes(), headers=headers
+        )
+
+    def identify(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Begin to identify an arm's own figures: `POST /identifications`.
+
+        Returns:
+            The identification as it stands; `get` of its path says when it is done.
+        """
+        return self._post("/identifications", request, fields)
+
+    def send_job(
+        self, requests: Sequence[Mapping[str, Any]], name: str | None = None, **fields: Any
+    ) -> Json:
+        """Let the service compute many requests while nobody waits: `POST /jobs`.
+
+        Args:
+            requests: each has one field, the name of its endpoint, such as `optimize`.
+            name: name of the job.
+            fields: further fields of the job.
+
+        Returns:
+            The job with its `id`.
+        """
+        return self._post("/jobs", None, {"requests": requests, "name": name, **fields})
+
+    def jobs(self) -> Iterator[Json]:
+        """All jobs, newest first: `GET /jobs`."""
+        after: Any = None
+        while True:
+            query = {} if after is None else {"after": after}
+            page = self._json("GET", "/jobs", params=query)
+            yield from page["jobs"]
+            after = page["next"]
+            if after is None:
+                return
+
+    def job(self, id: str) -> Json:
+        """A job and its first requests: `GET /jobs/{id}`."""
+        return self.get(f"/jobs/{id}")
+
+    def wait_for_job(
+        self, id: str, period: float = 1.0, tell: Callable[[Json], object] = lambda job: None
+    ) -> Json:
+        """Wait until all requests of a job have ended.
+
+        Args:
+            id: id of the job.
+            period: time between two looks [s].
+            tell: gets the job at each look.
+
+        Returns:
+            The job.
+        """
+        while True:
+            job = self.job(id)
+            tell(job)
+            if job["state"] in ENDED:
+                return job
+            time.sleep(period)
+
+    def job_results(self, id: str) -> Iterator[Json]:
+        """The requests of a job that have ended, with their answers: `GET /jobs/{id}/results`."""
+        headers = {"Accept": "application/x-ndjson"}
+        for line in self._send("GET", f"/jobs/{id}/results", headers=headers).content.splitlines():
+            yield orjson.loads(line)
+
+    def job_table(self, id: str) -> str:
+        """The figures of the ended requests of a job, as CSV: `GET /jobs/{id}/results`."""
+        text: str = self._send("GET", f"/jobs/{id}/results", headers={"Accept": "text/csv"}).text
+        return text
+
+    def cancel_job(self, id: str) -> Json:
+        """Cancel what waits and stop what runs: `POST /jobs/{id}/cancel`."""
+        return self._json("POST", f"/jobs/{id}/cancel")
+
+    def retry_job(self, id: str) -> Json:
+        """Let failed and cancelled requests wait again: `POST /jobs/{id}/retry`."""
+        return self._json("POST", f"/jobs/{id}/retry")
+
+    def delete_job(self, id: str) -> None:
+        """Delete a job with its answers: `DELETE /jobs/{id}`."""
+        self._send("DELETE", f"/jobs/{id}")
+
+    def get(self, path: str, **query: Any) -> Json:
+        """The JSON at any path of the service, such as that in the field `answer`."""
+        return self._json("GET", path, params=query)
+
+    def _post(self, path: str, request: Mapping[str, Any] | None, fields: Json) -> Json:
+        return self._json("POST", path, json={**(request or {}), **fields})
+
+    def _json(self, method: str, path: str, **options: Any) -> Json:
+        content: Json = orjson.loads(self._send(method, path, **options).content)
+        return content
+
+    def _send(self, method: str, path: str, **options: Any) -> Any:
+        """The response. Raises the error of a problem, and ServiceUnreachable."""
+        headers = {**self._headers, **options.pop("headers", {})}
+        if "json" in options:
+            options["content"] = orjson.dumps(
+                options.pop("json"), option=orjson.OPT_SERIALIZE_NUMPY
+            )
+            headers["Content-Type"] = "application/json"
+        try:
+            answer = self._http.request(method, self._url + path, headers=headers, **options)
+        except self._httpx.TransportError as error:
+            raise ServiceUnreachable(self._url, str(error) or type(error).__name__) from error
+        if answer.is_error:
+            raise _error_of(answer, self._url)
+        return answer
+
+
+def _error_of(answer: Any, url: str) -> DeclaredError:
+    try:
+        document = orjson.loads(answer.content)
+        return error_of(document)
+    except (orjson.JSONDecodeError, KeyError, TypeError, AttributeError):
+        reason = f"it answers {answer.status_code}, but not as joulepath does"
+        return ServiceUnreachable(url, reason)
+
+
+def error_of(document: Json) -> DeclaredError:
+    """The error of a problem document (RFC 9457).
+
+    Args:
+        document: the document. Its fields beyond those of every problem become data of the error,
+            and `instance` the id of the request.
+    """
+    slug = document["type"].rpartition("/")[2]
+    kind = next((each for each in types_of_error() if each.slug() == slug), InternalError)
+    # mypy considers classes of dataclass exceptions unhashable, like their instances
+    error = _told(kind)  # type: ignore[arg-type]
+    told = error.__new__(error)
+    fixed = ("type", "title", "status")
+    vars(told).update({name: value for name, value in document.items() if name not in fixed})
+    vars(told)["document"] = document
+    return told
+
+
+@cache
+def _told(kind: type[DeclaredError]) -> type[DeclaredError]:
+    """A kind of error whose message is the one that the service wrote."""
+
+    def message(self: Any) -> str:
+        return str(vars(self)["detail"])
+
+    def reduce(self: Any) -> tuple[Any, ...]:
+        return error_of, (vars(self)["document"],)
+
+    own = {"__str__": message, "__reduce__": reduce, "__module__": kind.__module__}
+    bases = (kind,) if issubclass(kind, JoulepathError) else (kind, JoulepathError)
+    return type(kind.__name__, bases, own | {"__doc__": kind.__doc__})

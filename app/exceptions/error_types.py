@@ -1,0 +1,35 @@
+"""All types of errors that the service answers with."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from joulepath.app.exceptions import access, base, queue, report, stored, transport
+from joulepath.optimizer import exceptions as library
+from joulepath.optimizer.cycle import errors as sequence
+from joulepath.optimizer.evaluate import errors as given_motions
+from joulepath.optimizer.exceptions import DeclaredError
+from joulepath.optimizer.excitation import errors as excitation
+from joulepath.optimizer.export import errors as exports
+from joulepath.optimizer.identify import errors as identification
+from joulepath.optimizer.identify.logs import log_errors as logs
+from joulepath.optimizer.search import errors as search
+
+_MODULES = (
+    *(base, library, search, sequence, given_motions, exports, logs, identification, excitation),
+    *(stored, queue, access, transport, report),
+)
+"""Modules with declared errors, in the order of the reference."""
+
+
+@cache
+def types_of_error() -> tuple[type[DeclaredError], ...]:
+    """All types of errors in answers of the service."""
+    classes = (
+        each for module in _MODULES for each in vars(module).values() if isinstance(each, type)
+    )
+    declared = (
+        each for each in classes if issubclass(each, DeclaredError) and "title" in vars(each)
+    )
+    # Modules also contain imported classes.
+    return tuple(dict.fromkeys(declared))

@@ -1,0 +1,142 @@
+"""The client of the API, against the service in this process."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import sys
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+import joulepath
+from joulepath.app.client import error_of
+from joulepath.app.exceptions.error_types import types_of_error
+from joulepath.app.http.problems import path_of, problem_of
+from joulepath.optimizer.exceptions import OutsideLimits
+from tests.app.live import LOCAL
+from tests.app.requests import HOME, NEAR, move
+
+
+@pytest.fixture
+def service(client: TestClient) -> joulepath.Client:
+    return joulepath.Client(LOCAL, http=client)
+
+
+def test_it_optimizes_as_the_service_does(service: joulepath.Client) -> None:
+    """A request may be a dictionary, fields, or both, with arrays."""
+    whole = service.optimize(move())
+    parts = service.optimize(move(), goal={"q": np.array(NEAR)})
+    assert whole["energy"]["electrical"]["total"] == parts["energy"]["electrical"]["total"]
+    assert service.get(whole["answer"])["id"] == whole["id"]
+    assert service.export("csv", whole["id"]).startswith(b"t,q1,")
+
+
+def test_it_evaluates_and_inverts(service: joulepath.Client) -> None:
+    found = service.evaluate(configurations=[HOME, NEAR], time_per_segment=1.5)
+    assert found["duration"] == pytest.approx(1.5)
+    pose = {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
+    assert len(service.inverse_kinematics(pose=pose, windings=False)["solutions"]) == 8
+
+
+def test_an_error_is_the_library_s_own(service: joulepath.Client) -> None:
+    with pytest.raises(joulepath.UnreachablePose, match="reach") as caught:
+        service.inverse_kinematics(pose={"position": [3, 0, 0], "quaternion": [0, 1, 0, 0]})
+    assert caught.value.distance is not None and caught.value.distance > 1
+    with pytest.raises(joulepath.UnknownRobot) as unknown:
+        service.optimize(move(robot="r2d2"))
+    assert "ur5e" in unknown.value.known
+    with pytest.raises(joulepath.InvalidRequest) as invalid:
+        service.optimize(move(colour="red"))
+    assert [each["loc"] for each in invalid.value.errors] == [["body", "colour"]]
+    assert isinstance(invalid.value, joulepath.ServiceError)
+
+
+@pytest.mark.parametrize("kind", types_of_error())
+def test_every_problem_becomes_its_error(kind: type[Any]) -> None:
+    document = {"type": path_of(kind), "title": kind.title, "status": kind.status}
+    error = error_of(document | {"detail": "Said by the service.", "instance": "7", "names": ["a"]})
+    assert isinstance(error, kind) and type(error).type_of_error() is kind
+    assert isinstance(error, joulepath.JoulepathError)
+    assert str(error) == "Said by the service."
+    assert vars(error)["names"] == ["a"]
+    again = pickle.loads(pickle.dumps(error))
+    assert isinstance(again, kind) and str(again) == str(error)
+
+
+def test_the_message_is_that_of_the_service() -> None:
+    """Also where the message has data that no document shows."""
+    error = OutsideLimits("goal", "elbow", 7.0, -3.0, 3.0)
+    told = error_of(json.loads(json.dumps(problem_of(error, "7"))))
+    assert str(told) == str(error)
+    assert isinstance(told, OutsideLimits) and told.upper == 3.0
+
+
+def test_a_job_from_begin_to_end(service: joulepath.Client) -> None:
+    requests = [{"evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5}}] * 2
+    sent = service.send_job(requests, name="two")
+    looks = list[Any]()
+    job = service.wait_for_job(sent["id"], period=0.05, tell=looks.append)
+    assert job["state"] == "done" and looks[-1] == job
+    assert any(each["id"] == sent["id"] for each in service.jobs())
+    results = [*service.job_results(sent["id"])]
+    assert [each["index"] for each in results] == [0, 1]
+    assert len(service.job_table(sent["id"]).splitlines()) == 3
+    assert service.retry_job(sent["id"])["state"] == "done"
+    service.delete_job(sent["id"])
+    with pytest.raises(joulepath.ServiceError, match="job") as caught:
+        service.job(sent["id"])
+    assert caught.value.slug() == "unknown-job"
+
+
+def answering(status: int, content: bytes) -> joulepath.Client:
+    transport = httpx2.MockTransport(lambda _: httpx2.Response(status, content=content))
+    return joulepath.Client("http://other", http=httpx2.Client(transport=transport))
+
+
+@pytest.mark.parametrize("content", [b"<html>Bad Gateway</html>", b"[]", b'{"type": null}'])
+def test_another_server_is_no_service(content: bytes) -> None:
+    with pytest.raises(joulepath.ServiceUnreachable, match="http://other: it answers 502"):
+        answering(502, content).optimize(move())
+
+
+def test_nobody_answers() -> None:
+    with (
+        joulepath.Client("http://127.0.0.1:1") as client,
+        pytest.raises(joulepath.ServiceUnreachable, match=r"http://127\.0\.0\.1:1"),
+    ):
+        client.optimize(move())
+
+
+def test_the_key_goes_along() -> None:
+    seen = list[str | None]()
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        seen.append(request.headers.get("authorization"))
+        return httpx2.Response(200, json={"jobs": [], "next": None})
+
+    http = httpx2.Client(transport=httpx2.MockTransport(answer))
+    for key in ("secret", None):
+        assert [*joulepath.Client("http://service/", key, http=http).jobs()] == []
+    assert seen == ["Bearer secret", None]
+
+
+def test_all_pages_of_jobs() -> None:
+    pages = {None: ([{"id": "a"}], "a"), "a": ([{"id": "b"}], None)}
+
+    def page(request: httpx2.Request) -> httpx2.Response:
+        jobs, following = pages[request.url.params.get("after")]
+        return httpx2.Response(200, json={"jobs": jobs, "next": following})
+
+    http = httpx2.Client(transport=httpx2.MockTransport(page))
+    found = joulepath.Client("http://service", http=http).jobs()
+    assert [each["id"] for each in found] == ["a", "b"]
+
+
+def test_without_httpx_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "httpx2", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'joulepath\[client\]'"):
+        joulepath.Client("http://service")

@@ -1,0 +1,61 @@
+"""The code of the pages on the library and the command line, run as it is printed."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from joulepath.app.cli.main import joulepath
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+COMMAND = f'joulepath() {{ "{sys.executable}" -m joulepath.app.cli "$@"; }}\nset -e -o pipefail\n'
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """The blocks of code that are to be run."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def run(arguments: list[str], folder: Path) -> str:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    finished = subprocess.run(
+        arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert finished.returncode == 0, finished.stderr
+    return finished.stdout
+
+
+def test_the_library_page(tmp_path: Path) -> None:
+    found = blocks("library.md", "python")
+    assert len(found) == 2
+    first, second = run([sys.executable, "-c", "\n".join(found)], tmp_path).splitlines()
+    assert re.fullmatch(r"Solution\([\d.]+ J electrical, [\d.]+ s, \w+, gap [\d.]+%\)", first)
+    assert re.fullmatch(r"\d+% friction", second)
+
+
+def test_the_command_line_page(tmp_path: Path) -> None:
+    found = blocks("command_line.md", "")
+    assert len(found) == 4
+    run(["bash", "-c", COMMAND + "\n".join(found)], tmp_path)
+    written = {file.name for file in tmp_path.iterdir()}
+    named = set(re.findall(r"--(?:output|answers) (\S+)", "\n".join(found)))
+    assert written == named
+
+
+def test_the_command_line_page_names_every_command() -> None:
+    text = (DOCS / "command_line.md").read_text(encoding="utf-8")
+    table = text.partition("| --- | --- |\n")[2].partition("\n\n")[0]
+    named = set(re.findall(r"`([a-z-]+)`", table))
+    assert named == set(joulepath.commands)
+
+
+def test_the_exit_codes_of_the_page_are_those_of_the_help() -> None:
+    text = (DOCS / "command_line.md").read_text(encoding="utf-8")
+    assert joulepath.epilog is not None
+    told = set(re.findall(r"^\s+(\d+)  \S", joulepath.epilog, re.MULTILINE))
+    assert set(re.findall(r"^\| (\d+) \|", text, re.MULTILINE)) == told
