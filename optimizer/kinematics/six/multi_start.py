@@ -39,6 +39,10 @@ class MultiStartSettings:
     """Largest number of rounds."""
     idle_rounds: int = 3
     """Number of consecutive rounds without a new solution that ends the search."""
+    empty_rounds: int = 12
+    """The same number as long as there is no solution at all; after three rounds, one pose in 800
+    was missed altogether.
+    """
     steps: int = 45
     """Newton steps per start."""
     hopeless: float = 0.5
@@ -119,7 +123,8 @@ class MultiStart:
             checkpoint()
             fresh = self._joined(found, starts, T)
             idle = idle + 1 if len(fresh) == len(found) else 0
-            if idle == MULTI_START.idle_rounds or len(fresh) >= MULTI_START.most_branches:
+            most_idle = MULTI_START.idle_rounds if len(fresh) else MULTI_START.empty_rounds
+            if idle >= most_idle or len(fresh) >= MULTI_START.most_branches:
                 found = fresh
                 break
             starts = np.vstack(
@@ -140,6 +145,10 @@ class MultiStart:
     def _joined(self, found: Array, starts: Array, T: Array) -> Array:
         """The known solutions (n, 6) [rad], and the distinct new ones found from starts (m, 6)."""
         q, residual = solved(self._chain, starts, T, MULTI_START.steps, MULTI_START.hopeless)
+        # At a fold of two branches Newton's method is slow.
+        slow = np.flatnonzero((residual >= MULTI_START.solved) & (residual < REACH.near))
+        if len(slow):
+            q[slow], residual[slow] = solved(self._chain, q[slow], T)
         singular = self._smallest(q) < REACH.singular
         done = (residual < MULTI_START.solved) | ((residual < REACH.beyond) & singular)
         q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
