@@ -233,19 +233,17 @@ class FreeSpline(SplineMethod):
         return with_effort(tried[-1], tried)
 
     def solve_from_fastest(self, duration: float) -> SolveResult:
-        """Solve from the time-optimal motion, slowed down to a duration [s]; 0 for the motion
-        itself.
-
-        At the knots of a slowed motion the slope of jerk may jump, but not jerk itself: its jerk
-        need not switch there.
-        """
+        """Solve from the time-optimal motion, slowed down to a duration [s] if this is longer."""
         return self.improve(self.time_optimal_guess(duration))
 
     def time_optimal_guess(self, duration: float = 0.0) -> Guess:
         """The time-optimal motion under limits on rates, with knots at its jumps of jerk.
 
+        At the knots of a slowed motion the slope of jerk may jump, but not jerk itself, which need
+        not switch there.
+
         Args:
-            duration: duration to which the motion is slowed down [s].
+            duration: duration to which the motion is slowed down, if it is faster [s].
         """
         line, settings = self.coordinates, SPLINE_SPACES
         fastest = time_optimal(line.limits, line.start, line.goal)
