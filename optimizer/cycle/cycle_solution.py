@@ -20,13 +20,13 @@ from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.result.cycle import (
     CycleCertificate,
     CycleClearance,
+    CycleEnergy,
     CycleSearchReport,
     LegReport,
 )
 from joulepath.optimizer.result.energy import (
     ElectricalEnergy,
     Energy,
-    EnergyAndBound,
     JointEnergy,
     MechanicalEnergy,
     Objective,
@@ -50,15 +50,6 @@ class CycleEnergies:
     def of(self, objective: Objective) -> float:
         """The energy that an objective minimises [J]."""
         return self.electrical.energy if objective == "electrical" else self.mechanical
-
-
-@dataclass(frozen=True, kw_only=True)
-class CycleEnergy(EnergyAndBound):
-    """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
-
-    lower_bound: Joules
-    """Lower bound of the objective: no cycle with these stops and passes, of any configurations,
-    shapes and durations, needs less."""
 
 
 CycleBaselineName = Literal[

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from joulepath.optimizer.declared import Count, Joules, Keys, Radians, Ratio, Seconds, Unit
 from joulepath.optimizer.result.certificate import Clearance, WorstRatio
+from joulepath.optimizer.result.energy import EnergyAndBound
 from joulepath.optimizer.result.solution import Configuration
 
 
@@ -100,3 +101,12 @@ class CycleSearchReport:
     """Of these, those for which a motion was sought."""
     wall_time: Seconds
     """Wall time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleEnergy(EnergyAndBound):
+    """Energy of the cycle: the moves, and dwells and waiting in `electrical.dwell`."""
+
+    lower_bound: Joules
+    """Lower bound of the objective: no cycle with these stops and passes, of any configurations,
+    shapes and durations, needs less."""
