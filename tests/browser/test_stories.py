@@ -132,6 +132,13 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
         assert float(page.locator("#joules").inner_text().split()[0]) == pytest.approx(
             total, rel=0.01
         )
+        home = sum(
+            leg["electrical"]
+            for leg in legs
+            if leg["kind"] == "move" and "start" in (leg["start"]["stop"], leg["goal"]["stop"])
+        )
+        expect(page.locator("#notes")).to_contain_text(f"start and back take {home:.3g} of")
+        expect(page.get_by_role("button", name="Leave out")).to_be_visible()
         page.locator("#export").click()
         page.locator("[data-format=movej]").click()
         page.get_by_label("Gripper output").select_option("0")

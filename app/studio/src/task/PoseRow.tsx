@@ -92,8 +92,8 @@ function ReachText({ row, target }: { row: Row; target: Target }) {
   const free = reach.solutions.filter(({ collides }) => !collides).length;
   if (free)
     return (
-      <small class="hint">
-        {free} of {reach.solutions.length} postures free
+      <small class="hint" title="Postures that reach it without a collision">
+        {free} of {reach.solutions.length} {row.role === "stop" ? "" : "postures "}free
       </small>
     );
   return <small class="warning-text">every posture collides</small>;
