@@ -23,7 +23,7 @@ from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.tightened_limits import WITHIN_TIGHTER
-from joulepath.optimizer.solve.methods import sqp_method
+from joulepath.optimizer.solve.methods import sqp_stages
 from tests.selection import long_but
 
 Json = dict[str, Any]
@@ -137,14 +137,14 @@ def test_short_peaks_of_the_tools_speed_are_no_refusal() -> None:
 def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_limits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(sqp_method, "path_excess", lambda *_: np.zeros(2))
+    monkeypatch.setattr(sqp_stages, "path_excess", lambda *_: np.zeros(2))
     found = solved(SLOW_TOOL)
     assert [each.reason for each in found.candidates] == [WITHIN_TIGHTER]
     assert found.certificate.valid and found.certificate.worst_ratio["tcp_speed"] <= 1
 
 
 def test_what_is_rejected_twice_is_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sqp_method, "path_excess", lambda *_: np.zeros(2))
+    monkeypatch.setattr(sqp_stages, "path_excess", lambda *_: np.zeros(2))
     monkeypatch.setattr("joulepath.optimizer.search.tightened_limits.LIMIT_RESERVE", -0.02)
     try:
         answer = solved(SLOW_TOOL)
