@@ -179,26 +179,30 @@ def test_figures_older_than_the_cell_are_marked(page: Page) -> None:
     expect(page.locator("#stale")).to_have_count(0)
 
 
-def test_projects_are_named_saved_and_opened(page: Page, tmp_path: Path) -> None:
+def test_projects_are_named_saved_and_opened(
+    browser: Browser, service: Server, tmp_path: Path
+) -> None:
     """In the browser, and as files."""
-    page.get_by_label("Name of the project").fill("Night cell")
-    page.get_by_label("Name of the project").blur()
-    type_into(page, "/payload/mass", "1,25")
-    with page.expect_download() as download:
-        page.keyboard.press("Control+s")
-    file = tmp_path / "night.joulepath.json"
-    download.value.save_as(file)
-    assert json.loads(file.read_text())["typed"]["/payload/mass"] == "1,25"
-    new_cell(page)
-    assert state(page, "project.name") == "New cell"
-    page.locator("#project > summary").click()
-    page.locator("#open-file").set_input_files(file)
-    expect(page.locator("[data-pointer='/payload/mass']")).to_have_value("1,25")
-    page.locator("#project > summary").click()
-    page.get_by_role("button", name="Open a project").click()
-    page.get_by_label("Search projects").fill("New")
-    page.get_by_role("dialog").get_by_role("button", name="New cell").first.click()
-    assert state(page, "project.name") == "New cell"
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        page.get_by_label("Name of the project").fill("Night cell")
+        page.get_by_label("Name of the project").blur()
+        type_into(page, "/payload/mass", "1,25")
+        with page.expect_download() as download:
+            page.keyboard.press("Control+s")
+        file = tmp_path / "night.joulepath.json"
+        download.value.save_as(file)
+        assert json.loads(file.read_text())["typed"]["/payload/mass"] == "1,25"
+        new_cell(page)
+        assert state(page, "project.name") == "New cell"
+        page.locator("#project > summary").click()
+        page.locator("#open-file").set_input_files(file)
+        expect(page.locator("[data-pointer='/payload/mass']")).to_have_value("1,25")
+        page.locator("#project > summary").click()
+        page.get_by_role("button", name="Open a project").click()
+        page.get_by_label("Search projects").fill("New")
+        page.get_by_role("dialog").get_by_role("button", name="New cell").first.click()
+        assert state(page, "project.name") == "New cell"
 
 
 @pytest.mark.parametrize(

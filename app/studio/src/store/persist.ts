@@ -88,11 +88,11 @@ export const keepJob = (notes: JobNotes) =>
 export const jobNotes = (id: string) =>
   within<JobNotes | undefined>("jobs", "readonly", (store) => store.get(id)).catch(() => undefined);
 
-/** Writes the present project now. */
-export async function saveNow(): Promise<void> {
-  if (!project.value.id) return;
+const write = (record: Saved) => within("projects", "readwrite", (store) => store.put(record));
+
+function recordNow(): Saved {
   const shown = answered.value;
-  const record: Saved = {
+  return {
     ...project.value,
     savedAt: Date.now(),
     request: request.value,
@@ -101,8 +101,13 @@ export async function saveNow(): Promise<void> {
     answer: shown?.asked ? shown.solution.id : null,
     asked: shown?.asked ?? null,
   };
+}
+
+/** Writes the present project now. */
+export async function saveNow(): Promise<void> {
+  if (!project.value.id) return;
   try {
-    await within("projects", "readwrite", (store) => store.put(record));
+    await write(recordNow());
     saved.value = "saved";
   } catch {
     saved.value = "failed"; // a private window, or no room
@@ -112,12 +117,16 @@ export async function saveNow(): Promise<void> {
 /** Saves after each change, from now on. */
 export function followChanges(): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
+  let waiting: Saved | null = null;
   effect(() => {
     void [project.value, request.value, typed.value, economics.value, answered.value];
     untracked(() => {
       if (!project.value.id) return;
       saved.value = "saving";
       clearTimeout(timer);
+      // what was changed just before another cell was opened is not lost
+      if (waiting && waiting.id !== project.value.id) void write(waiting).catch(() => undefined);
+      waiting = recordNow();
       timer = setTimeout(() => void saveNow(), PAUSE);
     });
   });
