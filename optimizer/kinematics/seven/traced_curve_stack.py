@@ -55,8 +55,6 @@ class TracedCurveStack:
     @classmethod
     def of(cls, paths: Sequence[TracedPath]) -> TracedCurveStack:
         """Stack of the curves along paths."""
-        if not paths:
-            return cls(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0, dtype=np.intp), np.zeros(0))
         counts = [len(path.q) for path in paths]
         half = [
             np.pi if path.closed else SETTINGS.open_half if count > 1 else 0.0
@@ -65,20 +63,6 @@ class TracedCurveStack:
         nodes = np.concatenate([path.q for path in paths])
         tangents = np.concatenate([path.tangents for path in paths])
         return cls(nodes, tangents, np.cumsum([0, *counts[:-1]]), np.array(half))
-
-    def joined(self, paths: Sequence[TracedPath]) -> TracedCurveStack:
-        """This stack, extended by the curves along paths."""
-        if not paths:
-            return self
-        others = TracedCurveStack.of(paths)
-        if not len(self.first):
-            return others
-        return TracedCurveStack(
-            np.concatenate([self.nodes, others.nodes]),
-            np.concatenate([self.tangents, others.tangents]),
-            np.concatenate([self.first, others.first + len(self.nodes)]),
-            np.concatenate([self.half, others.half]),
-        )
 
     @cached_property
     def last(self) -> Rows:
@@ -146,20 +130,6 @@ class TracedCurveStack:
             length * self.tangents[k],
             length * self.tangents[after],
         )
-
-    def at_each(self, k: Rows, weights: Array, joints: Rows) -> Array:
-        """Angles (n, m, j) [rad] of joints (j,) at m shares of each segment.
-
-        Args:
-            k: points that begin the segments, shape (n,).
-            weights: `hermite_weights` of the shares, shape (4, m).
-            joints: indices of the joints, shape (j,).
-        """
-        after, length = self._after(k), self.segment_lengths[k][:, None]
-        ends = np.empty((len(k), 4, self.nodes.shape[1]))
-        ends[:, 0], ends[:, 1] = self.nodes[k], self.nodes[after]
-        ends[:, 2], ends[:, 3] = length * self.tangents[k], length * self.tangents[after]
-        return np.asarray(weights.T @ ends[:, :, joints])
 
     def along(self, k: Rows, share: Array) -> Array:
         """Approximate directions (n, nq) of the curves there, across which members are sought."""
