@@ -24,7 +24,7 @@ class Target(click.ParamType[dict[str, Any], Any]):
     name = "TARGET"
 
     def convert(
-        self, value: Any, param: click.IdentifiedParameter | None, ctx: click.Context | None
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> dict[str, Any]:
         """The target as the HTTP contract has it."""
         if isinstance(value, dict):

@@ -28,7 +28,7 @@ class _Sourced(click.ParamType[dict[str, Any], Any]):
     name = "NUMBER[:SOURCE]"
 
     def convert(
-        self, value: Any, param: click.IdentifiedParameter | None, ctx: click.Context | None
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> dict[str, Any]:
         number, _, source = str(value).partition(":")
         try:
