@@ -1,5 +1,5 @@
-"""Writes docs/reference.md: every request, answer and problem, from the OpenAPI document of the
-service.
+"""Writes docs/reference/fields.md: every request, answer and problem, from the OpenAPI document
+of the service.
 
 python -m scripts.reference
 """
@@ -14,7 +14,7 @@ from typing import Any
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
 
-PAGE = Path(__file__).parents[1] / "docs" / "reference.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "fields.md"
 HEAD = """# Reference
 
 Every endpoint with its request, answer and problems, and the fields of each of them. SI units; arrays over time are

@@ -12,7 +12,7 @@ from joulepath.models.own_arm.description import Collision, Description, Drives,
 from tests.mesh_folders import meshes as arm_folder
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "docs" / "own_robot.md").read_text()
+PAGE = (ROOT / "docs" / "reference" / "own_robot.md").read_text()
 
 
 def block(kind: str) -> str:

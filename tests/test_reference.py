@@ -22,6 +22,6 @@ def test_every_link_to_the_page_has_a_target() -> None:
     titles = re.findall(r"^#+ (.+)$", PAGE.read_text(encoding="utf-8"), re.M)
     anchors = {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
     inside = set(re.findall(r"\]\(#([^)]+)\)", PAGE.read_text(encoding="utf-8")))
-    pages = (page.read_text(encoding="utf-8") for page in DOCS.glob("*.md"))
-    linked = inside.union(*(re.findall(r"\]\(reference\.md#([^)]+)\)", page) for page in pages))
+    pages = (page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md"))
+    linked = inside.union(*(re.findall(r"\]\(fields\.md#([^)]+)\)", page) for page in pages))
     assert inside and linked <= anchors

@@ -115,7 +115,7 @@ def test_answers(server: Server) -> None:
 
 
 def test_the_page_for_newcomers_shows_what_its_script_prints(server: Server) -> None:
-    page = (ROOT / "docs" / "first_saving.md").read_text()
+    page = (ROOT / "docs" / "start" / "first_saving.md").read_text()
     (request,) = re.findall(r"```\n(\{.*?\})\n```", page, re.DOTALL)
     assert json.loads(request) == json.loads(
         (ROOT / "examples" / "optimize" / "pick_to_place.json").read_text()
