@@ -98,14 +98,14 @@ SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
         TOTAL,
     ),
     (
-        "docs/reference/cycle.md",
+        "docs/explained/cycles.md",
         r"along lines: the cycle needs ([\d.]+) J",
         "cycle/round_parts",
         {},
         TOTAL,
     ),
     (
-        "docs/reference/cycle.md",
+        "docs/explained/cycles.md",
         r"a seam of 0.4 m: the cycle needs ([\d.]+) J",
         "cycle/seam_any_turn",
         {},
