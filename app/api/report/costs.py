@@ -31,6 +31,12 @@ class Money:
     carbon: float | None
     box: float | None
 
+    def in_words(self, joules: float) -> str:
+        """An energy as kilowatt-hours, and as money where its price is given."""
+        kwh = joules / JOULES_PER_KWH
+        money = "" if self.price is None else f" ({digits(kwh * self.price, 2)} {self.currency})"
+        return f"{digits(kwh)} kWh{money}"
+
     @classmethod
     def of(cls, bundle: Bundle) -> Money:
         """The numbers of a report."""
@@ -61,7 +67,7 @@ def cycle_time(bundle: Bundle) -> float:
 
 def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
     """The leading figures: one cycle, a shift, a year, money."""
-    word = "cycle" if bundle.kind == "cycle" else "motion"
+    word = bundle.what
     known = bundle.answer["energy"]["electrical"].get("interval")
     likely = "" if known is None else f", likely {down(known['p5'])} to {up(known['p95'])}"
     total = bundle.answer["energy"]["electrical"]["total"]
@@ -70,7 +76,7 @@ def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
         Fact(
             digits(_kwh(money, money.cycles), 2),
             "kWh",
-            f"a shift of {'8 h, ' if money.filled else ''}{digits(money.cycles, 4)} {word}s",
+            f"a shift of {'8 h, ' if money.filled else ''}{round(money.cycles):,} {word}s",
         ),
     ]
     if money.shifts is None:
@@ -98,7 +104,7 @@ def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
 
 def cost_table(bundle: Bundle, money: Money) -> tuple[Cost, ...]:
     """A row for a cycle, a shift, and a year if its shifts are given."""
-    word = "cycle" if bundle.kind == "cycle" else "motion"
+    word = bundle.what
     rows = [(f"1,000 {word}s", 1000.0), ("a shift", money.cycles)]
     if money.shifts is not None:
         rows.append(("a year", money.cycles * money.shifts))

@@ -116,7 +116,7 @@ def test_a_pdf_has_the_same_documents(client: TestClient) -> None:
     file = reported(client, optimize=move(), costs=COSTS, format="pdf")
     assert file.startswith(b"%PDF") and len(re.findall(rb"/Type ?/Page\b", file)) == 1
     bundle = attached_to(file)
-    assert bundle.costs["price"] == {"value": 0.25, "source": "contract"}
+    assert bundle.costs["price"] == {"value": 0.25, "source": "contract", "letter": "Y"}
     assert checked(file, again=False, request_id="test").agrees
 
 
