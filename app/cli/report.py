@@ -67,6 +67,8 @@ Examples:
     help="With a log: JSON file with the query parameters of POST /logs: units, payload, columns, "
     "...",
 )
+@click.option("--period", type=float, help="Time from one start to the next [s]: the wait counts.")
+@click.option("--no-advice", is_flag=True, help="Do not compute changes that would need less.")
 @click.option("--cycles-per-shift", type=_Sourced(), help="Default: back to back for 8 hours.")
 @click.option("--shifts-per-year", type=_Sourced(), help="Default: no figures per year.")
 @click.option("--price", type=_Sourced(), help="Of a kilowatt-hour. Default: no money.")
@@ -80,6 +82,8 @@ def report(
     title: str | None,
     robot: str | None,
     settings: Path | None,
+    period: float | None,
+    no_advice: bool,
     **costs: Any,
 ) -> None:
     """Writes one page on a motion or a cycle: energy, savings, costs, and what they rest on.
@@ -105,6 +109,8 @@ def report(
         "format": format,
         "answer": answer,
         "title": title,
+        "period": period,
+        "advice": not no_advice,
         "costs": {name: value for name, value in costs.items() if value is not None},
     }
     # the request stays as it is written, so that its problems name its own places

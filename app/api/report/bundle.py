@@ -47,6 +47,10 @@ class Bundle:
     version: str
     """Version of the service."""
     log: dict[str, Any] | None = None
+    period: float | None = None
+    """Time from one start of a motion or a cycle to the next [s]; None: its own."""
+    advised: dict[str, Any] | None = None
+    """Of a motion or a cycle, the energy of its wait and changes: see `AdviceAnswer`."""
 
     def packed(self) -> bytes:
         """The document."""

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import orjson
 
+from joulepath.app.api.advice.answered import answered
+from joulepath.app.api.advice.request import AnsweredRequest
+from joulepath.app.api.advice.task import advised
 from joulepath.app.api.report.build import report_of
 from joulepath.app.api.report.bundle import Bundle, attached_to
-from joulepath.app.api.report.job_rows import answered, summed
+from joulepath.app.api.report.job_rows import answered as answered_rows
+from joulepath.app.api.report.job_rows import summed
 from joulepath.app.api.report.page import page
 from joulepath.app.api.report.programs import program_of, program_of_motion
-from joulepath.app.api.report.request import ReportRequest
-from joulepath.app.api.report.task import answer_of
+from joulepath.app.api.report.request import JOB_DEADLINE
+from joulepath.app.api.report.task import evaluation_of
 from joulepath.app.convert.recorded import GivenLog, log_given
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.export.certified import certified
 from joulepath.optimizer.export.program import Move
@@ -86,7 +93,7 @@ def _motions(bundle: Bundle) -> list[Line]:
     """The certificates and the energies of all moves, from their splines alone."""
     moves = list[tuple[str, Move, Json]]()
     if bundle.kind == "job":
-        for row in answered(bundle.moves):
+        for row in answered_rows(bundle.moves):
             if "trajectory" in row["answer"]:
                 program = program_of_motion(row["request"], row["answer"])
                 certified(program)
@@ -132,25 +139,26 @@ def _electrical(part: Json) -> float:
 def _again(bundle: Bundle, request_id: str) -> Iterator[Line]:
     """The requests, answered anew."""
     if bundle.kind == "job":
-        for row in answered(bundle.moves):
+        for row in answered_rows(bundle.moves):
             what = f"no. {row['index'] + 1} answered anew"
             yield _anew(row["kind"], row["request"], row["answer"], request_id, what)
     elif bundle.kind != "evaluate":
         what = "request answered anew"
         yield _anew(bundle.kind, bundle.request, bundle.answer, request_id, what)
+        yield from _advised_anew(bundle)
     else:
         yield from _read_again(bundle, request_id)
 
 
 def _read_again(bundle: Bundle, request_id: str) -> Iterator[Line]:
     """The log, read and evaluated anew."""
-    asked = ReportRequest.model_validate_json(orjson.dumps({"evaluate": bundle.request}))
+    asked = EvaluateRequest.model_validate_json(orjson.dumps(bundle.request))
     if bundle.log is None:
-        found, _ = answer_of(asked, request_id, asked.deadline)
+        found = evaluation_of(asked, request_id, JOB_DEADLINE)
     else:
         body = base64.b64decode(bundle.log["body"])
         with log_given(GivenLog(bundle.request["log"], bundle.log["settings"], body)):
-            found, _ = answer_of(asked, request_id, asked.deadline)
+            found = evaluation_of(asked, request_id, JOB_DEADLINE)
     for name in ("predicted", "electrical", "by_efforts"):
         stated, own = (
             _electrical(each["total"])
@@ -164,11 +172,26 @@ def _read_again(bundle: Bundle, request_id: str) -> Iterator[Line]:
 
 
 def _anew(kind: str, request: Json, answer: Json, request_id: str, what: str) -> Line:
-    asked = ReportRequest.model_validate_json(orjson.dumps({kind: request}))
-    found, _ = answer_of(asked, request_id, asked.deadline)
+    asked = AnsweredRequest.model_validate_json(orjson.dumps({kind: request}))
+    assert asked.task is not None
+    found, _ = answered(asked, request_id, asked.task.deadline)
     objective = answer["objective"]
     stated, own = (each["energy"][objective]["total"] for each in (answer, found))
     return _line(what, stated, own, ANSWER_TOLERANCE)
+
+
+def _advised_anew(bundle: Bundle) -> Iterator[Line]:
+    """The changes, computed anew."""
+    known = bundle.advised
+    if known is None or not known["advice"]:
+        return
+    task = AnsweredRequest.model_validate_json(orjson.dumps({bundle.kind: bundle.request})).task
+    assert task is not None
+    found = advised(task, bundle.answer, bundle.moves, bundle.period, NEVER)
+    energies = {each.name: each.energy for each in found.advice}
+    for each in known["advice"]:
+        own = energies.get(each["name"], math.nan)
+        yield _line(f"{each['name']}, anew", each["energy"], own, ANSWER_TOLERANCE)
 
 
 def _sum(what: str, stated: float, parts: Any, tolerance: float) -> Line:

@@ -10,7 +10,7 @@ from joulepath.app.api.report.costs import Money, cost_table, costs_note, facts
 from joulepath.app.api.report.drawings import Bar, drawn_bars
 from joulepath.app.api.report.job_rows import answered, rivals_of
 from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
-from joulepath.app.api.report.programs import arm_of, program_of_motion
+from joulepath.app.api.report.programs import program_of_motion
 from joulepath.app.api.report.report import Report, Rival, Table
 from joulepath.app.api.report.rivals import (
     EQUAL,
@@ -21,6 +21,7 @@ from joulepath.app.api.report.rivals import (
     rival_name,
     saved,
 )
+from joulepath.app.convert.given_answer import arm_of
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.picture.cell_picture import cell_picture
 

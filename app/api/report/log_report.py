@@ -8,9 +8,9 @@ from joulepath.app.api.report.assumptions import assumptions, interval_note
 from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.drawings import Bar, drawn_bars
 from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
-from joulepath.app.api.report.programs import arm_of
 from joulepath.app.api.report.report import Fact, Report, Rival, Table
 from joulepath.app.api.report.rivals import listed, parts_of
+from joulepath.app.convert.given_answer import arm_of
 
 Json = dict[str, Any]
 _BY = {"electrical": "power", "by_efforts": "currents or torques"}

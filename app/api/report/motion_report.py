@@ -6,7 +6,16 @@ from typing import Any
 
 from joulepath.app.api.report.assumptions import assumptions, interval_note
 from joulepath.app.api.report.bundle import COMPUTED, Bundle
-from joulepath.app.api.report.costs import Money, cost_table, costs_note, cycle_time, facts
+from joulepath.app.api.report.costs import (
+    Money,
+    advice_note,
+    advice_table,
+    cost_table,
+    costs_note,
+    cycle_time,
+    facts,
+    waiting,
+)
 from joulepath.app.api.report.drawings import Course, Leg, Stop, drawn
 from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
 from joulepath.app.api.report.report import Report, Rival
@@ -54,6 +63,8 @@ def motion_report(bundle: Bundle, program: Program) -> Report:
         check=bundle.how_to_check(answer.get("id")),
         assumptions=assumptions(bundle.request, bundle.costs, program.robot, masses),
         assumptions_note=unbroken(interval_note(answer["energy"]["electrical"].get("interval"))),
+        changes=advice_table(bundle, money),
+        changes_note=unbroken(advice_note(bundle)),
         foot=f"{COMPUTED} joulepath {bundle.version}",
     )
 
@@ -77,6 +88,8 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     length = cycle_time(bundle)
     waits = length > answer["duration"] and objective == "electrical"
     wait = f", with the wait until {digits(length)} s" if waits else ""
+    if held := waiting(bundle):
+        wait = f" and, with the wait until {digits(length)} s, *{digits(total + held)} J*"
     first = (
         f"One {word}{stops} needs *{digits(total)} J{kind}* in {digits(answer['duration'])} s{wait}"
     )

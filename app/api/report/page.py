@@ -9,7 +9,16 @@ from importlib.resources import files
 from string import Template
 
 from joulepath.app.api.report.bundle import Bundle, in_html
-from joulepath.app.api.report.report import Assumption, Cost, Fact, Part, Report, Rival, Table
+from joulepath.app.api.report.report import (
+    Assumption,
+    Change,
+    Cost,
+    Fact,
+    Part,
+    Report,
+    Rival,
+    Table,
+)
 
 MEDIA_TYPE = "text/html; charset=utf-8"
 _STRONG = re.compile(r"\*([^*]+)\*")
@@ -31,6 +40,11 @@ def page(report: Report, bundle: Bundle) -> bytes:
         parts=_section("Where the energy goes", _rows(map(_part, report.parts))),
         course=_course(report),
         costs=_costs(report),
+        changes=_section(
+            "What would need less",
+            _rows(map(_change, report.changes)) if report.changes else "",
+            report.changes_note,
+        ),
         proven=_section(report.proven_title, f"<p>{_rich(report.proven)}</p>"),
         check=_section("Check it yourself", f"<p>{_rich(report.check)}</p>"),
         assumptions=_section(
@@ -136,6 +150,11 @@ def _part(part: Part) -> str:
 def _cost(cost: Cost) -> str:
     cells = "".join(f"<td>{escape(each)}</td>" for each in (cost.energy, cost.money, cost.carbon))
     return f'<tr><th scope="row">{escape(cost.period)}</th>{cells}</tr>'
+
+
+def _change(each: Change) -> str:
+    cells = "".join(f"<td>{escape(cell)}</td>" for cell in (each.energy, each.saving, each.yearly))
+    return f'<tr class="claimed"><th scope="row">{escape(each.what)}</th>{cells}</tr>'
 
 
 def _assumption(each: Assumption) -> str:

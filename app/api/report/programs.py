@@ -5,11 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from joulepath.app.api.report.bundle import Bundle
-from joulepath.app.convert.arm import to_arm
-from joulepath.app.convert.given_answer import paths_of_moves, to_program
-from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.convert.given_answer import arm_fields_of, paths_of_moves, to_program
 from joulepath.optimizer.export.program import Program
-from joulepath.optimizer.problem.arm import Arm
 
 Json = dict[str, Any]
 
@@ -27,18 +24,5 @@ def program_of(bundle: Bundle) -> Program:
 def program_of_motion(request: Json, answer: Json) -> Program:
     """The motion of an answer of `POST /optimize`. Raises as `program_of`."""
     # where the arm is too large to be repeated, the request has it
-    own = None if answer.get("arm") is not None else _arm_fields(request)
+    own = None if answer.get("arm") is not None else arm_fields_of(request)
     return to_program(answer, own, lambda _: [])
-
-
-def arm_of(request: Json, answer: Json) -> Arm:
-    """The arm of an answer, see `program_of_motion`. Raises InvalidProblem."""
-    known = answer.get("arm")
-    fields = _arm_fields(request) if known is None else ArmRequest.model_validate(known)
-    return to_arm(fields.model_copy(update={"robot": answer["robot"]}))
-
-
-def _arm_fields(request: Json) -> ArmRequest:
-    return ArmRequest.model_validate(
-        {name: value for name, value in request.items() if name in ArmRequest.model_fields}
-    )

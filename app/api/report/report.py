@@ -50,6 +50,16 @@ class Cost:
 
 
 @dataclass(frozen=True)
+class Change:
+    """A change that needs less: its energy, its saving, and the saving of a year or nothing."""
+
+    what: str
+    energy: str
+    saving: str
+    yearly: str
+
+
+@dataclass(frozen=True)
 class Assumption:
     """An assumption with its trust letter."""
 
@@ -102,4 +112,6 @@ class Report:
     assumptions: tuple[Assumption, ...]
     assumptions_note: str
     foot: str
+    changes: tuple[Change, ...] = ()
+    changes_note: str = ""
     table: Table | None = None

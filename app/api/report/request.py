@@ -7,12 +7,11 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.advice.request import AnsweredRequest
 from joulepath.app.schemas.common import NO_CONTROLS, Request, described
 from joulepath.app.schemas.evaluate import EvaluateRequest
-from joulepath.app.schemas.examples.values import ANSWER_ID, JOB_ID, LOG_ID, OPTIMIZE
+from joulepath.app.schemas.examples.values import JOB_ID, LOG_ID
 from joulepath.app.schemas.lengths import LENGTHS
-from joulepath.app.schemas.request import OptimizeRequest
 
 MOST_ROWS = 2000
 """Largest job of a report: its motions are in the file."""
@@ -44,7 +43,8 @@ class Costs(Request):
     only."""
 
     cycles_per_shift: Sourced | None = described(
-        "Motions or cycles per shift. Null: one directly after the other, for 8 hours.",
+        "Motions or cycles per shift. Null: one each `period` or directly after the other, for 8 "
+        "hours.",
         None,
         {"value": 2400, "source": "line plan"},
         default=None,
@@ -77,19 +77,10 @@ class Costs(Request):
     )
 
 
-class ReportRequest(Request):
+class ReportRequest(AnsweredRequest):
     """A motion or a cycle, as exactly one of `optimize` and `cycle`; or a `job`; or a log, as
     `evaluate`. With the numbers for costs."""
 
-    optimize: OptimizeRequest | None = described(
-        "A body of `POST /optimize`.", None, OPTIMIZE, default=None
-    )
-    cycle: CycleRequest | None = described(
-        "A body of `POST /cycle`.",
-        None,
-        {"start": OPTIMIZE["start"], "stops": [{"target": OPTIMIZE["goal"]}]},
-        default=None,
-    )
     job: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
         f"Id of a job with motions or cycles of one robot, of at most {MOST_ROWS:,} requests.",
         None,
@@ -108,12 +99,6 @@ class ReportRequest(Request):
         ["bin to shelf", "shelf to bin"],
         default=[],
     )
-    answer: Annotated[str, Field(max_length=64)] | None = described(
-        "Id of the kept answer to `optimize` or `cycle`. Null: the request is answered first.",
-        None,
-        ANSWER_ID,
-        default=None,
-    )
     title: Text | None = described(
         "Title of the report. Null: one of the request's kind.",
         None,
@@ -125,6 +110,12 @@ class ReportRequest(Request):
         None,
         {"price": {"value": 0.2, "source": "yours"}},
         default=Costs(),
+    )
+    advice: bool = described(
+        "Whether changes of a motion or a cycle that need less are computed, as by `POST /advice`.",
+        None,
+        True,
+        default=True,
     )
     format: Format = described(
         "`html`: a page that stands alone. `pdf`: pages of A4, made by Typst.",
@@ -139,24 +130,15 @@ class ReportRequest(Request):
         return next(kind for kind in get_args(Kind) if getattr(self, kind) is not None)
 
     @property
-    def body(self) -> OptimizeRequest | CycleRequest | EvaluateRequest | None:
-        """The request behind the report; None for a job."""
-        return self.optimize or self.cycle or self.evaluate
-
-    @property
-    def robot(self) -> str | None:
-        """Name of the robot; None if only the job or the log says it."""
-        return None if self.body is None or self.evaluate is not None else self.body.robot
-
-    @property
     def figures(self) -> str | None:
         """Id of identified figures."""
-        return None if self.body is None else self.body.figures
+        return self.evaluate.figures if self.evaluate is not None else super().figures
 
     @property
     def deadline(self) -> float:
         """Wall time of the request [s]."""
-        given = None if self.body is None else self.body.deadline
+        body = self.task or self.evaluate
+        given = None if body is None else body.deadline
         return JOB_DEADLINE if given is None else given
 
     @model_validator(mode="after")

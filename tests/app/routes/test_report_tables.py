@@ -41,7 +41,8 @@ def job(client: TestClient) -> str:
         {"cycle": CYCLE},
     ]
     path = jobs.sent(client, requests, name="Night run")
-    assert jobs.ended(client, path)["counts"]["done"] == 4
+    ended = jobs.ended(client, path)
+    assert ended["counts"]["done"] == 4, client.get(f"{path}/results").text
     return path.rpartition("/")[2]
 
 
