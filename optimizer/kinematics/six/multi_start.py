@@ -135,6 +135,9 @@ class MultiStart:
             )
             found = fresh
         singular = self._smallest(found)
+        if len(found) > MULTI_START.most_branches:
+            # More than any arm has: they are on a curve that holds the pose to the tolerance.
+            raise SingularPose("goal", float(singular.min()))
         for k in np.flatnonzero(singular < ISOLATED.singular_value):
             if lies_on_a_curve(self._chain, found[k], T):
                 raise SingularPose("goal", float(singular[k]))
