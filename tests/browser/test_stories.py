@@ -99,7 +99,10 @@ def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, servic
         page.get_by_label("One move every so many seconds").blur()
         expect(page.locator("#costs")).to_contain_text("Waiting, motors on")
         expect(page.locator("#costs thead")).to_contain_text("4,800×")
-        expect(page.locator("#notes")).to_contain_text("a cycle is waiting")
+        notes = page.locator("#notes")
+        expect(notes).to_contain_text("a cycle is waiting")
+        expect(notes).to_contain_text(re.compile(r"brakes at rest, 0\.5 s .* J, .* % less"))
+        expect(notes.get_by_role("button", name="Use brakes")).to_be_visible()
         page.locator("#export").click()
         expect(page.locator("#preview")).to_contain_text("0.1 of its speed")
         with page.expect_download() as download:
