@@ -12,8 +12,12 @@ def hermite(share: Array, q0: Array, q1: Array, slope0: Array, slope1: Array) ->
 
     `slope0` and `slope1` (n, m) are the derivatives by the share at both ends.
     """
-    rest = (1 - share)[:, None]
-    share = share[:, None]
-    start = (1 + 2 * share) * rest * rest
-    slopes = share * rest * rest * slope0 - share * share * rest * slope1
-    return np.asarray(start * q0 + (1 - start) * q1 + slopes)
+    a, b, c, d = hermite_weights(share)[:, :, None]
+    return np.asarray(a * q0 + b * q1 + c * slope0 + d * slope1)
+
+
+def hermite_weights(share: Array) -> Array:
+    """Weights (4, n) of q0, q1, slope0 and slope1 in `hermite` at shares (n,)."""
+    rest = 1 - share
+    a, b = (1 + 2 * share) * rest * rest, share * rest * rest
+    return np.array([a, 1 - a, b, -share * share * rest])

@@ -67,7 +67,7 @@ class TracedCurve:
     @property
     def nodes(self) -> Array:
         """Known points (m, nq) [rad] of the curve, without jumps by full turns."""
-        return self.stack.nodes[self.part]
+        return self.stack.nodes[self._part]
 
     @property
     def closed(self) -> bool:
@@ -121,7 +121,7 @@ class TracedCurve:
         if len(self.nodes) == 1:
             return centre, np.full_like(centre, SETTINGS.rounding)
         rates = np.abs(
-            np.diff(self.nodes, axis=0) / np.diff(self.stack.knots[self.part])[:, None]
+            np.diff(self.nodes, axis=0) / np.diff(self.stack.knots[self._part])[:, None]
         ).max(axis=0)
         return centre, np.minimum(
             SETTINGS.rate_factor * np.asarray(half, dtype=float)[:, None] * rates
@@ -130,7 +130,7 @@ class TracedCurve:
         )
 
     @property
-    def part(self) -> slice:
+    def _part(self) -> slice:
         """Rows of the points of the curve."""
         return slice(int(self.stack.first[self.row]), int(self.stack.last[self.row]) + 1)
 
@@ -138,7 +138,7 @@ class TracedCurve:
         """Parameter of the point between nodes across from q (nq,), and an upper bound of its
         distance [rad].
         """
-        stack, part = self.stack, self.part
+        stack, part = self.stack, self._part
         k: Rows = np.arange(part.start, max(part.stop - 1, part.start + 1))
         unwound = nearest_turn(q, stack.nodes[k])
         lengths = np.maximum(stack.segment_lengths[k], SETTINGS.rounding)

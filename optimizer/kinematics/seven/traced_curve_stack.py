@@ -131,6 +131,20 @@ class TracedCurveStack:
             length * self.tangents[after],
         )
 
+    def at_each(self, k: Rows, weights: Array, joints: Rows) -> Array:
+        """Angles (n, m, j) [rad] of joints (j,) at m shares of each segment.
+
+        Args:
+            k: points that begin the segments, shape (n,).
+            weights: `hermite_weights` of the shares, shape (4, m).
+            joints: indices of the joints, shape (j,).
+        """
+        after, length = self._after(k), self.segment_lengths[k][:, None]
+        ends = np.empty((len(k), 4, self.nodes.shape[1]))
+        ends[:, 0], ends[:, 1] = self.nodes[k], self.nodes[after]
+        ends[:, 2], ends[:, 3] = length * self.tangents[k], length * self.tangents[after]
+        return np.asarray(weights.T @ ends[:, :, joints])
+
     def along(self, k: Rows, share: Array) -> Array:
         """Approximate directions (n, nq) of the curves there, across which members are sought."""
         before = self.tangents[k]

@@ -1,64 +1,239 @@
-"""Parts of the curves of one pose within position limits, all curves at once."""
+"""Parts of the curves of one pose within position limits, all curves at once.
+
+A cubic lies within the hull of its four control points: this alone shows most cubics to be inside
+all limits, or outside one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
+from joulepath.optimizer.kinematics.seven.across_curve import ACROSS, project_onto_curve
+from joulepath.optimizer.kinematics.seven.hermite import hermite_weights
+from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve, on_curve
+from joulepath.optimizer.kinematics.seven.traced_curve_stack import Rows, TracedCurveStack
 
 
 @dataclass(frozen=True)
 class TracedLimitsSettings:
-    """Settings of cutting curves to limits."""
+    """Settings of the search for crossings of limits."""
 
     parts: int = 8
-    """Number of parts of each segment between two points of a curve."""
-    margin: float = 0.05
-    """Largest joint distance of a curve from its cubics [rad]."""
+    """Number of parts of an undecided segment whose ends are tested against the limits."""
+    steps: int = 16
+    """Largest number of steps towards a crossing that Newton's method does not find."""
+    near: float = 0.05
+    """Longest step of Newton's method, and largest joint distance of a curve from its cubics
+    [rad].
+    """
+    rounding: float = 1e-9
+    """Angle beyond a limit that is due to rounding [rad]."""
 
 
 SETTINGS = TracedLimitsSettings()
+PART_WEIGHTS = hermite_weights(np.linspace(0.0, 1.0, SETTINGS.parts + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _JointRanges:
+    """Ranges of the joints with limits: middles (m,) and half widths (m,) [rad]."""
+
+    joints: Rows
+    middle: Array
+    half: Array
+
+    @classmethod
+    def of(cls, q_min: Array, q_max: Array) -> _JointRanges:
+        """Ranges of limits (nq,) [rad]; a joint that may turn all around has none."""
+        joints = np.flatnonzero(q_max - q_min < 2 * np.pi)
+        return cls(joints, ((q_min + q_max) / 2)[joints], ((q_max - q_min) / 2)[joints])
+
+    def excess(self, q: Array) -> Array:
+        """Largest angle (n,) [rad] of configurations (n, nq) beyond the limits, negative inside."""
+        return self.beyond(q[:, self.joints])
+
+    def beyond(self, angles: Array) -> Array:
+        """Largest angle (…) [rad] beyond the limits, from angles (…, m) [rad] of the joints with
+        limits.
+        """
+        away = np.abs(wrapped(angles - self.middle)) - self.half
+        return np.asarray(np.maximum.reduce(away, axis=-1))
 
 
 def cut_to_limits(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
-    """Curves of one pose, cut to limits up to full turns; curves wholly outside are left out.
+    """Curves of one pose, cut to the limits (nq,) [rad] up to full turns; curves wholly outside are
+    left out.
+    """
+    limits = _JointRanges.of(q_min, q_max)
+    if not curves or not len(limits.joints):
+        return list(curves)
+    cut = _cut(curves, limits)
+    return [
+        curve if arcs == curve.arcs else curve.cut(arcs)
+        for curve, arcs in zip(curves, cut, strict=True)
+        if arcs
+    ]
 
-    The arcs hold every member within the limits, and extend beyond them by some hundredths of a
-    radian.
+
+def _cut(curves: Sequence[TracedCurve], limits: _JointRanges) -> list[list[tuple[float, float]]]:
+    """Arcs of each curve within the limits."""
+    stack = curves[0].stack
+    inside, undecided = _by_hull(stack, limits)
+    at, segment = np.zeros(0), np.zeros(0, dtype=np.intp)
+    if len(undecided):
+        excess = limits.beyond(stack.at_each(undecided, PART_WEIGHTS, limits.joints))
+        held = excess <= 0
+        row, part = np.nonzero(held[:, 1:] != held[:, :-1])
+        segment = undecided[row]
+        if len(segment):
+            at = _crossings(curves[0], limits, segment, part, excess[row])
+    gap = stack.knots[np.minimum(segment + 1, len(inside) - 1)] - stack.knots[segment]
+    ends = stack.knots[segment] + at * gap
+    # Crossings are sorted by segments, and so by curves.
+    crossed, behind = ends.tolist(), [0, *np.searchsorted(segment, stack.last).tolist()]
+    first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
+    return [
+        _arcs(
+            each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row]
+        )
+        for each in curves
+    ]
+
+
+def _by_hull(stack: TracedCurveStack, limits: _JointRanges) -> tuple[Mask, Rows]:
+    """Mask (n,) of the nodes inside the limits, and rows of the nodes that begin undecided
+    segments.
+    """
+    q, tangents = stack.nodes[:, limits.joints], stack.tangents[:, limits.joints]
+    own = wrapped(q - limits.middle)
+    inside: Mask = np.logical_and.reduce(np.abs(own) <= limits.half, axis=1)
+    points = np.empty((4, len(q) - 1, len(limits.joints)))
+    points[0] = own[:-1]
+    # The other control points follow without jumps by full turns.
+    third = stack.segment_lengths[:-1, None] / 3
+    points[1], points[3] = points[0] + third * tangents[:-1], points[0] + (q[1:] - q[:-1])
+    points[2] = points[3] - third * tangents[1:]
+    least, most = np.minimum.reduce(points, axis=0), np.maximum.reduce(points, axis=0)
+    low, high = least >= -limits.half, most <= limits.half
+    held = np.logical_and.reduce(low & high, axis=1)
+    beyond = 2 * np.pi - limits.half
+    outside = ((least > limits.half) & (most < beyond)) | (
+        (most < -limits.half) & (least > -beyond)
+    )
+    # At nodes on a limit, rounding may make hull and node disagree.
+    both, either = inside[:-1] & inside[1:], inside[:-1] | inside[1:]
+    crossing = ~(held & both) & (either | ~np.logical_or.reduce(outside, axis=1))
+    crossing[stack.last[:-1]] = False
+    return inside, np.flatnonzero(crossing)
+
+
+def _arcs(
+    curve: TracedCurve, ends: list[float], first: bool, last: bool
+) -> list[tuple[float, float]]:
+    """Arcs of a curve that crosses limits at `ends`.
+
+    `first` and `last` tell whether the ends of the curve itself are inside.
+    """
+    if not ends:
+        return curve.arcs if first else []
+    if first:
+        ends.insert(0, curve.arcs[0][0])
+    if last:
+        ends.append(curve.arcs[0][1])
+    arcs = list(zip(ends[::2], ends[1::2], strict=True))
+    if curve.closed and first and last:
+        # The last arc continues beyond the start of the curve.
+        (_, before), (after, _) = arcs[0], arcs[-1]
+        arcs = [*arcs[1:-1], (after, before + 2 * np.pi)]
+    return arcs
+
+
+def _crossings(one: TracedCurve, limits: _JointRanges, k: Rows, part: Rows, excess: Array) -> Array:
+    """Shares of segments at which the curves cross limits.
 
     Args:
-        curves: whole curves of one pose.
-        q_min: lower limits, shape (nq,) [rad].
-        q_max: upper limits, shape (nq,) [rad].
+        one: any curve of the pose.
+        limits: ranges of the joints.
+        k: points that begin the segments, shape (n,).
+        part: part of each segment with the crossing, shape (n,).
+        excess: angles of the cubics beyond the limits at the ends of all parts, shape (n, parts +
+            1) [rad].
+
+    Returns:
+        The shares (n,).
     """
-    joints = np.flatnonzero(q_max - q_min < 2 * np.pi)
-    if not curves or not len(joints):
-        return list(curves)
-    middle, half = ((q_min + q_max) / 2)[joints], ((q_max - q_min) / 2)[joints]
-    stack, shares = curves[0].stack, np.linspace(0.0, 1.0, SETTINGS.parts + 1)
-    n = len(stack.nodes)
-    q = stack.at(np.arange(n).repeat(len(shares)), np.tile(shares, n))[:, joints]
-    q = q.reshape(n, len(shares), -1)
-    excess = np.abs(wrapped(q - middle)) - half
-    reach = np.abs(np.diff(q, axis=1)) + SETTINGS.margin
-    inside: Mask = np.all(np.minimum(excess[:, 1:], excess[:, :-1]) <= reach, axis=2)
-    gaps = np.diff(stack.knots, append=0.0)
-    gaps[stack.last] = 0.0
-    starts = stack.knots[:, None] + shares[:-1] * gaps[:, None]
-    cut = list[TracedCurve]()
-    for curve in curves:
-        own, ends = inside[curve.part].ravel(), starts[curve.part].ravel()
-        # An arc starts at a change of the mask, and ends at the next one.
-        bounds = np.append(ends, ends[-1])[np.diff(own, prepend=False, append=False)].tolist()
-        arcs = list(zip(bounds[::2], bounds[1::2], strict=True))
-        if curve.closed and len(arcs) > 1 and own[0] and own[-1]:
-            # The last arc continues beyond the start of the curve.
-            arcs = [*arcs[1:-1], (arcs[-1][0], arcs[0][1] + 2 * np.pi)]
-        if arcs:
-            cut.append(curve.cut(arcs))
-    return cut
+    stack, rows = one.stack, np.arange(len(k))
+    # A parabola through the ends of the part and of an adjacent one crosses the limit near the
+    # crossing of the curve.
+    low, high = excess[rows, part], excess[rows, part + 1]
+    beside = np.where(part < SETTINGS.parts - 1, part + 2, part - 1)
+    chord = low / (low - high)
+    bend = (excess[rows, beside] + low + high) / 2 - 1.5 * np.where(beside > part, high, low)
+    root = np.minimum(np.maximum(chord - bend * chord * (chord - 1) / (high - low), 0.0), 1.0)
+    near = stack.at(k, (part + root) / SETTINGS.parts)
+    q, exact = _on_limits(one, limits, near)
+    at = stack.shares_across(k, (part + root) / SETTINGS.parts, q)
+    exact &= (at >= 0) & (at <= 1) & (np.maximum.reduce(np.abs(near - q), axis=1) < SETTINGS.near)
+    rest = np.flatnonzero(~exact)
+    if len(rest):
+        # The target is inside the limits by half of the rounding tolerance.
+        at[rest] = _zeros(
+            lambda share: limits.excess(on_curve(one, k[rest], share)) + SETTINGS.rounding / 2,
+            np.array([part[rest], part[rest] + 1]) / SETTINGS.parts,
+            low[rest] <= 0,
+        )
+    return at
+
+
+def _on_limits(one: TracedCurve, limits: _JointRanges, q: Array) -> tuple[Array, Mask]:
+    """Configurations (n, nq) [rad] of the curves next to q (n, nq) with a joint on its limit, and a
+    mask (n,) of those found.
+    """
+    n, nq = q.shape
+    rows = np.arange(n)
+    own = wrapped(q[:, limits.joints] - limits.middle)
+    binding = (np.abs(own) - limits.half).argmax(axis=1)
+    joint, side = limits.joints[binding], np.sign(own[rows, binding])
+    target = (
+        q[rows, joint] + side * (limits.half[binding] - SETTINGS.rounding / 2) - own[rows, binding]
+    )
+    along = np.zeros((n, nq))
+    along[rows, joint] = 1.0
+    q, left = project_onto_curve(one.chain, q, along, target - q[rows, joint], one.T, SETTINGS.near)
+    return q, (left < ACROSS.tolerance) & (limits.excess(q) <= 0)
+
+
+def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Array:
+    """Zeros (n,) of a function of shares (n,) between the given ones (2, n), by the Illinois
+    method.
+
+    Args:
+        beyond: function, negative inside the limits.
+        share: brackets of the zeros, shape (2, n).
+        inside: whether the first end of each bracket is inside, shape (n,).
+
+    Returns:
+        The zeros, to half of the rounding tolerance, or the inner ends of the brackets if the
+        search fails.
+    """
+    low, high = share
+    f_low, f_high = beyond(low), beyond(high)
+    found = np.full(len(low), np.nan)
+    for _ in range(SETTINGS.steps):
+        # Illinois variant of the regula falsi: the value at an end that stays is halved.
+        span = np.where(f_high == f_low, 1.0, f_high - f_low)
+        at = np.minimum(np.maximum(low - f_low * (high - low) / span, low), high)
+        f = beyond(at)
+        found = np.where(np.isnan(found) & (np.abs(f) < SETTINGS.rounding / 2), at, found)
+        if not np.isnan(found).any():
+            break
+        is_low = (f <= 0) == inside
+        f_high = np.where(is_low, f_high / 2, f)
+        f_low = np.where(is_low, f, f_low / 2)
+        low, high = np.where(is_low, at, low), np.where(is_low, high, at)
+    return np.asarray(np.where(np.isnan(found), np.where(inside, low, high), found))

@@ -14,6 +14,7 @@ from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.seven.curve_tracing import cycles, trace
+from joulepath.optimizer.kinematics.seven.hermite import hermite_weights
 from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
@@ -23,10 +24,10 @@ from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, insid
 from tests.optimizer.kinematics.traced import CHAIN, GEN3, PANDA, away
 from tests.selection import long_but
 
-# largest distance of members with nearly equal parameters [rad]
+# largest distance of members with nearly equal parameters, and beyond limits [rad]
 LIMIT = 1e-8
-# angle by which the arcs of curves extend beyond the limits at most [rad]
-OVERHANG = 0.15
+# rounding of points on cubics [rad]
+ROUNDING = 1e-13
 # smallest share of the members of a closed form on the curves found; some of a pose next to a
 # singularity are missed
 COVERED = 0.99
@@ -100,7 +101,7 @@ def test_every_configuration_is_on_a_curve_of_its_pose(
     assert missed <= 0.001 * count
 
 
-def test_members_reach_the_pose_next_to_the_limits_at_most(robot: Robot, arm: TracedArm) -> None:
+def test_members_reach_the_pose_within_the_limits(robot: Robot, arm: TracedArm) -> None:
     rng, limits = np.random.default_rng(52), robot.limits
     middle, half = (limits.q_min + limits.q_max) / 2, (limits.q_max - limits.q_min) / 2
     for _ in range(5):
@@ -109,7 +110,7 @@ def test_members_reach_the_pose_next_to_the_limits_at_most(robot: Robot, arm: Tr
             at = np.concatenate([np.append(rng.uniform(*arc, 5), arc) for arc in curve.arcs])
             for q in curve.at(at):
                 assert np.abs(flange(robot, q) - T).max() < ACCURACY
-                assert (np.abs(wrapped(q - middle)) < half + OVERHANG).all()
+                assert (np.abs(wrapped(q - middle)) < half + LIMIT).all()
 
 
 def test_a_configuration_on_a_limit_is_on_an_arc(robot: Robot, arm: TracedArm) -> None:
@@ -160,7 +161,7 @@ def test_parts_cut_off_by_limits_are_outside(robot: Robot, arm: TracedArm) -> No
             inside_limits = (
                 np.abs(wrapped(curve.at(at) - (q_min + q_max) / 2)) < (q_max - q_min) / 2
             ).all(axis=1)
-            assert (held | ~inside_limits).all()
+            assert (inside_limits == held).all()
             cut += len(at) - sum(held)
     assert cut > 0
 
@@ -171,6 +172,16 @@ def test_the_parameter_of_a_member_is_found_again(robot: Robot, arm: TracedArm) 
         for u in rng.uniform(*curve.arcs[0], 4):
             found = curve.at(np.array([u, curve.parameter(curve.at(np.array([u]))[0])]))
             assert np.abs(wrapped(found[1] - found[0])).max() < LIMIT
+
+
+def test_points_at_many_shares_are_those_at_each(robot: Robot, arm: TracedArm) -> None:
+    curve = arm.self_motions(flange(robot, inside(robot, np.random.default_rng(76))))[0]
+    share, joints, k = np.linspace(0.0, 1.0, 5), np.array([1, 4]), np.arange(3)
+    each = curve.stack.at_each(k, hermite_weights(share), joints)
+    for row in k:
+        assert (
+            np.abs(each[row] - curve.stack.at(np.full(5, row), share)[:, joints]).max() < ROUNDING
+        )
 
 
 def test_boxes_hold_the_curve(robot: Robot, arm: TracedArm) -> None:
