@@ -76,7 +76,6 @@ def build(site: Path = SITE) -> None:
         done = subprocess.run(
             command,
             cwd=stage,
-            env=os.environ | {"PYTHONPATH": ""},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             encoding="utf-8",
@@ -113,10 +112,15 @@ def has_tools() -> bool:
 def digest() -> str:
     """The digest of everything that the site is built from. Raises OSError."""
     found = hashlib.sha256()
-    for path in sorted({*_pages(), *_linked(), *_documented(), CONFIG, LOCK}):
+    for path in sorted(sources()):
         found.update(f"{path.relative_to(ROOT)}\0".encode())
         found.update(path.read_bytes())
     return found.hexdigest()
+
+
+def sources() -> set[Path]:
+    """Every file that the site is built from. Raises OSError."""
+    return {*_pages(), *_linked(), *_documented(), CONFIG, LOCK}
 
 
 def _stage(folder: Path) -> None:
