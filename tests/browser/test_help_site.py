@@ -61,3 +61,13 @@ def test_the_pages_fit_a_phone_and_the_night(browser: Browser, service: Server) 
         colour = page.evaluate("getComputedStyle(document.body).backgroundColor")
         assert sum(map(int, colour[4:-1].split(","))) < 150
         assert findings(page) == []
+
+
+def test_operations_lead_to_their_pages(browser: Browser, service: Server) -> None:
+    with opened(browser, f"{service.url}/docs") as page:
+        operation = page.locator("#operations-motion-optimize_optimize_post")
+        operation.locator(".opblock-summary-control").click()
+        link = operation.locator("a[href*='/help/']")
+        expect(link).to_be_visible()
+        page.goto(link.get_attribute("href") or "")
+        expect(page.locator("h1").first).to_be_visible()

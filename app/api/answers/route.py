@@ -19,7 +19,7 @@ from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import ANSWER_ID
 from joulepath.app.store import answers
 
-router = APIRouter(prefix="/answers", tags=["answers"])
+router = APIRouter(prefix="/answers", tags=["results"])
 
 AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_ID])]
 
