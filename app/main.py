@@ -14,6 +14,7 @@ from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
 from joulepath.app.api import cluster, docs, health, help, metrics, problems, studio
+from joulepath.app.api.advice import route as advice
 from joulepath.app.api.answers import route as answers
 from joulepath.app.api.compare import route as compare
 from joulepath.app.api.cycle import route as cycle
@@ -58,6 +59,7 @@ ROUTES = (
     pareto,
     cycle,
     whatif,
+    advice,
     evaluate,
     replay,
     ik,

@@ -88,11 +88,11 @@ export function CostTable() {
       </table>
       <p class="hint">
         <span title={given.price.source}>
-          {fixed(given.price.value, 2)} € a kWh ({short(given.price.source)})
+          {fixed(given.price.value, 2)} € a kWh ({short(given.price)})
         </span>
         ,{" "}
         <span title={given.carbon.source}>
-          {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon.source)})
+          {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon)})
         </span>
         . {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
         {given.cycle === null && !shown.cycle
@@ -109,8 +109,13 @@ export function CostTable() {
   );
 }
 
-/** A source by its first words; the whole of it is among the assumptions. */
-const short = (source: string) => source.split(":")[0]!;
+/** A source by its first words, with its trust letter; the whole of it is among the assumptions. */
+const short = ({ source, letter }: Sourced) =>
+  `${source.split(":")[0]!}${letter ? `, ${letter}` : ""}`;
+
+const LETTERS: Record<string, string> = { C: "second-hand" };
+const sourceOf = ({ source, letter }: Sourced) =>
+  letter ? `${letter}, ${LETTERS[letter] ?? ""}: ${source}` : source;
 
 /** What the costs rest on; each is replaced by the user's own. */
 function Assumptions() {
@@ -148,14 +153,14 @@ function Assumptions() {
         "Electricity",
         "€ per kWh",
         given.price.value,
-        given.price.source,
+        sourceOf(given.price),
         (value) => value !== null && set({ price: yours(value) }),
       )}
       {row(
         "Carbon",
         "kg CO₂e per kWh",
         given.carbon.value,
-        given.carbon.source,
+        sourceOf(given.carbon),
         (value) => value !== null && set({ carbon: yours(value) }),
       )}
       {row("Shift", "h", given.shift, "", (value) => value !== null && set({ shift: value }))}
