@@ -27,6 +27,7 @@ from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,
@@ -68,7 +69,11 @@ PARETO = ParetoSettings()
 
 
 def pareto(
-    problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = no_listener
+    problem: Problem,
+    points: int = 12,
+    clock: Clock = time.perf_counter,
+    tell: Tell = no_listener,
+    progress: bool = True,
 ) -> Front:
     """Find the front of energy over duration, from the fastest motion to the motion of least
     energy.
@@ -80,6 +85,8 @@ def pareto(
         clock: function that returns the time [s].
         tell: receives the progress, with the durations as candidates and the motion of least
             energy.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         The motions of the front, fastest first.
@@ -94,7 +101,7 @@ def pareto(
         raise InvalidProblem(
             "duration", "A front runs over durations: leave duration out or give a range."
         )
-    with one_thread():
+    with one_thread(), progress_bar("Finding the front", tell, progress) as tell:
         return _Search(problem, points, clock, only_news(tell)).front()
 
 
