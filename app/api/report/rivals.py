@@ -71,7 +71,7 @@ def above_least(subject: str, total: float, bound: float) -> str:
     if bound <= 0:
         return "How little could be needed at least is not known here."
     return (
-        f"{subject} needs less than {down(bound)} J: at most "
+        f"{subject} needs less than {down(bound)} J, so this is at most "
         f"{percent(max(total / bound - 1, 0.0), 'up')} above the least possible."
     )
 
