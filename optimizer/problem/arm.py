@@ -118,7 +118,7 @@ class Arm:
         robot: the robot.
         T_flange_tcp: pose of the TCP in the flange frame, shape (4, 4).
         payload: body carried.
-        gravity: gravity in the base frame, shape (3,) [m/s²].
+        gravity: gravity in the base frame, shape (3,) [m/s²]; None for that of the robot.
         limits: joint limits, at most those of the robot; None for these.
         friction: name of one of the robot's friction laws; None for its default.
         inverter: replaced coefficients of the inverters.
@@ -139,7 +139,8 @@ class Arm:
     robot: Robot
     T_flange_tcp: Array = field(default_factory=lambda: np.eye(4))
     payload: Payload = field(default_factory=Payload)
-    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    # None is replaced on construction
+    gravity: Array = field(default=None)  # type: ignore[arg-type]
     limits: Limits | None = None
     friction: str | None = None
     inverter: Inverter = field(default_factory=Inverter)
@@ -154,7 +155,8 @@ class Arm:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tcp", rigid_transform(self.T_flange_tcp, "tcp"))
-        object.__setattr__(self, "gravity", frozen(self.gravity, (3,), "gravity"))
+        gravity = self.gravity if self.gravity is not None else self.robot.gravity  # type: ignore[redundant-expr]
+        object.__setattr__(self, "gravity", frozen(gravity, (3,), "gravity"))
         object.__setattr__(
             self, "limits", self.robot.limits if self.limits is None else self.limits
         )

@@ -163,8 +163,8 @@ class MultiStart:
     def _at_fold(self, found: Array, T: Array) -> Array:
         """The exact ones of more solutions (n, 6) [rad] than an arm has branches.
 
-        Around a fold of high order, many configurations hold the pose to the tolerance, and Newton's
-        method converges slowly.
+        Around a fold of high order, many configurations hold the pose to the tolerance, and
+        Newton's method converges slowly.
 
         Raises:
             SingularPose: none is exact.
