@@ -6,7 +6,7 @@ a plot.
     make bench BENCH_ARGS="--only quality"    some sections; the others keep their last results
     make bench BENCH_ARGS=--list              what there is, also apart from the sections
     make bench BENCH_ARGS="--foreign FILE"    planning problems of others too, see
-    docs/foreign_scenes.md
+    docs/explained/foreign_scenes.md
 
 Each section is a module with a command of its own. The sections run one after another, in a process
 each.

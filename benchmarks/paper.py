@@ -1,5 +1,5 @@
-"""Comparison of the founding paper's three tables with this model; written into docs/paper.md
-between its markers.
+"""Comparison of the founding paper's three tables with this model; written into
+docs/explained/paper.md between its markers.
 
     python -m benchmarks.paper            # writes the page
     python -m benchmarks.paper --print    # prints what it would write
@@ -31,7 +31,7 @@ from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.problem.arm import Arm
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "paper.md"
+PAGE = ROOT / "docs" / "explained" / "paper.md"
 BEGIN, END = "<!-- made by python -m benchmarks.paper -->", "<!-- end of what it made -->"
 REFERENCE = ROOT / "tests" / "reference"
 

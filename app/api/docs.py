@@ -30,6 +30,18 @@ _HEADERS = {
 }
 
 
+_SWAGGER = {
+    # without this it fetches a badge from validator.swagger.io
+    "validatorUrl": None,
+    # 300 schemas below the operations: each operation has its own, and `/help` lists all fields
+    "defaultModelsExpandDepth": -1,
+    # colouring an answer of a megabyte takes seconds
+    "syntaxHighlight": False,
+    "displayRequestDuration": True,
+    "filter": True,
+}
+
+
 @router.get("/docs")
 async def swagger(request: Request) -> HTMLResponse:
     """Swagger UI."""
@@ -40,8 +52,7 @@ async def swagger(request: Request) -> HTMLResponse:
         swagger_js_url=f"{root}/docs/swagger-ui-bundle.js",
         swagger_css_url=f"{root}/docs/swagger-ui.css",
         swagger_favicon_url=_NO_PICTURE,
-        # without this it fetches a badge from validator.swagger.io
-        swagger_ui_parameters={"validatorUrl": None},
+        swagger_ui_parameters=_SWAGGER,
     )
     page.headers.update(_HEADERS)
     return page

@@ -88,7 +88,7 @@ def evaluate(
     if kind == "json" and (query or settings is not None):
         named = "--settings" if settings is not None else f"--{next(iter(query)).replace('_', '-')}"
         raise click.UsageError(f"{named} is for a CSV: put the field into the JSON of FILE.")
-    fields = (_settings_in(settings) if settings is not None else {}) | query
+    fields = (settings_in(settings) if settings is not None else {}) | query
     with tempfile.NamedTemporaryFile(prefix="joulepath-", suffix=f".{kind}") as copy:
         copy.write(content_of(file))
         copy.flush()
@@ -114,7 +114,7 @@ def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadlin
         )
 
 
-def _settings_in(file: Path) -> dict[str, Any]:
+def settings_in(file: Path) -> dict[str, Any]:
     """The fields of a settings file. Raises click.UsageError."""
     try:
         fields = parsed(file.read_bytes())

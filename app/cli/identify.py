@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 _GZIP = b"\x1f\x8b"
 _PIECE = 1 << 20
-# a stand-in for the ids of stored logs: the command's are files
-_FILE_ID = "file"
+FILE_ID = "file"
+"""Stand-in for the ids of stored logs: those of a command are files."""
 
 OTHERS = click.option(
     "--validate",
@@ -44,7 +44,7 @@ METHOD = click.option(
     type=click.Choice(get_args(Method)),
     default="automatic",
     show_default=True,
-    help="How it is found; docs/identification.md says what each method needs.",
+    help="How it is found; docs/reference/identification.md says what each method needs.",
 )
 PERIOD = click.option(
     "--period",
@@ -127,7 +127,6 @@ def identify(
     to `PUT /figures`.
     """
     from joulepath.app.api.identifications.request import IdentifyRequest
-    from joulepath.app.api.logs.request import LogSettings
 
     request_id = new_id()
     carried = None if payload is None else {"mass": payload, "com": list(com)}
@@ -137,15 +136,15 @@ def identify(
         "units": units,
         "effort": effort,
     }
-    read = tuple(_read(LogSettings, settings, file, request_id) for file in (*logs, *others))
+    read = tuple(read_log_file(settings, file, request_id) for file in (*logs, *others))
     body: dict[str, Any] = {
-        "logs": [_FILE_ID] * len(logs),
+        "logs": [FILE_ID] * len(logs),
         "estimator": estimator,
         "fit": list(fit),
     }
     body |= {"method": method, "period": period, "inertials": "refit" if refit else "keep"}
     body |= {"friction": {"terms": list(terms)}}
-    body |= {"validate": [_FILE_ID] * len(others)} if others else {}
+    body |= {"validate": [FILE_ID] * len(others)} if others else {}
     asked = validated(IdentifyRequest, _json(body), request_id)
     with terminal.progress(f"Identifying from {len(logs)} logs"):
         answer = _answered(asked, read, request_id)
@@ -159,14 +158,14 @@ def _answered(asked: Any, read: Any, request_id: str) -> bytes:
     return answered(IdentifyTask(asked, read, request_id), asked.deadline, request_id)
 
 
-def _read(model: Any, fields: dict[str, Any], file: Path, request_id: str) -> GivenLog:
-    """Checked settings of a log, as they are stored, and its packed file."""
+def read_log_file(fields: dict[str, Any], file: Path, request_id: str) -> GivenLog:
+    """Checked settings of a log, as they are stored, and its packed file. Raises Refused."""
+    from joulepath.app.api.logs.request import LogSettings
     from joulepath.app.convert.recorded import GivenLog
 
     named = _json(fields | {"name": file.stem[:80]})
-    return GivenLog(
-        _FILE_ID, validated(model, named, request_id).model_dump(mode="json"), _packed(file)
-    )
+    settings = validated(LogSettings, named, request_id).model_dump(mode="json")
+    return GivenLog(FILE_ID, settings, _packed(file))
 
 
 def _json(content: dict[str, Any]) -> bytes:

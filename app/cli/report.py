@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import orjson
@@ -14,12 +15,16 @@ from joulepath.app.cli.answer import (
     compile_kernel_of,
     content_of,
     new_id,
-    refused,
     result_of,
     validated,
     write,
 )
+from joulepath.app.cli.evaluate import settings_in
 from joulepath.app.cli.exit_codes import ANSWERED, PROBLEM
+from joulepath.app.cli.identify import FILE_ID, read_log_file
+
+if TYPE_CHECKING:
+    from joulepath.app.engine.task import Task
 
 
 class _Sourced(click.ParamType[dict[str, Any], Any]):
@@ -41,7 +46,9 @@ class _Sourced(click.ParamType[dict[str, Any], Any]):
     epilog="""\b
 Examples:
   joulepath report request.json --output report.html
-  joulepath report round.json --price 0.2:contract --shifts-per-year 460 --output report.pdf"""
+  joulepath report round.json --price 0.2:contract --shifts-per-year 460 --output report.pdf
+  joulepath report log.csv --robot ur10e --output log.pdf
+  echo '{"job": "9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60"}' | joulepath report - --output job.pdf"""
 )
 @FILE
 @click.option(
@@ -53,40 +60,86 @@ Examples:
 )
 @click.option("--answer", help="Id of the kept answer to the request. Default: it is answered.")
 @click.option("--title", help="Title of the report.")
+@click.option("--robot", help="With a log: name of its robot. Default: ur5e.")
+@click.option(
+    "--settings",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="With a log: JSON file with the query parameters of POST /logs: units, payload, columns, "
+    "...",
+)
+@click.option("--period", type=float, help="Time from one start to the next [s]: the wait counts.")
+@click.option("--no-advice", is_flag=True, help="Do not compute changes that would need less.")
 @click.option("--cycles-per-shift", type=_Sourced(), help="Default: back to back for 8 hours.")
 @click.option("--shifts-per-year", type=_Sourced(), help="Default: no figures per year.")
 @click.option("--price", type=_Sourced(), help="Of a kilowatt-hour. Default: no money.")
 @click.option("--currency", help="Of the price. Default: €.")
 @click.option("--carbon", type=_Sourced(), help="kg CO2e per kilowatt-hour. Default: no CO2e.")
 @click.option("--control-box", type=_Sourced(), help="Its power [W]. Default: it is not counted.")
-def report(file: str, output: Path, answer: str | None, title: str | None, **costs: Any) -> None:
+def report(
+    file: str,
+    output: Path,
+    answer: str | None,
+    title: str | None,
+    robot: str | None,
+    settings: Path | None,
+    period: float | None,
+    no_advice: bool,
+    **costs: Any,
+) -> None:
     """Writes one page on a motion or a cycle: energy, savings, costs, and what they rest on.
 
-    FILE is the JSON of `POST /optimize` or of `POST /cycle`, or - for standard input. PDF needs the
-    extra `report` of the package.
+    FILE is the JSON of `POST /optimize`, of `POST /cycle`, or of `POST /evaluate` with a `log`; a
+    log as CSV, plain or packed with gzip; `{"job": ID}` with a job of the database; or - for
+    standard input. PDF needs the extra `report` of the package.
     """
     from joulepath.app.api.report.request import ReportRequest
     from joulepath.app.api.report.task import ReportTask
+    from joulepath.app.convert.recorded import log_given
+    from joulepath.app.tasks.arm_engine import Equipped
 
     format = output.suffix.removeprefix(".").lower()
     if format not in ("html", "pdf"):
         raise click.UsageError("The name of the output must end in .html or .pdf.")
-    request_id, body = new_id(), content_of(file).strip() or b"null"
-    kind = "cycle" if b'"stops"' in body else "optimize"
+    is_log = file.lower().endswith((".csv", ".csv.gz"))
+    if (robot or settings) and not is_log:
+        raise click.UsageError("--robot and --settings are for a log as CSV.")
+    request_id = new_id()
+    body = orjson.dumps({"log": FILE_ID}) if is_log else content_of(file).strip() or b"null"
     beside = {
         "format": format,
         "answer": answer,
         "title": title,
+        "period": period,
+        "advice": not no_advice,
         "costs": {name: value for name, value in costs.items() if value is not None},
     }
     # the request stays as it is written, so that its problems name its own places
-    whole = b'{"%b":%b,%b' % (kind.encode(), body, orjson.dumps(beside)[1:])
+    whole = _whole(body, orjson.dumps(beside)[1:])
     request = validated(ReportRequest, whole, request_id)
-    with terminal.progress("Loading the compiled kernel of the robot"):
-        compile_kernel_of(request.robot)
+    if request.robot is not None:
+        with terminal.progress("Loading the compiled kernel of the robot"):
+            compile_kernel_of(request.robot)
+    task: Task = ReportTask(request, request_id)
+    if is_log:
+        fields = settings_in(settings) if settings is not None else {}
+        fields |= {} if robot is None else {"robot": robot}
+        log = read_log_file(fields, Path(file), request_id)
+        task = Equipped(task, (partial(log_given, log),))
     with terminal.progress("Writing the report"):
-        result = result_of(ReportTask(request, request_id), request.deadline, request_id)
+        result = result_of(task, request.deadline, request_id)
     write(result.document, output)
+
+
+def _whole(body: bytes, beside: bytes) -> bytes:
+    """The body of `POST /report` with the request in a file."""
+    try:
+        names = set(orjson.loads(body))
+    except (orjson.JSONDecodeError, TypeError):
+        names = set()
+    if names == {"job"}:
+        return body[:-1] + b"," + beside
+    kind = "cycle" if "stops" in names else "evaluate" if "log" in names else "optimize"
+    return b'{"%b":%b,%b' % (kind.encode(), body, beside)
 
 
 @click.command(
@@ -103,22 +156,22 @@ def check(file: Path, no_answer: bool) -> int:
     answered anew. The exit code is 1 unless everything agrees.
     """
     from joulepath.app.api.report.bundle import NoReport
-    from joulepath.app.api.report.check import checked
-    from joulepath.optimizer.exceptions import DeclaredError
+    from joulepath.app.api.report.check import CheckTask
 
     request_id = new_id()
     try:
         with terminal.progress("Computing it again"):
-            found = checked(file.read_bytes(), not no_answer, request_id)
+            result = result_of(
+                CheckTask(file.read_bytes(), not no_answer, request_id), 0, request_id
+            )
     except NoReport:
         raise click.UsageError(
             f"{file} is no report of joulepath, or nothing is attached."
         ) from None
-    except DeclaredError as error:
-        raise refused(error, request_id) from None
+    lines = orjson.loads(result.document)
     rows = [
-        f"{'agrees' if line.agrees else 'DIFFERS'}  {line.what}: {line.found}"
-        for line in found.lines
+        f"{'agrees' if line['agrees'] else 'DIFFERS'}  {line['what']}: {line['found']}"
+        for line in lines
     ]
     write("\n".join(rows).encode(), None)
-    return ANSWERED if found.agrees else PROBLEM
+    return ANSWERED if all(line["agrees"] for line in lines) else PROBLEM

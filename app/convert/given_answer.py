@@ -120,6 +120,20 @@ def to_program(
     raise InvalidProblem("answer", f"{_MOTION}: it has no `trajectory`, `legs` or `samples`.")
 
 
+def arm_of(request: dict[str, Any], answer: dict[str, Any]) -> Arm:
+    """The arm of an answer; of its request, where it is too large to be repeated. Raises
+    InvalidProblem."""
+    known = answer.get("arm")
+    fields = arm_fields_of(request) if known is None else ArmRequest.model_validate(known)
+    return to_arm(fields.model_copy(update={"robot": answer["robot"]}))
+
+
+def arm_fields_of(request: dict[str, Any]) -> ArmRequest:
+    """The fields of the arm in a request."""
+    names = ArmRequest.model_fields
+    return ArmRequest.model_validate({k: value for k, value in request.items() if k in names})
+
+
 def paths_of_moves(answer: dict[str, Any]) -> list[str]:
     """The paths of the answers of a cycle's moves; empty for another answer. Raises ValidationError
     or InvalidProblem."""

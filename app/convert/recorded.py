@@ -69,12 +69,17 @@ def log_given(log: GivenLog) -> AbstractContextManager[None]:
     return at_hand(_LOG, log)
 
 
-def reading_of(id: str) -> LogReading:
+def stored_log(id: str) -> GivenLog:
     """The stored log of this id. Raises UnknownLog if the request did not bring it."""
     log = _LOG.get()
     if log is None or log.id != id:
         raise UnknownLog(id)
-    return log.reading
+    return log
+
+
+def reading_of(id: str) -> LogReading:
+    """The content of a stored log. Raises UnknownLog, see `stored_log`."""
+    return stored_log(id).reading
 
 
 def as_logged(asked: EvaluateRequest) -> EvaluateRequest:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from contextvars import ContextVar
+from dataclasses import replace
+
 import numpy as np
 
+from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.convert.scene import to_capsules
 from joulepath.app.schemas import scene as asked
@@ -12,6 +17,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.scene import Attachment
 from joulepath.optimizer.problem.tool import load_tool
+
+_SHARE: ContextVar[float] = ContextVar("share of the mass of a tool", default=1.0)
 
 
 def to_tool(tool: str | asked.Tool) -> tuple[Attachment, ...]:
@@ -32,4 +39,13 @@ def to_tcp(tcp: Pose | None, tool: str | asked.Tool | None = None) -> Array:
 
 def with_tool(tool: str | asked.Tool, part: Payload) -> Payload:
     """What the flange carries: the part, and the mass of a tool with a name. Raises UnknownTool."""
-    return load_tool(tool).carrying(part) if isinstance(tool, str) else part
+    if not isinstance(tool, str):
+        return part
+    named, share = load_tool(tool), _SHARE.get()
+    body = replace(named.body, mass=share * named.body.mass, inertia=share * named.body.inertia)
+    return replace(named, body=body).carrying(part)
+
+
+def tool_of_mass(share: float) -> AbstractContextManager[None]:
+    """Within the context, and its thread, tools with a name have this share of their mass."""
+    return at_hand(_SHARE, share)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from itertools import islice
 from typing import Annotated, Any, Literal
 
@@ -17,7 +19,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.declared import with_unit
-from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID
+from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID, TURNED
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.names import TYPOS, nearest
 from joulepath.optimizer.problem.names import is_plain
@@ -106,11 +108,13 @@ class MotionAnswer(Answer):
     )
 
 
-def by_field(*names: str, beside: str | None = None) -> Discriminator:
+def by_field(
+    *names: str, beside: str | None = None, example: Mapping[str, Any] | None = None
+) -> Discriminator:
     """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one
     field of `names`.
 
-    `beside` is a field that all members have.
+    `beside` is a field that all members have. The message of the error shows the `example`.
     """
 
     def choose(value: Any) -> str | None:
@@ -129,10 +133,11 @@ def by_field(*names: str, beside: str | None = None) -> Discriminator:
         return f"by {present[0]}" if len(present) == 1 else None
 
     also = f"{beside} and " if beside else ""
+    like = f", for example {json.dumps(example)}" if example else ""
     return Discriminator(
         choose,
         custom_error_type="exactly_one",
-        custom_error_message=f"Give an object with {also}exactly one of {', '.join(names)}",
+        custom_error_message=f"Give an object with {also}exactly one of {', '.join(names)}{like}",
     )
 
 
@@ -244,7 +249,7 @@ Pose = Annotated[
     Annotated[QuaternionPose, Tag("by quaternion")]
     | Annotated[RpyPose, Tag("by rpy")]
     | Annotated[RotvecPose, Tag("by rotvec")],
-    by_field("quaternion", "rpy", "rotvec", beside="position"),
+    by_field("quaternion", "rpy", "rotvec", beside="position", example=TURNED),
 ]
 
 Frame = Literal["base", "base_link"]
@@ -287,7 +292,7 @@ BasePose = Annotated[
     Annotated[BaseQuaternionPose, Tag("by quaternion")]
     | Annotated[BaseRpyPose, Tag("by rpy")]
     | Annotated[BaseRotvecPose, Tag("by rotvec")],
-    by_field("quaternion", "rpy", "rotvec", beside="position"),
+    by_field("quaternion", "rpy", "rotvec", beside="position", example=TURNED),
 ]
 
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])

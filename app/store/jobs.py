@@ -173,6 +173,13 @@ def results(
     return [(request, bodies.get(request.answer_id or "")) for request in found]
 
 
+def whole(session: Session, job_id: str) -> list[tuple[JobRequest, bytes | None]]:
+    """All requests of a job with their bodies and those of their answers, in order."""
+    query = select(JobRequest, Answer.body).outerjoin(Answer, Answer.id == JobRequest.answer_id)
+    query = query.where(JobRequest.job_id == job_id).order_by(JobRequest.number)
+    return [(request, body) for request, body in session.execute(query)]
+
+
 def cancel(session: Session, job_id: str, client: Client) -> None:
     """Cancels waiting requests, and asks for the end of running ones.
 

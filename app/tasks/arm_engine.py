@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
+from joulepath.app.api.report.request import MOST_ROWS
 from joulepath.app.convert.identified import Identified, identified_as
 from joulepath.app.convert.own_robots import own_robot_named, own_robot_of
 from joulepath.app.convert.recorded import GivenLog, log_given
@@ -16,6 +17,7 @@ from joulepath.app.engine.task import Task
 from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
 from joulepath.app.store import answers, figures, logs, robots
 from joulepath.app.store.store import Store
+from joulepath.app.tasks.job_document import JOBS, job_document
 from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Robot
@@ -57,7 +59,8 @@ class Equipped:
 class Needs:
     """Items of the database used by a task.
 
-    A robot by its name, figures and a log by their ids, kept answers by their ids or paths.
+    A robot by its name, figures and a log by their ids, kept answers by their ids or paths, jobs by
+    their paths.
     """
 
     robot: str | None = None
@@ -161,7 +164,10 @@ async def given_log(store: Store, id: str) -> GivenLog:
 
 
 async def _kept(store: Store, name: str) -> bytes:
-    _, body = await store.read(partial(answers.get, answer_id=name.rpartition("/")[2]))
+    path, _, id = name.rpartition("/")
+    if path == JOBS:
+        return await store.read(partial(job_document, job_id=id, most=MOST_ROWS))
+    _, body = await store.read(partial(answers.get, answer_id=id))
     return body
 
 

@@ -9,11 +9,16 @@ import io
 import json
 import re
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from joulepath.app.api.report.bundle import attached_to
+from joulepath.app.api.report.check import checked
+from joulepath.app.api.report.numbers import digits
+from joulepath.models.registry import load_robot
 from tests.app.live import Server
 from tests.browser.pages import (
     FIRST,
@@ -27,9 +32,11 @@ from tests.browser.pages import (
     until,
 )
 from tests.browsers import BROWSER, MISSING
+from tests.identification_logs import csv_of, recorded, truth_of
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
+ROBOT = load_robot("ur5e")
 PENDANT = {"start": "-420.0 280.0 300.0 0.000 3.142 0.000", "goal": "-350 -420 350 2.221 -2.221 0"}
 """Poses as a teach pendant shows them: mm, and RX RY RZ in radians."""
 RADIANS = "pose in mm and RX RY RZ in rad"
@@ -46,6 +53,15 @@ def new_cell(page: Page) -> None:
     until(page, SHOWN)
     page.locator("#project > summary").click()
     page.get_by_role("button", name="New cell").click()
+
+
+def report(page: Page, kind: Literal["html", "pdf"]) -> bytes:
+    """The report of what is shown, as a file."""
+    names = {"html": "Page (HTML)", "pdf": "PDF, to print"}
+    page.locator("#report > summary").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name=names[kind]).click()
+    return Path(download.value.path()).read_bytes()
 
 
 def optimised(page: Page) -> None:
@@ -83,7 +99,10 @@ def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, servic
         page.get_by_label("One move every so many seconds").blur()
         expect(page.locator("#costs")).to_contain_text("Waiting, motors on")
         expect(page.locator("#costs thead")).to_contain_text("4,800×")
-        expect(page.locator("#notes")).to_contain_text("a cycle is waiting")
+        notes = page.locator("#notes")
+        expect(notes).to_contain_text("a cycle is waiting")
+        expect(notes).to_contain_text(re.compile(r"brakes at rest, 0\.5 s .* J, .* % less"))
+        expect(notes.get_by_role("button", name="Use brakes")).to_be_visible()
         page.locator("#export").click()
         expect(page.locator("#preview")).to_contain_text("0.1 of its speed")
         with page.expect_download() as download:
@@ -264,6 +283,10 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
             assert float(line["p5_J"]) < energy < float(line["p95_J"])
         total = page.locator("#job-totals dd").first.inner_text()
         assert float(total.split()[0]) == pytest.approx(sum(joules), rel=0.01)
+        text = report(page, "html").decode()
+        assert "<td>bin to shelf</td>" in text and "1 of 3 moves have no answer" in text
+        assert f"<strong>{digits(sum(joules))}</strong> J" in text
+        assert report(page, "pdf").startswith(b"%PDF")
         page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()
         until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.trouble)")
         expect(page.locator("[data-row='/goal']")).to_contain_text("out of reach")
@@ -301,12 +324,27 @@ def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:
     page.get_by_label("Electricity in € per kWh").blur()
     expect(page.locator("#costs")).to_contain_text("0.31 € a kWh (yours)")
     joules = page.locator("#joules").inner_text().split()[0]
-    found = {}
-    for kind, button in (("html", "Page (HTML)"), ("pdf", "PDF, to print")):
-        page.locator("#report > summary").click()
-        with page.expect_download() as download:
-            page.get_by_role("button", name=button).click()
-        found[kind] = Path(download.value.path()).read_bytes()
-    assert found["pdf"].startswith(b"%PDF")
-    text = found["html"].decode()
-    assert joules in text and "0.31" in text
+    text = report(page, "html").decode()
+    assert joules in text and "0.31" in text and "EEA" in text
+    assert report(page, "pdf").startswith(b"%PDF")
+
+
+def test_an_engineer_compares_a_log_with_what_was_predicted(
+    browser: Browser, service: Server, tmp_path: Path
+) -> None:
+    """Joules of each move, measured beside predicted, on the page and in a report that checks."""
+    file = tmp_path / "monday.csv"
+    file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3)))
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        go(page, "Logs")
+        page.locator("#log-file").set_input_files(file)
+        page.locator("#add-log").click()
+        whole = page.locator("#measured tr.total td")
+        expect(whole.last).to_contain_text("%")
+        measured = float(whole.nth(2).inner_text().replace(",", ""))
+        page_of_log = report(page, "html")
+        assert "<h1>monday.csv</h1>" in page_of_log.decode()
+        drawn = attached_to(page_of_log).answer["total"]["measured"]["electrical"]
+        assert measured == pytest.approx(drawn, rel=0.01)
+        assert checked(page_of_log, True, "test").agrees

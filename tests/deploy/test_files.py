@@ -189,6 +189,6 @@ def test_systemd_takes_the_unit(tmp_path: Path) -> None:
 
 
 def test_the_page_says_which_settings_there_are() -> None:
-    page = (ROOT / "docs" / "settings.md").read_text()
+    page = (ROOT / "docs" / "reference" / "settings.md").read_text()
     missing = [name for name in KNOWN if name.startswith("JOULEPATH_") and f"`{name}`" not in page]
     assert missing == []

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.report import Assumption
+from joulepath.app.api.report.rivals import listed
+from joulepath.models.robot import Robot
 from joulepath.models.tools.registry import tool_figures
 from joulepath.models.trust import figures_by_letter, worst_letter
-from joulepath.optimizer.export.program import Program
 
+Json = dict[str, Any]
 YOURS = "Y"
 NOT_COUNTED = "–"
 _LETTERS = {
@@ -38,42 +39,60 @@ _WORDS = {
     "rotor_inertia": "the rotors",
 }
 _LARGE = 0.9
+_MOST_MASSES = 5
 
 
-def assumptions(bundle: Bundle, program: Program) -> tuple[Assumption, ...]:
-    """Figures of the robot by letter, of the tool, given numbers, and missing numbers."""
-    return (*_of_robot(bundle, program), *_of_request(bundle, program), *_of_costs(bundle))
+def assumptions(
+    request: Json,
+    costs: Json | None,
+    robot: Robot,
+    masses: Sequence[float],
+    payload_from: str = "yours",
+) -> tuple[Assumption, ...]:
+    """Figures of the robot by letter, of the tool, given numbers, and missing numbers.
+
+    Args:
+        request: a request with figures and tool.
+        costs: the numbers for costs; None if nothing is priced.
+        robot: the robot.
+        masses: what the flange carries in the motions [kg].
+        payload_from: who says so.
+    """
+    priced = () if costs is None else _of_costs(costs)
+    return (*_of_robot(request, robot), *_of_request(request, masses, payload_from), *priced)
 
 
-def _of_robot(bundle: Bundle, program: Program) -> Iterator[Assumption]:
-    identified = bundle.request.get("figures") is not None
-    for letter, names in figures_by_letter(program.robot.figures).items():
+def _of_robot(request: Json, robot: Robot) -> Iterator[Assumption]:
+    identified = request.get("figures") is not None
+    for letter, names in figures_by_letter(robot.figures).items():
         source = "your own arm" if letter == "B" and identified else _LETTERS[letter]
         yield Assumption(letter, _sentence(names), source)
 
 
-def _of_request(bundle: Bundle, program: Program) -> Iterator[Assumption]:
-    tool = bundle.request.get("tool")
+def _of_request(request: Json, masses: Sequence[float], payload_from: str) -> Iterator[Assumption]:
+    tool = request.get("tool")
     if isinstance(tool, str):
         figures = tool_figures(tool)
         mass = figures["mass"]
         letter = worst_letter({name: figures[name] for name in ("mass", "center_of_mass")})
         yield Assumption(letter, f"Tool {figures['title']}, {mass['value']:g} kg", _LETTERS[letter])
-    masses = sorted({round(move.arm.payload.mass, 3) for move in program.moves} - {0.0})
-    loads = ", ".join(f"{mass:g}" for mass in masses)
+    different = sorted({round(mass, 3) for mass in masses} - {0.0})
+    loads = ", ".join(f"{mass:g}" for mass in different[:_MOST_MASSES])
+    if len(different) > _MOST_MASSES:
+        loads = f"{different[0]:g} to {different[-1]:g}"
     with_tool = ", tool included" if isinstance(tool, str) else ""
-    yield Assumption(YOURS, f"Payload {loads} kg{with_tool}" if masses else "No payload", "yours")
+    words = f"Payload {loads} kg{with_tool}" if different else "No payload"
+    yield Assumption(YOURS, words, payload_from)
 
 
-def _of_costs(bundle: Bundle) -> Iterator[Assumption]:
-    costs = bundle.costs
+def _of_costs(costs: Json) -> Iterator[Assumption]:
     if costs.get("cycles_per_shift") is None:
         yield Assumption(YOURS, "One directly after the other, for 8 h a shift", "assumed")
     for name, words in _SOURCES.items():
         given = costs.get(name)
         if given is not None:
             text = words.format(f"{given['value']:g}", currency=costs.get("currency") or "€")
-            yield Assumption(YOURS, text, given["source"])
+            yield Assumption(given.get("letter") or YOURS, text, given["source"])
     if costs.get("control_box") is None:
         yield Assumption(NOT_COUNTED, "Control box, mains loss", "not counted: no reading")
 
@@ -93,8 +112,7 @@ def interval_note(interval: dict[str, Any] | None) -> str:
         names.append(_WORDS.get(name, name.replace("_", " ")))
         if made >= _LARGE:
             break
-    *first, last = names
-    words = f"{', '.join(first)} and {last}" if first else last
+    words = listed(names)
     return (
         f"{words[:1].upper()}{words[1:]} make {made:.0%} of the interval. ".replace("%", " %")
         + "A log of this arm replaces them."

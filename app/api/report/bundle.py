@@ -7,11 +7,13 @@ import re
 import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from datetime import date
 from typing import Any
 
 import orjson
 
 from joulepath.app.api.report.request import Kind
+from joulepath.models.robot import Robot
 
 NAME = "joulepath-report.json"
 """Name of the attachment."""
@@ -19,6 +21,7 @@ MARK = "joulepath_report"
 """Field identifying the document."""
 MOST_BYTES = 1 << 28
 """Largest unpacked document [byte]."""
+COMPUTED = "Computed, not measured. Never run on hardware by us."
 _SCRIPT = re.compile(rb'<script type="application/json" id="%s">([^<]*)</script>' % MARK.encode())
 _STREAM = re.compile(rb"stream\r?\n")
 
@@ -28,7 +31,9 @@ class Bundle:
     """The documents of a report.
 
     `answer` is the answer to the `request` to the endpoint `kind`; `moves` are the answers of the
-    moves of a cycle, in order.
+    moves of a cycle, in order. Of a job, `answer` has its sums and `moves` its rows, see
+    `job_rows`. `log` is the log of a request to `POST /evaluate`: its settings, and its packed file
+    in Base64.
     """
 
     kind: Kind
@@ -41,6 +46,11 @@ class Bundle:
     """Date of the report, as YYYY-MM-DD."""
     version: str
     """Version of the service."""
+    log: dict[str, Any] | None = None
+    period: float | None = None
+    """Time from one start of a motion or a cycle to the next [s]; None: its own."""
+    advised: dict[str, Any] | None = None
+    """Of a motion or a cycle, the energy of its wait and changes: see `AdviceAnswer`."""
 
     def packed(self) -> bytes:
         """The document."""
@@ -50,6 +60,30 @@ class Bundle:
     def motions(self) -> list[dict[str, Any]]:
         """The answers of `POST /optimize` in it."""
         return self.moves if self.kind == "cycle" else [self.answer]
+
+    @property
+    def what(self) -> str:
+        """The subject of the report in one word."""
+        return {"optimize": "motion", "cycle": "cycle", "job": "round", "evaluate": "log"}[
+            self.kind
+        ]
+
+    def subtitle(self, robot: Robot) -> str:
+        """Day and robot."""
+        made = date.fromisoformat(self.made)
+        return f"Energy report · {made:%-d %B %Y} · {robot.figures['title']}"
+
+    def how_to_check(self, id: str | None) -> str:
+        """How to check the report, with the id of its answer."""
+        again = {
+            "job": "certifies every motion again and answers every request anew",
+            "evaluate": "reads the log again and computes its motion anew",
+        }.get(self.kind, "certifies every motion again and answers the request anew")
+        own = f" Answer {id}." if id else ""
+        return (
+            "Request and answer are attached to this file. `joulepath check FILE` takes them out, "
+            f"{again}.{own}"
+        )
 
 
 class NoReport(Exception):

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+import base64
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import orjson
 
+from joulepath.app.api.advice.answered import answered
+from joulepath.app.api.advice.request import AnsweredRequest
+from joulepath.app.api.advice.task import advised
 from joulepath.app.api.report.build import report_of
 from joulepath.app.api.report.bundle import Bundle, attached_to
+from joulepath.app.api.report.job_rows import answered as answered_rows
+from joulepath.app.api.report.job_rows import summed
 from joulepath.app.api.report.page import page
-from joulepath.app.api.report.request import ReportRequest
-from joulepath.app.api.report.task import answer_of, program_of
+from joulepath.app.api.report.programs import program_of, program_of_motion
+from joulepath.app.api.report.request import JOB_DEADLINE
+from joulepath.app.api.report.task import evaluation_of
+from joulepath.app.convert.recorded import GivenLog, log_given
+from joulepath.app.engine.result import TaskResult
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.export.certified import certified
+from joulepath.optimizer.export.program import Move
+from joulepath.optimizer.result.energy import ENERGY_PARTS
 
+Json = dict[str, Any]
 ENERGY_TOLERANCE = 1e-3
 """Relative difference of an energy and the same one computed from its motion."""
 ANSWER_TOLERANCE = 5e-3
@@ -42,61 +59,143 @@ class Checked:
         return all(line.agrees for line in self.lines)
 
 
+@dataclass(frozen=True)
+class CheckTask:
+    """A report in HTML or PDF; with `again`, its requests are answered anew."""
+
+    file: bytes
+    again: bool
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The lines as JSON, see `checked`. `deadline` is not watched: each request has its own."""
+        found = checked(self.file, self.again, self.request_id)
+        return TaskResult.of_json([vars(line) for line in found.lines])
+
+
 def checked(file: bytes, again: bool, request_id: str) -> Checked:
-    """The checks of a report in HTML or PDF; with `again`, the request is answered anew.
+    """The checks of a report in HTML or PDF; with `again`, the requests are answered anew.
 
     Raises NoReport, NotCertified, and the errors of answering.
     """
     bundle = attached_to(file)
-    lines = [*_motions(bundle), _sum(bundle)]
+    lines = [*_motions(bundle), *_sums(bundle)]
     if not file.startswith(b"%PDF"):
-        same = page(report_of(bundle, program_of(bundle)), bundle) == file
+        same = page(report_of(bundle), bundle) == file
         words = "is what its documents give" if same else "is not what its documents give"
         lines.append(Line("page", words, same))
     if again:
-        lines.append(_again(bundle, request_id))
+        lines += _again(bundle, request_id)
     return Checked(tuple(lines))
 
 
 def _motions(bundle: Bundle) -> list[Line]:
     """The certificates and the energies of all moves, from their splines alone."""
-    program = program_of(bundle)
-    certified(program)
+    moves = list[tuple[str, Move, Json]]()
+    if bundle.kind == "job":
+        for row in answered_rows(bundle.moves):
+            if "trajectory" in row["answer"]:
+                program = program_of_motion(row["request"], row["answer"])
+                certified(program)
+                moves.append((f"no. {row['index'] + 1}", program.moves[0], row["answer"]))
+    elif bundle.kind != "evaluate":
+        program = program_of(bundle)
+        certified(program)
+        moves = [
+            (move.label, move, answer)
+            for move, answer in zip(program.moves, bundle.motions, strict=True)
+        ]
     lines = list[Line]()
-    for move, answer in zip(program.moves, bundle.motions, strict=True):
+    for label, move, answer in moves:
         electrical = answer["energy"]["electrical"]
         stated = electrical["total"] - electrical["dwell"]
         found = Plant(move.arm).energy(move.spline).electrical.total
-        lines.append(_line(f"energy of {move.label}", stated, found, ENERGY_TOLERANCE))
-    return [Line("limits", f"{len(lines)} motions certified again", True), *lines]
+        lines.append(_line(f"energy of {label}", stated, found, ENERGY_TOLERANCE))
+    return [Line("limits", f"{len(lines)} motions certified again", True), *lines] if lines else []
 
 
-def _sum(bundle: Bundle) -> Line:
-    """Totals of the cycle, its legs and their answers agree."""
+def _sums(bundle: Bundle) -> Iterator[Line]:
+    """Totals agree with their parts, legs, rows or segments."""
+    if bundle.kind == "evaluate":
+        total, segments = bundle.answer["total"], bundle.answer["segments"]
+        if segments:
+            yield _sum("segments", _electrical(total), map(_electrical, segments), ENERGY_TOLERANCE)
+        return
     total = bundle.answer["energy"]["electrical"]["total"]
     if bundle.kind == "optimize":
         parts = bundle.answer["energy"]["electrical"]
-        names = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking")
-        signed = sum(parts[name] for name in (*names, "storage_loss", "dwell"))
-        return _line("sum of the parts", total, signed - parts["recovered"], ENERGY_TOLERANCE)
-    return _line(
-        "sum of the legs",
-        total,
-        sum(leg["electrical"] for leg in bundle.answer["legs"]),
-        ROUNDING,
-    )
+        yield _sum("parts", total, (parts[name] for name in ENERGY_PARTS), ENERGY_TOLERANCE)
+    elif bundle.kind == "cycle":
+        yield _sum("legs", total, (leg["electrical"] for leg in bundle.answer["legs"]), ROUNDING)
+    else:
+        own = summed(bundle.moves)["energy"]["electrical"]["total"]
+        yield _line("sum of the rows", total, own, ROUNDING)
 
 
-def _again(bundle: Bundle, request_id: str) -> Line:
-    """The request, answered anew."""
-    asked = ReportRequest.model_validate_json(orjson.dumps({bundle.kind: bundle.request}))
-    result = answer_of(asked, request_id, asked.deadline)
-    objective = bundle.answer["objective"]
-    stated, found = (
-        each["energy"][objective]["total"]
-        for each in (bundle.answer, orjson.loads(result.document))
-    )
-    return _line("request answered anew", stated, found, ANSWER_TOLERANCE)
+def _electrical(part: Json) -> float:
+    return float(part["energy"]["electrical"]["total"])
+
+
+def _again(bundle: Bundle, request_id: str) -> Iterator[Line]:
+    """The requests, answered anew."""
+    if bundle.kind == "job":
+        for row in answered_rows(bundle.moves):
+            what = f"no. {row['index'] + 1} answered anew"
+            yield _anew(row["kind"], row["request"], row["answer"], request_id, what)
+    elif bundle.kind != "evaluate":
+        what = "request answered anew"
+        yield _anew(bundle.kind, bundle.request, bundle.answer, request_id, what)
+        yield from _advised_anew(bundle)
+    else:
+        yield from _read_again(bundle, request_id)
+
+
+def _read_again(bundle: Bundle, request_id: str) -> Iterator[Line]:
+    """The log, read and evaluated anew."""
+    asked = EvaluateRequest.model_validate_json(orjson.dumps(bundle.request))
+    if bundle.log is None:
+        found = evaluation_of(asked, request_id, JOB_DEADLINE)
+    else:
+        body = base64.b64decode(bundle.log["body"])
+        with log_given(GivenLog(bundle.request["log"], bundle.log["settings"], body)):
+            found = evaluation_of(asked, request_id, JOB_DEADLINE)
+    for name in ("predicted", "electrical", "by_efforts"):
+        stated, own = (
+            _electrical(each["total"])
+            if name == "predicted"
+            else (each["total"]["measured"] or {}).get(name)
+            for each in (bundle.answer, found)
+        )
+        if stated is not None and own is not None:
+            words = {"electrical": "measured by power", "by_efforts": "measured by efforts"}
+            yield _line(f"{words.get(name, name)}, anew", stated, own, ENERGY_TOLERANCE)
+
+
+def _anew(kind: str, request: Json, answer: Json, request_id: str, what: str) -> Line:
+    asked = AnsweredRequest.model_validate_json(orjson.dumps({kind: request}))
+    assert asked.task is not None
+    found, _ = answered(asked, request_id, asked.task.deadline)
+    objective = answer["objective"]
+    stated, own = (each["energy"][objective]["total"] for each in (answer, found))
+    return _line(what, stated, own, ANSWER_TOLERANCE)
+
+
+def _advised_anew(bundle: Bundle) -> Iterator[Line]:
+    """The changes, computed anew."""
+    known = bundle.advised
+    if known is None or not known["advice"]:
+        return
+    task = AnsweredRequest.model_validate_json(orjson.dumps({bundle.kind: bundle.request})).task
+    assert task is not None
+    found = advised(task, bundle.answer, bundle.moves, bundle.period, NEVER)
+    energies = {each.name: each.energy for each in found.advice}
+    for each in known["advice"]:
+        own = energies.get(each["name"], math.nan)
+        yield _line(f"{each['name']}, anew", each["energy"], own, ANSWER_TOLERANCE)
+
+
+def _sum(what: str, stated: float, parts: Any, tolerance: float) -> Line:
+    return _line(f"sum of the {what}", stated, sum(parts), tolerance)
 
 
 def _line(what: str, stated: float, found: float, tolerance: float) -> Line:

@@ -6,11 +6,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from joulepath.app.api.report.bundle import Bundle
-from joulepath.app.api.report.numbers import JOULES_PER_KWH, digits, down, up
-from joulepath.app.api.report.report import Cost, Fact
+from joulepath.app.api.report.numbers import JOULES_PER_KWH, digits, down, percent, up
+from joulepath.app.api.report.report import Change, Cost, Fact
 
 SHIFT = 8 * 3600.0
 """Length of a shift filled with cycles [s], without a given number."""
+_CHANGES = {
+    "whole_cycle": "Move over the whole time, without a wait",
+    "brakes": "Brakes at rest, 0.5 s after standstill",
+    "without_home": "Leave out the way home",
+    "shorter_stops": "Every stop 0.1 s shorter",
+    "lighter_tool": "A tool of half the mass",
+}
 
 
 @dataclass(frozen=True)
@@ -18,7 +25,7 @@ class Money:
     """Given numbers for the conversion of joules into costs, or None."""
 
     energy: float
-    """Of a cycle [J], the control box included if it is counted."""
+    """Of a cycle [J], with its wait, and with the control box if it is counted."""
     likely: tuple[float, float] | None
     """5th and 95th percentile of it [J]."""
     cycles: float
@@ -31,18 +38,27 @@ class Money:
     carbon: float | None
     box: float | None
 
+    def in_words(self, joules: float) -> str:
+        """An energy as kilowatt-hours, and as money where its price is given."""
+        kwh = joules / JOULES_PER_KWH
+        money = "" if self.price is None else f" ({digits(kwh * self.price, 2)} {self.currency})"
+        return f"{digits(kwh)} kWh{money}"
+
     @classmethod
     def of(cls, bundle: Bundle) -> Money:
         """The numbers of a report."""
         costs, answer = bundle.costs, bundle.answer
         electrical, box = answer["energy"]["electrical"], _value(costs, "control_box")
         length = cycle_time(bundle)
-        more = (box or 0.0) * length
+        more = (box or 0.0) * length + waiting(bundle)
         known = electrical.get("interval")
         cycles = _value(costs, "cycles_per_shift")
         return cls(
             energy=electrical["total"] + more,
-            likely=None if known is None else (known["p5"] + more, known["p95"] + more),
+            # how well a wait is known is not computed
+            likely=None
+            if known is None or waiting(bundle)
+            else (known["p5"] + more, known["p95"] + more),
             cycles=SHIFT / length if cycles is None else cycles,
             filled=cycles is None,
             shifts=_value(costs, "shifts_per_year"),
@@ -54,23 +70,29 @@ class Money:
 
 
 def cycle_time(bundle: Bundle) -> float:
-    """Time [s] from one start to the next: the dwell's, or the duration."""
+    """Time [s] from one start to the next: the dwell's, the period, or the duration."""
     dwell = (bundle.request.get("dwell") or {}).get("time")
-    return max(float(bundle.answer["duration"]), float(dwell or 0.0))
+    period = bundle.period if waiting(bundle) else None
+    return max(float(bundle.answer["duration"]), float(dwell or period or 0.0))
+
+
+def waiting(bundle: Bundle) -> float:
+    """Energy [J] of the wait until the end of the period."""
+    return float((bundle.advised or {}).get("waiting", 0.0))
 
 
 def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
     """The leading figures: one cycle, a shift, a year, money."""
-    word = "cycle" if bundle.kind == "cycle" else "motion"
+    word = bundle.what
     known = bundle.answer["energy"]["electrical"].get("interval")
     likely = "" if known is None else f", likely {down(known['p5'])} to {up(known['p95'])}"
     total = bundle.answer["energy"]["electrical"]["total"]
     found = [
-        Fact(digits(total), "J", f"a {word}{likely}"),
+        Fact(digits(total), "J", f"a {word}{likely}{_with_wait(bundle)}"),
         Fact(
             digits(_kwh(money, money.cycles), 2),
             "kWh",
-            f"a shift of {'8 h, ' if money.filled else ''}{digits(money.cycles, 4)} {word}s",
+            f"a shift of {'8 h, ' if money.filled else ''}{round(money.cycles):,} {word}s",
         ),
     ]
     if money.shifts is None:
@@ -96,9 +118,44 @@ def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
     return tuple(found)
 
 
+def _with_wait(bundle: Bundle) -> str:
+    more = waiting(bundle)
+    return f", and {digits(more)} J of waiting" if more else ""
+
+
+def advice_table(bundle: Bundle, money: Money) -> tuple[Change, ...]:
+    """A row for each change that needs less."""
+    given = (bundle.advised or {}).get("advice", ())
+    yearly = None if money.shifts is None else money.cycles * money.shifts / JOULES_PER_KWH
+    return tuple(
+        Change(
+            _CHANGES[each["name"]],
+            f"{digits(each['energy'])} J",
+            f"saves {percent(each['share'])}",
+            ""
+            if yearly is None
+            else f"{digits(each['saving'] * yearly * money.price, 2)} {money.currency} a year"
+            if money.price is not None
+            else f"{digits(each['saving'] * yearly, 2)} kWh a year",
+        )
+        for each in given
+    )
+
+
+def advice_note(bundle: Bundle) -> str:
+    """How the changes were computed."""
+    word = bundle.what
+    if waiting(bundle):
+        over = f"All are optimised over {digits(cycle_time(bundle))} s, and "
+        beside = f"compared with the {word} that is: each change is counted once."
+    else:
+        over, beside = "", f"compared with this {word}, for as many {word}s a year."
+    return f"Each change by itself: computed, not estimated. {over}{beside}"
+
+
 def cost_table(bundle: Bundle, money: Money) -> tuple[Cost, ...]:
     """A row for a cycle, a shift, and a year if its shifts are given."""
-    word = "cycle" if bundle.kind == "cycle" else "motion"
+    word = bundle.what
     rows = [(f"1,000 {word}s", 1000.0), ("a shift", money.cycles)]
     if money.shifts is not None:
         rows.append(("a year", money.cycles * money.shifts))

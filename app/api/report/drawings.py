@@ -1,7 +1,8 @@
-"""The course of a motion or a cycle as SVG: its legs, and power over time."""
+"""Drawings of a report as SVG: power over time with the legs of a cycle, and energies of moves."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import escape
@@ -35,13 +36,37 @@ class DrawingSettings:
     """Colour of moves with a payload."""
     empty: str = "#e6f2ee"
     """Colour of moves without a payload."""
+    bar: str = "#8fc4b2"
+    """Colour of the energy of a move."""
     rest: str = "#c3cbd3"
     """Colour of rests."""
 
 
 DRAWING = DrawingSettings()
 _MOST_POINTS = 600
-_TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+_MOST_BARS, _MOST_LABELS = 1000, 25
+_TICKS = (
+    0.05,
+    0.1,
+    0.2,
+    0.5,
+    1,
+    2,
+    5,
+    10,
+    20,
+    50,
+    100,
+    200,
+    500,
+    1000,
+    2000,
+    5000,
+    1e4,
+    2e4,
+    5e4,
+    1e5,
+)
 
 
 @dataclass(frozen=True)
@@ -75,11 +100,65 @@ class Course:
     stops: Sequence[Stop] = ()
 
 
+@dataclass(frozen=True)
+class Bar:
+    """The energy of a move [J], the ends of its interval, and its measured energy."""
+
+    name: str
+    energy: float
+    ends: tuple[float, float] | None = None
+    dot: float | None = None
+
+
+def drawn_bars(bars: Sequence[Bar]) -> str:
+    """The energies of moves, side by side; empty without a move, or with too many of them."""
+    if not 0 < len(bars) <= _MOST_BARS:
+        return ""
+    low, high = DRAWING.legs + 30.0, 10.0
+    known = [value for bar in bars for value in (bar.energy, bar.dot, *(bar.ends or ()))]
+    most: float = max(value for value in known if value is not None)
+    step = (DRAWING.width - DRAWING.left - DRAWING.right) / len(bars)
+
+    def y(energy: float) -> float:
+        return low - (low - high) * max(energy, 0.0) / most
+
+    tick = _tick(most / 5)
+    levels = [k * tick for k in range(int(most / tick) + 1)]
+    parts = [*_grid([(level, y(level)) for level in levels], "J")]
+    every = max(math.ceil(len(bars) / _MOST_LABELS), 1)
+    for k, bar in enumerate(bars):
+        middle, half = DRAWING.left + (k + 0.5) * step, 0.5 * step
+        parts.append(
+            f'<rect x="{middle - 0.72 * half:.1f}" y="{y(bar.energy):.1f}" '
+            f'width="{1.44 * half:.1f}" height="{low - y(bar.energy):.1f}" '
+            f'fill="{DRAWING.bar}"/>'
+        )
+        if bar.ends is not None:
+            down, up = map(y, bar.ends)
+            parts.append(
+                f'<path d="M{middle:.1f} {down:.1f}V{up:.1f}" stroke="{DRAWING.grey}" '
+                f'stroke-width="{min(1.6, half):.1f}"/>'
+            )
+        if bar.dot is not None:
+            size = min(4.5, max(half, 1.5))
+            parts.append(
+                f'<circle cx="{middle:.1f}" cy="{y(bar.dot):.1f}" r="{size:.1f}" '
+                f'fill="{DRAWING.ink}" stroke="#fff"/>'
+            )
+        if k % every == 0:
+            parts.append(_text(middle, low + 17, bar.name, DRAWING.grey, "middle"))
+    return _document(low + DRAWING.foot, parts)
+
+
 def drawn(course: Course) -> str:
     """The course, with a row of legs above the power if there is more than one."""
     top = DRAWING.legs if len(course.legs) > 1 else 8.0
     height = top + DRAWING.power + DRAWING.foot
     parts = [*(_legs(course) if len(course.legs) > 1 else ()), *_power(course, top)]
+    return _document(height, parts)
+
+
+def _document(height: float, parts: Sequence[str]) -> str:
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {DRAWING.width:g} {height:g}" '
         f'font-family="Inter, DejaVu Sans, sans-serif" font-size="12.5">{"".join(parts)}</svg>'
@@ -150,13 +229,13 @@ def _power(course: Course, top: float) -> Iterator[str]:
         yield _text(x, low + 17, text, DRAWING.grey, anchor)
 
 
-def _grid(levels: Sequence[tuple[float, float]]) -> Iterator[str]:
-    """Horizontal lines with their powers [W]."""
+def _grid(levels: Sequence[tuple[float, float]], name: str = "W") -> Iterator[str]:
+    """Horizontal lines with their values, in the unit `name`."""
     end = DRAWING.width - DRAWING.right
     for level, y in levels:
         yield f'<path d="M{DRAWING.left} {y:.1f}H{end}" stroke="{DRAWING.line}"/>'
-        unit = " W" if level and level == levels[-1][0] else ""
-        yield _text(DRAWING.left - 7, y + 4.3, f"{level:g}{unit}", DRAWING.grey, "end")
+        unit = f" {name}" if level and level == levels[-1][0] else ""
+        yield _text(DRAWING.left - 7, y + 4.3, f"{level:,g}{unit}", DRAWING.grey, "end")
 
 
 def _tick(least: float) -> float:

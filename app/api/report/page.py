@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Iterable
 from importlib.resources import files
 from string import Template
 
 from joulepath.app.api.report.bundle import Bundle, in_html
-from joulepath.app.api.report.report import Assumption, Cost, Fact, Part, Report, Rival
+from joulepath.app.api.report.report import (
+    Assumption,
+    Change,
+    Cost,
+    Fact,
+    Part,
+    Report,
+    Rival,
+    Table,
+)
 
 MEDIA_TYPE = "text/html; charset=utf-8"
 _STRONG = re.compile(r"\*([^*]+)\*")
@@ -25,24 +35,82 @@ def page(report: Report, bundle: Bundle) -> bytes:
         subtitle=escape(report.subtitle),
         lead=" ".join(_rich(each) for each in report.lead),
         facts="".join(map(_fact, report.facts)),
-        picture=report.picture,
-        caption=_rich(report.caption),
-        rivals="".join(map(_rival, report.rivals)),
-        rivals_note=_rich(report.rivals_note),
-        parts="".join(map(_part, report.parts)),
-        course_title=escape(report.course_title),
-        course_note=_rich(report.course_note),
-        course=report.course,
-        costs="".join(map(_cost, report.costs)),
-        currency=escape(report.currency),
-        costs_note=_rich(report.costs_note),
-        proven=_rich(report.proven),
-        check=_rich(report.check),
-        assumptions="".join(map(_assumption, report.assumptions)),
-        assumptions_note=_rich(report.assumptions_note),
+        figure=_figure(report),
+        rivals=_section(report.rivals_title, _rows(map(_rival, report.rivals)), report.rivals_note),
+        parts=_section("Where the energy goes", _rows(map(_part, report.parts))),
+        course=_course(report),
+        costs=_costs(report),
+        changes=_section(
+            "What would need less",
+            _rows(map(_change, report.changes)) if report.changes else "",
+            report.changes_note,
+        ),
+        proven=_section(report.proven_title, f"<p>{_rich(report.proven)}</p>"),
+        check=_section("Check it yourself", f"<p>{_rich(report.check)}</p>"),
+        assumptions=_section(
+            "What it rests on",
+            f"<table>{''.join(map(_assumption, report.assumptions))}</table>",
+            report.assumptions_note,
+        ),
+        table="" if report.table is None else _table(report.table),
         foot=escape(report.foot),
         attached=in_html(bundle.packed()),
     ).encode()
+
+
+def _section(title: str, content: str, note: str = "") -> str:
+    """A part of the page; without content, none."""
+    if not content:
+        return ""
+    below = f'<p class="note">{_rich(note)}</p>' if note else ""
+    return f"<h2>{escape(title)}</h2>{content}{below}"
+
+
+def _rows(rows: Iterable[str]) -> str:
+    return f'<table class="tight">{"".join(rows)}</table>'
+
+
+def _figure(report: Report) -> str:
+    if not report.picture:
+        return ""
+    caption = f"<figcaption>{_rich(report.caption)}</figcaption>"
+    return f'<figure aria-label="The cell">{report.picture}{caption}</figure>'
+
+
+def _course(report: Report) -> str:
+    if not report.course:
+        return ""
+    head = f"<h2>{escape(report.course_title)}</h2>"
+    note = f'<p class="note">{_rich(report.course_note)}</p>'
+    return f'<section class="course">{head}{note}{report.course}</section>'
+
+
+def _costs(report: Report) -> str:
+    if not report.costs:
+        return ""
+    cells = "".join(f"<td>{escape(each)}</td>" for each in ("", "kWh", report.currency, "kg CO2e"))
+    rows = "".join(map(_cost, report.costs))
+    table = f"<table><thead><tr>{cells}</tr></thead><tbody>{rows}</tbody></table>"
+    return _section("What it costs", table, report.costs_note)
+
+
+def _table(table: Table) -> str:
+    head = "".join(f'<th scope="col">{escape(each)}</th>' for each in table.head)
+    rows = "".join(f"<tr>{_cells(table, row)}</tr>" for row in table.rows)
+    whole = f'<table class="rows"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+    scroll = f'<div class="scroll" role="region" aria-label="Table" tabindex="0">{whole}</div>'
+    content = _section(table.title, scroll, table.note)
+    return f'<section class="table words{table.words}">{content}</section>'
+
+
+def _cells(table: Table, row: tuple[str, ...]) -> str:
+    """The cells of a row; the last one is a remark if there are fewer than in the head."""
+    *cells, last = row
+    left = len(table.head) - len(cells)
+    remark = f' colspan="{left}" class="remark"' if left > 1 else ""
+    return "".join(f"<td>{escape(each)}</td>" for each in cells) + (
+        f"<td{remark}>{escape(last)}</td>"
+    )
 
 
 def escape(text: str, quote: bool = True) -> str:
@@ -82,6 +150,11 @@ def _part(part: Part) -> str:
 def _cost(cost: Cost) -> str:
     cells = "".join(f"<td>{escape(each)}</td>" for each in (cost.energy, cost.money, cost.carbon))
     return f'<tr><th scope="row">{escape(cost.period)}</th>{cells}</tr>'
+
+
+def _change(each: Change) -> str:
+    cells = "".join(f"<td>{escape(cell)}</td>" for cell in (each.energy, each.saving, each.yearly))
+    return f'<tr class="claimed"><th scope="row">{escape(each.what)}</th>{cells}</tr>'
 
 
 def _assumption(each: Assumption) -> str:

@@ -1,4 +1,4 @@
-"""The content of a report as data, for templates of the layout."""
+"""The content of a report as data, for the templates of HTML and PDF."""
 
 from __future__ import annotations
 
@@ -50,6 +50,16 @@ class Cost:
 
 
 @dataclass(frozen=True)
+class Change:
+    """A change that needs less: its energy, its saving, and the saving of a year or nothing."""
+
+    what: str
+    energy: str
+    saving: str
+    yearly: str
+
+
+@dataclass(frozen=True)
 class Assumption:
     """An assumption with its trust letter."""
 
@@ -60,8 +70,21 @@ class Assumption:
 
 
 @dataclass(frozen=True)
+class Table:
+    """A table behind the first page. The first `words` columns are aligned to the left; a row of
+    fewer cells ends with a remark over the rest of its width."""
+
+    title: str
+    note: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int
+
+
+@dataclass(frozen=True)
 class Report:
-    """One page on a motion or a cycle."""
+    """A page on a motion or a cycle, or a page and a table on a job or a log. Empty parts are left
+    out."""
 
     title: str
     subtitle: str
@@ -72,18 +95,23 @@ class Report:
     picture: str
     """The cell, as SVG."""
     caption: str
+    rivals_title: str
     rivals: tuple[Rival, ...]
     rivals_note: str
     parts: tuple[Part, ...]
     course_title: str
     course_note: str
     course: str
-    """Power over time, and the legs of a cycle, as SVG."""
+    """As SVG: power over time, with the legs of a cycle; or the energies of moves."""
     costs: tuple[Cost, ...]
     currency: str
     costs_note: str
+    proven_title: str
     proven: str
     check: str
     assumptions: tuple[Assumption, ...]
     assumptions_note: str
     foot: str
+    changes: tuple[Change, ...] = ()
+    changes_note: str = ""
+    table: Table | None = None

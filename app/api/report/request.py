@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.advice.request import AnsweredRequest
 from joulepath.app.schemas.common import NO_CONTROLS, Request, described
-from joulepath.app.schemas.examples.values import ANSWER_ID, OPTIMIZE
-from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.examples.values import JOB_ID, LOG_ID
+from joulepath.app.schemas.lengths import LENGTHS
+
+MOST_ROWS = 2000
+"""Largest job of a report: its motions are in the file."""
+JOB_DEADLINE = 60.0
+"""Wall time of the report of a job or a log [s]."""
 
 Text = Annotated[str, Field(min_length=1, max_length=120, pattern=NO_CONTROLS)]
 Format = Literal["html", "pdf"]
-Kind = Literal["optimize", "cycle"]
+Kind = Literal["optimize", "cycle", "job", "evaluate"]
 
 
 class Sourced(Request):
@@ -27,6 +33,9 @@ class Sourced(Request):
         "yours",
         default="yours",
     )
+    letter: Literal["A", "B", "C", "E", "Y"] = described(
+        "Trust letter of the source: `C` is second-hand; `Y` is yours.", None, "Y", default="Y"
+    )
 
 
 class Costs(Request):
@@ -34,7 +43,8 @@ class Costs(Request):
     only."""
 
     cycles_per_shift: Sourced | None = described(
-        "Motions or cycles per shift. Null: one directly after the other, for 8 hours.",
+        "Motions or cycles per shift. Null: one each `period` or directly after the other, for 8 "
+        "hours.",
         None,
         {"value": 2400, "source": "line plan"},
         default=None,
@@ -67,23 +77,27 @@ class Costs(Request):
     )
 
 
-class ReportRequest(Request):
-    """A motion or a cycle, as exactly one of `optimize` and `cycle`, and the numbers for costs."""
+class ReportRequest(AnsweredRequest):
+    """A motion or a cycle, as exactly one of `optimize` and `cycle`; or a `job`; or a log, as
+    `evaluate`. With the numbers for costs."""
 
-    optimize: OptimizeRequest | None = described(
-        "A body of `POST /optimize`.", None, OPTIMIZE, default=None
-    )
-    cycle: CycleRequest | None = described(
-        "A body of `POST /cycle`.",
+    job: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
+        f"Id of a job with motions or cycles of one robot, of at most {MOST_ROWS:,} requests.",
         None,
-        {"start": OPTIMIZE["start"], "stops": [{"target": OPTIMIZE["goal"]}]},
+        JOB_ID,
         default=None,
     )
-    answer: Annotated[str, Field(max_length=64)] | None = described(
-        "Id of the kept answer to this request. Null: the request is answered first.",
+    evaluate: EvaluateRequest | None = described(
+        "A body of `POST /evaluate` with a `log`: its moves are measured against predicted.",
         None,
-        ANSWER_ID,
+        {"log": LOG_ID},
         default=None,
+    )
+    names: Annotated[list[Text], Field(max_length=MOST_ROWS)] = described(
+        "Names of the requests of the `job`, in their order. Fewer: the others have none.",
+        None,
+        ["bin to shelf", "shelf to bin"],
+        default=[],
     )
     title: Text | None = described(
         "Title of the report. Null: one of the request's kind.",
@@ -97,37 +111,42 @@ class ReportRequest(Request):
         {"price": {"value": 0.2, "source": "yours"}},
         default=Costs(),
     )
+    advice: bool = described(
+        "Whether changes of a motion or a cycle that need less are computed, as by `POST /advice`.",
+        None,
+        True,
+        default=True,
+    )
     format: Format = described(
-        "`html`: a page that stands alone. `pdf`: a page of A4, made by Typst.",
+        "`html`: a page that stands alone. `pdf`: pages of A4, made by Typst.",
         None,
         "pdf",
         default="html",
     )
 
     @property
-    def body(self) -> OptimizeRequest | CycleRequest:
-        """The request behind the report."""
-        body = self.optimize or self.cycle
-        assert body is not None
-        return body
-
-    @property
-    def robot(self) -> str:
-        """Name of the robot."""
-        return self.body.robot
+    def kind(self) -> Kind:
+        """What the report is on."""
+        return next(kind for kind in get_args(Kind) if getattr(self, kind) is not None)
 
     @property
     def figures(self) -> str | None:
         """Id of identified figures."""
-        return self.body.figures
+        return self.evaluate.figures if self.evaluate is not None else super().figures
 
     @property
     def deadline(self) -> float:
         """Wall time of the request [s]."""
-        return self.body.deadline
+        body = self.task or self.evaluate
+        given = None if body is None else body.deadline
+        return JOB_DEADLINE if given is None else given
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if (self.optimize is None) == (self.cycle is None):
-            raise PydanticCustomError("exactly_one", "Give exactly one of `optimize` and `cycle`")
+    def _one_of_all(self) -> Self:
+        if sum(getattr(self, kind) is not None for kind in get_args(Kind)) != 1:
+            raise PydanticCustomError(
+                "exactly_one", "Give exactly one of `optimize`, `cycle`, `job` and `evaluate`"
+            )
+        if self.evaluate is not None and self.evaluate.log is None:
+            raise PydanticCustomError("log", "A report of `evaluate` needs a `log`")
         return self

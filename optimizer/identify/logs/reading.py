@@ -73,7 +73,7 @@ def read_log(
     """Read a log of one arm from a CSV file into SI units on a uniform grid of time.
 
     Speeds and accelerations that the file does not have are derivatives of its other channels,
-    low-passed without delay. Known columns are listed in docs/identification.md.
+    low-passed without delay. Known columns are listed in docs/reference/identification.md.
 
     Args:
         source: path of the file, or its content. Either may be packed with gzip.

@@ -111,12 +111,34 @@ def test_a_cycle_shows_its_legs(client: TestClient) -> None:
     assert "Not given: price, carbon intensity, shifts per year." in text
 
 
+def test_changes_that_need_less_are_computed_and_checked(client: TestClient) -> None:
+    page = reported(client, optimize=move(), period=6.0, costs=COSTS)
+    bundle, text = attached_to(page), page.decode()
+    assert bundle.advised is not None
+    total = bundle.answer["energy"]["electrical"]["total"] + bundle.advised["waiting"]
+    assert bundle.advised["waiting"] > 0
+    assert f"with the wait until 6.00\u00a0s, <b>{digits(total)}\u00a0J</b>" in text
+    changes = bundle.advised["advice"]
+    assert [each["name"] for each in changes] == ["whole_cycle", "brakes"]
+    assert text.count("CHF a year</td>") == len(changes)
+    found = checked(page, again=True, request_id="test")
+    assert found.agrees, found
+    assert [line.what for line in found.lines][-2:] == ["whole_cycle, anew", "brakes, anew"]
+    cheaper = bundle.advised | {"advice": [changes[0] | {"energy": 0.9 * changes[0]["energy"]}]}
+    changed = Bundle(**{**vars(bundle), "advised": cheaper})
+    forged = page.replace(in_html(bundle.packed()).encode(), in_html(changed.packed()).encode())
+    wrong = [line.what for line in checked(forged, True, "test").lines if not line.agrees]
+    assert wrong == ["page", "whole_cycle, anew"]
+    plain = reported(client, optimize=move(), period=6.0, advice=False).decode()
+    assert "What would need less" not in plain and "J of waiting" in plain
+
+
 def test_a_pdf_has_the_same_documents(client: TestClient) -> None:
     pytest.importorskip("typst")
     file = reported(client, optimize=move(), costs=COSTS, format="pdf")
     assert file.startswith(b"%PDF") and len(re.findall(rb"/Type ?/Page\b", file)) == 1
     bundle = attached_to(file)
-    assert bundle.costs["price"] == {"value": 0.25, "source": "contract"}
+    assert bundle.costs["price"] == {"value": 0.25, "source": "contract", "letter": "Y"}
     assert checked(file, again=False, request_id="test").agrees
 
 

@@ -4,19 +4,23 @@ import { Section } from "../ui/Section";
 import { costsOf, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
 import { figure, fixed, parseNumber } from "../store/units";
-import { wait, waitFailed } from "./waits";
+import { adviceFailed, advised, waits } from "./advice";
 
 /** The parts of what one move or round costs. */
 function partsOf(shown: Answered): { name: string; joules: number }[] {
   const { total, dwell = 0 } = shown.solution.energy.electrical;
-  if (shown.cycle)
-    return [
-      { name: "Moves", joules: total - dwell },
-      { name: "At the stops", joules: dwell },
-    ];
-  const move = { name: "The move", joules: total - dwell };
-  const waiting = dwell || wait.value?.waiting || 0;
-  return waiting ? [move, { name: "Waiting, motors on", joules: waiting }] : [move];
+  const waiting = advised.value?.waiting ?? 0;
+  const parts = shown.cycle
+    ? [
+        { name: "Moves", joules: total - dwell },
+        { name: "At the stops", joules: dwell },
+        { name: "Waiting, motors on", joules: waiting },
+      ]
+    : [
+        { name: "The move", joules: total - dwell },
+        { name: "Waiting, motors on", joules: dwell || waiting },
+      ];
+  return parts.filter(({ joules }, k) => k === 0 || joules > 0);
 }
 
 /** What the motion costs in a cycle, a shift and a year. */
@@ -30,7 +34,7 @@ export function CostTable() {
       ? (shown.asked.dwell as { time: number }).time
       : shown.solution.duration;
   const costs = costsOf(partsOf(shown), whole, given);
-  const unpriced = given.cycle !== null && given.cycle > whole && !shown.cycle && !wait.value;
+  const unpriced = waits(shown, given.cycle) && !advised.value;
   const kwh = (value: number) => `${figure(value)} kWh`;
   return (
     <Section
@@ -88,18 +92,18 @@ export function CostTable() {
       </table>
       <p class="hint">
         <span title={given.price.source}>
-          {fixed(given.price.value, 2)} € a kWh ({short(given.price.source)})
+          {fixed(given.price.value, 2)} € a kWh ({short(given.price)})
         </span>
         ,{" "}
         <span title={given.carbon.source}>
-          {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon.source)})
+          {fixed(given.carbon.value, 2)} kg CO₂e a kWh ({short(given.carbon)})
         </span>
         . {given.box ? "" : "The control box itself is not counted: enter a wattmeter’s reading. "}
         {given.cycle === null && !shown.cycle
           ? "Back to back: say how often the move comes to price the wait."
           : ""}
         {unpriced
-          ? waitFailed.value
+          ? adviceFailed.value
             ? "The wait could not be computed."
             : "The wait is being priced."
           : ""}
@@ -109,8 +113,13 @@ export function CostTable() {
   );
 }
 
-/** A source by its first words; the whole of it is among the assumptions. */
-const short = (source: string) => source.split(":")[0]!;
+/** A source by its first words, with its trust letter; the whole of it is among the assumptions. */
+const short = ({ source, letter }: Sourced) =>
+  `${source.split(":")[0]!}${letter ? `, ${letter}` : ""}`;
+
+const LETTERS: Record<string, string> = { C: "second-hand" };
+const sourceOf = ({ source, letter }: Sourced) =>
+  letter ? `${letter}, ${LETTERS[letter] ?? ""}: ${source}` : source;
 
 /** What the costs rest on; each is replaced by the user's own. */
 function Assumptions() {
@@ -148,14 +157,14 @@ function Assumptions() {
         "Electricity",
         "€ per kWh",
         given.price.value,
-        given.price.source,
+        sourceOf(given.price),
         (value) => value !== null && set({ price: yours(value) }),
       )}
       {row(
         "Carbon",
         "kg CO₂e per kWh",
         given.carbon.value,
-        given.carbon.source,
+        sourceOf(given.carbon),
         (value) => value !== null && set({ carbon: yours(value) }),
       )}
       {row("Shift", "h", given.shift, "", (value) => value !== null && set({ shift: value }))}

@@ -1,6 +1,7 @@
 import { Button } from "../ui/Button";
-import { Menu } from "../ui/Menu";
+import { ReportMenu } from "../ui/ReportMenu";
 import { alone } from "../store/alone";
+import { reportAnswer } from "../store/report";
 import { link, presentCell } from "../store/share";
 import {
   answered,
@@ -18,7 +19,6 @@ import {
 import { trying } from "../store/trouble";
 import { dialog } from "./dialog";
 import { ProjectMenu } from "./ProjectMenu";
-import { report } from "./report";
 
 const PAGES: { value: Page; text: string }[] = [
   { value: "cell", text: "Cell" },
@@ -115,16 +115,7 @@ export function TopBar() {
               Share
             </Button>
           )}
-          {!alone && ready && (
-            <Menu label="Report" icon="file" id="report">
-              <Button kind="quiet" onClick={trying(() => report("pdf"))}>
-                PDF, to print and send
-              </Button>
-              <Button kind="quiet" onClick={trying(() => report("html"))}>
-                Page (HTML), with request and answer
-              </Button>
-            </Menu>
-          )}
+          {!alone && ready && <ReportMenu write={reportAnswer} />}
           <Button
             kind={ready ? "primary" : undefined}
             icon="download"

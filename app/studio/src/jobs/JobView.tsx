@@ -1,9 +1,12 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
+import { ReportMenu } from "../ui/ReportMenu";
 import { openCell, openKept } from "../store/open";
 import { baselineName } from "../store/facts";
 import { post } from "../store/client";
+import { costsFor, report, type ReportFormat } from "../store/report";
 import { save } from "../store/share";
+import { economics } from "../store/state";
 import { trying } from "../store/trouble";
 import { figure, percent } from "../store/units";
 import { csvOfJob, isOver, loadDetails, loadJob, namesOf, type JobRow, type Opened } from "./model";
@@ -54,6 +57,7 @@ export function JobView({ shown }: { shown: Opened }) {
         >
           CSV
         </Button>
+        {counts.done > 0 && <ReportMenu write={(format) => reportJob(shown, format)} />}
         {counts.failed > 0 && isOver(job) && (
           <Button icon="refresh" onClick={act("retry")}>
             Retry {counts.failed} failed
@@ -122,6 +126,17 @@ export function JobView({ shown }: { shown: Opened }) {
     </>
   );
 }
+
+const reportJob = (shown: Opened, format: ReportFormat) =>
+  report(
+    {
+      job: shown.job.id,
+      names: (shown.notes?.moves ?? []).map(({ from, to }) => (to ? `${from} to ${to}` : from)),
+      costs: costsFor(economics.value, null),
+    },
+    shown.job.name ?? "A table of moves",
+    format,
+  );
 
 function Totals({ shown: { rows, details } }: { shown: Opened }) {
   const done = rows.filter(({ energy }) => energy !== null);

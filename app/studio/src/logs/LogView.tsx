@@ -1,7 +1,9 @@
 import { useEffect, useState } from "preact/hooks";
 import { Note } from "../ui/Note";
+import { ReportMenu } from "../ui/ReportMenu";
 import { Table } from "../ui/Table";
 import { plain } from "../store/facts";
+import { report } from "../store/report";
 import { robotName } from "../store/request";
 import { request } from "../store/state";
 import { tell } from "../store/trouble";
@@ -30,6 +32,18 @@ export function LogView({ log }: { log: LogDetail }) {
             {log.effort && ` · efforts are a ${log.effort.meaning}`}
           </p>
         </div>
+        <span class="space" />
+        {found && (
+          <ReportMenu
+            write={(format) =>
+              report(
+                { evaluate: { log: log.id, figures: withOwn ? own : null } },
+                log.name ?? "Log",
+                format,
+              )
+            }
+          />
+        )}
       </header>
       {log.warnings.map((text) => (
         <Note kind="warning" key={text}>

@@ -4,6 +4,8 @@ export interface Sourced {
   value: number;
   /** Where it is from, or "yours". */
   source: string;
+  /** Trust letter of a figure that is not the user's: C, second-hand. */
+  letter?: string;
 }
 
 export interface Economics {
@@ -24,8 +26,12 @@ export const DEFAULT_ECONOMICS: Economics = {
   cycle: null,
   shift: 8,
   shiftsPerYear: 460,
-  price: { value: 0.2, source: "Eurostat: non-household consumers in the EU, second half of 2023" },
-  carbon: { value: 0.21, source: "EEA: electricity generation in the EU, 2023" },
+  price: {
+    value: 0.2,
+    source: "Eurostat: non-household consumers in the EU, second half of 2023",
+    letter: "C",
+  },
+  carbon: { value: 0.21, source: "EEA: electricity generation in the EU, 2023", letter: "C" },
   box: null,
 };
 

@@ -1,0 +1,208 @@
+"""The report of a job: its sums on the first page, then a table of its motions and cycles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from joulepath.app.api.report.assumptions import assumptions, interval_note
+from joulepath.app.api.report.bundle import COMPUTED, Bundle
+from joulepath.app.api.report.costs import Money, cost_table, costs_note, facts
+from joulepath.app.api.report.drawings import Bar, drawn_bars
+from joulepath.app.api.report.job_rows import answered, rivals_of
+from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
+from joulepath.app.api.report.programs import program_of_motion
+from joulepath.app.api.report.report import Report, Rival, Table
+from joulepath.app.api.report.rivals import (
+    EQUAL,
+    left_to_gain,
+    limits_used,
+    nearest_rival,
+    parts_of,
+    rival_name,
+    saved,
+)
+from joulepath.app.convert.given_answer import arm_of
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.picture.cell_picture import cell_picture
+
+Json = dict[str, Any]
+_NEAREST = "The nearest of each move"
+
+
+def job_report(bundle: Bundle) -> Report:
+    """The report of the rows of a job. Raises InvalidProblem without a motion of one robot."""
+    rows = answered(bundle.moves)
+    motions = [row for row in rows if "trajectory" in row["answer"]]
+    if not motions or len({row["answer"]["robot"] for row in rows}) > 1:
+        raise InvalidProblem(
+            "job", "A report needs a job with motions, all of one robot: this job has none such."
+        )
+    electrical, money = bundle.answer["energy"]["electrical"], Money.of(bundle)
+    most = max(motions, key=_joules)
+    shown = program_of_motion(most["request"], most["answer"])
+    masses = [arm_of(row["request"], row["answer"]).payload.mass for row in motions]
+    return Report(
+        title=bundle.title or bundle.request.get("name") or "A table of moves",
+        subtitle=bundle.subtitle(shown.robot),
+        lead=tuple(map(unbroken, _lead(bundle))),
+        facts=facts(bundle, money),
+        picture=cell_picture(shown),
+        caption=f"The move of most energy: {_name(most)}, {digits(_joules(most))} J. The arm is "
+        "shown at its goal, and pale at its start, as its collisions are checked.",
+        rivals_title="Against the usual ways",
+        rivals=_rivals(bundle),
+        rivals_note="Each usual way is summed over the moves in which it keeps every limit, in the "
+        "same time, and compared with the answers to those moves alone, as its bar is. No saving "
+        "is claimed in the others.",
+        parts=parts_of(electrical),
+        course_title="Energy of each move",
+        course_note="in the order of the table, in J, with its interval",
+        course=drawn_bars([_bar(row) for row in rows]),
+        costs=cost_table(bundle, money),
+        currency=money.currency,
+        costs_note=f"A round is all moves of the table once. {costs_note(money)}",
+        proven_title="Proven",
+        proven=unbroken(_proven(rows)),
+        check=bundle.how_to_check(None),
+        assumptions=assumptions(most["request"], bundle.costs, shown.robot, masses),
+        assumptions_note=unbroken(interval_note(electrical.get("interval"))),
+        foot=f"{COMPUTED} joulepath {bundle.version}",
+        table=_table(bundle.moves),
+    )
+
+
+def _joules(row: Json) -> float:
+    return float(row["answer"]["energy"]["electrical"]["total"])
+
+
+def _name(row: Json) -> str:
+    name: str = row["name"] or f"no. {row['index'] + 1}"
+    return name
+
+
+def _lead(bundle: Bundle) -> tuple[str, ...]:
+    rows, answer = answered(bundle.moves), bundle.answer
+    total = answer["energy"]["electrical"]["total"]
+    first = (
+        f"{len(rows):,} moves need *{digits(total)} J* together, in {digits(answer['duration'])} s "
+        "of motion"
+    )
+    count, theirs, ours = rivals_of(rows).get("nearest", (0, 0.0, 0.0))
+    claim = (
+        ". No usual way is known that keeps every limit: no saving is claimed."
+        if not count
+        else f". In the {count:,} moves in which a usual way keeps every limit, the answers need "
+        f"{_against(1 - ours / theirs)} the nearest such way of each, in the same time."
+    )
+    left = [row for row in bundle.moves if row["answer"] is None]
+    others = f" {len(left):,} of {len(bundle.moves):,} moves have no answer." if left else ""
+    least = left_to_gain("No way to make them", total, answer["energy"]["lower_bound"])
+    return first + claim, least + others
+
+
+def _against(saving: float) -> str:
+    if abs(saving) < EQUAL:
+        return "as much as"
+    return f"*{percent(saving)} less* than" if saving > 0 else f"{percent(-saving)} more than"
+
+
+def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
+    found = rivals_of(bundle.moves)
+    total = bundle.answer["energy"]["electrical"]["total"]
+    ratios = {name: theirs / ours for name, (_, theirs, ours) in found.items()}
+    most = max([1.0, *ratios.values()])
+    own = Rival(
+        "These answers",
+        f"{len(answered(bundle.moves)):,} moves",
+        f"{digits(total)} J",
+        1 / most,
+        "",
+        True,
+        ours=True,
+    )
+    return (
+        own,
+        *(
+            Rival(
+                _NEAREST if name == "nearest" else rival_name({"name": name}),
+                f"{count:,} moves",
+                f"{digits(theirs)} J",
+                ratios[name] / most,
+                saved(1 - ours / theirs),
+                True,
+            )
+            for name, (count, theirs, ours) in sorted(
+                found.items(), key=lambda each: (each[0] != "nearest", -each[1][0])
+            )
+        ),
+    )
+
+
+def _bar(row: Json) -> Bar:
+    known = row["answer"]["energy"]["electrical"].get("interval")
+    ends = None if known is None else (known["p5"], known["p95"])
+    return Bar(str(row["index"] + 1), _joules(row), ends=ends)
+
+
+def _proven(rows: list[Json]) -> str:
+    certificates = [row["answer"]["certificate"] for row in rows]
+    worst = dict[str, float | None]()
+    for each in certificates:
+        for name, value in each["worst_ratio"].items():
+            worst[name] = max(
+                (known for known in (worst.get(name), value) if known is not None), default=None
+            )
+    checked = [
+        (each["clearance"]["min_clearance"], row)
+        for each, row in zip(certificates, rows, strict=True)
+        if each.get("clearance") is not None
+    ]
+    sentences = [f"Every limit is kept in all {len(rows):,} moves: {limits_used(worst)} at most."]
+    if checked:
+        least, row = min(checked, key=lambda each: float(each[0]))
+        sentences.append(
+            f"Bodies stay at least {down(1e3 * least, 2)} mm beyond their margins, the nearest in "
+            f"{_name(row)}, proven between the samples too."
+        )
+    if len(checked) < len(rows):
+        sentences.append(f"Collisions were not checked in {len(rows) - len(checked):,} moves.")
+    error = max(each["energy_error"] for each in certificates)
+    sentences.append(
+        "A second program, which shares nothing with the solver but the motion, finds the same "
+        f"energies within {up(100 * error, 1)} %."
+    )
+    return " ".join(sentences)
+
+
+def _table(rows: list[Json]) -> Table:
+    return Table(
+        title="The moves",
+        note="Likely: from the 5th to the 95th percentile. Nearest: the usual way within every "
+        "limit against which least is saved, in the same time. Least: what no motion can need less "
+        "than.",
+        head=("no.", "move", "kg", "s", "J", "likely, J", "nearest, J", "saves", "least, J"),
+        rows=tuple(map(_cells, rows)),
+        words=2,
+    )
+
+
+def _cells(row: Json) -> tuple[str, ...]:
+    head, answer = (str(row["index"] + 1), row["name"] or ""), row["answer"]
+    if answer is None or not answered([row]):
+        problem = row["problem"] or {}
+        why = problem.get("detail") or problem.get("title")
+        return (*head, why or ("no motion" if answer is not None else row["state"]))
+    electrical = answer["energy"]["electrical"]
+    known, nearest = electrical.get("interval"), nearest_rival(answer)
+    mass = ((row["request"].get("payload") or {}).get("mass")) or 0.0
+    ours = _joules(row) if answer["objective"] == "electrical" else None
+    return (
+        *head,
+        digits(mass) if mass else "–",
+        digits(answer["duration"]),
+        digits(electrical["total"]),
+        "" if known is None else f"{down(known['p5'])} to {up(known['p95'])}",
+        "–" if nearest is None or ours is None else digits(ours / (1 - nearest["saving"])),
+        "–" if nearest is None else percent(nearest["saving"]),
+        down(answer["energy"]["lower_bound"]),
+    )

@@ -1,0 +1,87 @@
+"""The rows of a job and their sums, as the documents of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from joulepath.app.api.report.rivals import nearest_rival
+
+Json = dict[str, Any]
+_LEFT_OUT = frozenset({"candidates", "limits", "branch", "unreachable", "solver"})
+_SAMPLED = ("t", "q", "v", "a", "tau")
+
+
+def row_of(row: Json, name: str | None) -> Json:
+    """A row of `job_document` with its name, and without the samples of its motion but three."""
+    answer = row["answer"]
+    if answer is not None:
+        answer = {key: value for key, value in answer.items() if key not in _LEFT_OUT}
+        trajectory = answer.get("trajectory")
+        if trajectory is not None:
+            last = len(trajectory["t"]) - 1
+            thin = {key: [trajectory[key][k] for k in (0, last // 2, last)] for key in _SAMPLED}
+            answer["trajectory"] = thin | {"spline": trajectory["spline"]}
+    return row | {"answer": answer, "name": name}
+
+
+def answered(rows: Sequence[Json]) -> list[Json]:
+    """The rows with an energy: motions and cycles."""
+    return [row for row in rows if "lower_bound" in ((row["answer"] or {}).get("energy") or {})]
+
+
+def summed(rows: Sequence[Json]) -> Json:
+    """Energy and duration of all answered rows together.
+
+    The ends of the interval are the sums of the ends. They are exact if all energies are too large
+    or too small together, and otherwise too wide.
+    """
+    energies = [row["answer"]["energy"] for row in answered(rows)]
+    electrical = [energy["electrical"] for energy in energies]
+    names = {name for each in electrical for name, value in each.items() if _is_number(value)}
+    total = {name: sum(each.get(name) or 0.0 for each in electrical) for name in sorted(names)}
+    return {
+        "duration": sum(row["answer"]["duration"] for row in answered(rows)),
+        "energy": {
+            "electrical": total
+            | {"interval": _together([each["interval"] for each in electrical])},
+            "lower_bound": sum(energy["lower_bound"] for energy in energies),
+        },
+    }
+
+
+def _together(known: Sequence[Mapping[str, Any] | None]) -> Json | None:
+    intervals = [each for each in known if each is not None]
+    if not intervals or len(intervals) < len(known):
+        return None
+    widths = [each["p95"] - each["p5"] for each in intervals]
+    shares = dict[str, float]()
+    for each, width in zip(intervals, widths, strict=True):
+        for name, share in each["shares"].items():
+            shares[name] = shares.get(name, 0.0) + share * width / sum(widths)
+    ends = {end: sum(each[end] for each in intervals) for end in ("p5", "p95")}
+    return ends | {"shares": shares}
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def rivals_of(rows: Sequence[Json]) -> dict[str, tuple[int, float, float]]:
+    """Of each baseline that keeps every limit in some rows: their number, and its energy and that
+    of the answers in them [J]. `nearest` is the one of each row against which least is saved.
+    """
+    found = dict[str, tuple[int, float, float]]()
+    for row in answered(rows):
+        answer = row["answer"]
+        if answer["objective"] != "electrical":
+            continue
+        ours = answer["energy"]["electrical"]["total"]
+        claimed = [each for each in answer["baselines"] if each["saving"] is not None]
+        nearest = nearest_rival(answer)
+        named = [(each["name"], each) for each in claimed]
+        for name, each in named if nearest is None else [*named, ("nearest", nearest)]:
+            count, theirs, own = found.get(name, (0, 0.0, 0.0))
+            # at the same time, the shorter of both waits
+            found[name] = (count + 1, theirs + ours / (1 - each["saving"]), own + ours)
+    return found

@@ -1,0 +1,222 @@
+"""The report of a motion or a cycle: nothing is computed but sums, shares and costs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from joulepath.app.api.report.assumptions import assumptions, interval_note
+from joulepath.app.api.report.bundle import COMPUTED, Bundle
+from joulepath.app.api.report.costs import (
+    Money,
+    advice_note,
+    advice_table,
+    cost_table,
+    costs_note,
+    cycle_time,
+    facts,
+    waiting,
+)
+from joulepath.app.api.report.drawings import Course, Leg, Stop, drawn
+from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
+from joulepath.app.api.report.report import Report, Rival
+from joulepath.app.api.report.rivals import (
+    EQUAL,
+    left_to_gain,
+    limits_used,
+    nearest_rival,
+    parts_of,
+    rival_name,
+    saved,
+)
+from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.picture.cell_picture import cell_picture, stops_of
+
+
+def motion_report(bundle: Bundle, program: Program) -> Report:
+    """The report of documents with the motions of `program`."""
+    answer, money = bundle.answer, Money.of(bundle)
+    masses = [move.arm.payload.mass for move in program.moves]
+    course = _course(bundle, program)
+    several = len(course.legs) > 1
+    return Report(
+        title=bundle.title or ("A cycle of stops" if bundle.kind == "cycle" else "A motion"),
+        subtitle=bundle.subtitle(program.robot),
+        lead=tuple(map(unbroken, _lead(bundle))),
+        facts=facts(bundle, money),
+        picture=cell_picture(program),
+        caption=_caption(program),
+        rivals_title="Against the usual ways",
+        rivals=_rivals(bundle),
+        rivals_note=_rivals_note(bundle),
+        parts=parts_of(answer["energy"]["electrical"]),
+        course_title="The cycle" if several else "The motion",
+        course_note="each leg as wide as its time and as high as its mean power, with its joules; "
+        "filled with a part in hand. Below, the power from the supply"
+        if several
+        else "power from the supply over time",
+        course=drawn(course),
+        costs=cost_table(bundle, money),
+        currency=money.currency,
+        costs_note=costs_note(money),
+        proven_title="Proven",
+        proven=unbroken(_proven(answer)),
+        check=bundle.how_to_check(answer.get("id")),
+        assumptions=assumptions(bundle.request, bundle.costs, program.robot, masses),
+        assumptions_note=unbroken(interval_note(answer["energy"]["electrical"].get("interval"))),
+        changes=advice_table(bundle, money),
+        changes_note=unbroken(advice_note(bundle)),
+        foot=f"{COMPUTED} joulepath {bundle.version}",
+    )
+
+
+def _caption(program: Program) -> str:
+    shown = "The cell as its collisions are checked: the arm "
+    if len(program.moves) == 1:
+        return shown + "at the goal, and pale at the start, with the way of the TCP."
+    if any(move.arm.payload.mass > 0 for move in program.moves):
+        shown += "where the first part is put down, and pale at the start. "
+        return shown + "Way of the TCP: in full with a part, dashed without."
+    return shown + "at the end of the first move, and pale at the start, with the way of the TCP."
+
+
+def _lead(bundle: Bundle) -> tuple[str, ...]:
+    answer = bundle.answer
+    objective, word = answer["objective"], bundle.what
+    total, bound = answer["energy"][objective]["total"], answer["energy"]["lower_bound"]
+    stops = f" of {len(answer['order'])} stops" if bundle.kind == "cycle" else ""
+    kind = "" if objective == "electrical" else " of mechanical work"
+    length = cycle_time(bundle)
+    waits = length > answer["duration"] and objective == "electrical"
+    wait = f", with the wait until {digits(length)} s" if waits else ""
+    if held := waiting(bundle):
+        wait = f" and, with the wait until {digits(length)} s, *{digits(total + held)} J*"
+    first = (
+        f"One {word}{stops} needs *{digits(total)} J{kind}* in {digits(answer['duration'])} s{wait}"
+    )
+    best = nearest_rival(answer)
+    if best is None:
+        claim = ". No usual way is known that keeps every limit: no saving is claimed."
+    elif best["saving"] < -EQUAL:
+        more = percent(-best["saving"])
+        claim = f", {more} more than {_words(best)}, the wait included: ask for that time."
+    elif best["saving"] < EQUAL:
+        claim = f", as much as the nearest usual way that keeps every limit, {_words(best)}."
+    else:
+        claim = (
+            f": *{percent(best['saving'])} less* than the nearest usual way that keeps every "
+            f"limit, {_words(best)}.{_yearly(bundle, best['saving'])}"
+        )
+    return first + claim, left_to_gain(f"No {word} of any kind", total, bound)
+
+
+def _yearly(bundle: Bundle, saving: float) -> str:
+    """What the saving is in a year, where its shifts are given."""
+    money = Money.of(bundle)
+    if bundle.answer["objective"] != "electrical" or money.shifts is None:
+        return ""
+    joules = bundle.answer["energy"]["electrical"]["total"] * saving / (1 - saving)
+    return f" In a year that is {money.in_words(joules * money.cycles * money.shifts)}."
+
+
+def _words(rival: dict[str, Any]) -> str:
+    return f"“{rival_name(rival)}”, in the same time"
+
+
+def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
+    """The answer, then its rivals, those within the limits first."""
+    answer = bundle.answer
+    objective = answer["objective"]
+    total = answer["energy"][objective]["total"]
+    table = sorted(answer["baselines"], key=lambda each: (each["saving"] is None, each[objective]))
+    most = max(total, *(each[objective] for each in table)) if table else total
+    return (
+        Rival(
+            f"This {bundle.what}",
+            f"{digits(answer['duration'])} s",
+            f"{digits(total)} J",
+            total / most,
+            "",
+            True,
+            ours=True,
+        ),
+        *(
+            Rival(
+                rival_name(each),
+                f"{digits(each['duration'])} s",
+                f"{digits(each[objective])} J",
+                max(each[objective] / most, 0.0),
+                _broken(each) if each["saving"] is None else saved(each["saving"]),
+                each["saving"] is not None,
+            )
+            for each in table
+        ),
+    )
+
+
+def _broken(rival: dict[str, Any]) -> str:
+    """Why no saving is claimed, in two words."""
+    reasons = (rival.get("reason") or "").split("; ")
+    return "collides" if all("closer than" in each for each in reasons) else "breaks a limit"
+
+
+def _rivals_note(bundle: Bundle) -> str:
+    best = nearest_rival(bundle.answer)
+    rule = (
+        "A saving is claimed only against a way that keeps every limit, in the same time: the "
+        "shorter of both waits, and its wait is priced. Hatched: no saving."
+    )
+    known = None if best is None else best.get("saving_interval")
+    if known is None:
+        return rule
+    name = "" if best is None else rival_name(best)
+    low, high = percent(known["p5"], "down"), percent(known["p95"], "up")
+    return f"Against “{name}” the saving is likely {low} to {high}. {rule}"
+
+
+def _course(bundle: Bundle, program: Program) -> Course:
+    answer = bundle.answer
+    if bundle.kind == "optimize":
+        trajectory, wait = answer["trajectory"], float(answer["energy"]["electrical"]["dwell"])
+        t, power = list(trajectory["t"]), list(trajectory["power"])
+        dwell = (bundle.request.get("dwell") or {}).get("time")
+        if wait > 0 and dwell is not None and dwell > answer["duration"]:
+            mean = wait / (dwell - answer["duration"])
+            t, power = [*t, t[-1], dwell], [*power, mean, mean]
+        return Course(t[-1], t, power)
+    moves, legs, t, power = iter(bundle.moves), list[Leg](), list[float](), list[float]()
+    for leg in answer["legs"]:
+        rests = leg["kind"] in ("dwell", "wait")
+        legs.append(
+            Leg(leg["t0"], leg["duration"], leg["electrical"], rests, leg["payload_mass"] > 0)
+        )
+        if rests:
+            mean = leg["electrical"] / leg["duration"]
+            t += [leg["t0"], leg["t0"] + leg["duration"]]
+            power += [mean, mean]
+        else:
+            trajectory = next(moves)["trajectory"]
+            t += [leg["t0"] + each for each in trajectory["t"]]
+            power += trajectory["power"]
+    stops = [Stop(each.t, each.number, each.takes) for each in stops_of(program)]
+    return Course(answer["duration"], t, power, legs, stops)
+
+
+def _proven(answer: dict[str, Any]) -> str:
+    used = limits_used(answer["certificate"]["worst_ratio"])
+    sentences = [f"Every limit is kept: {used}."]
+    clearance = answer["certificate"].get("clearance")
+    if clearance is not None:
+        one, other = (name.replace("_", " ") for name in clearance["pair"])
+        left = 1e3 * clearance["min_clearance"]
+        sentences.append(
+            f"Nearest pair: {one} and {other}, at least {down(left, 2)} mm beyond their margin, "
+            "proven between the samples too."
+        )
+    else:
+        sentences.append("Collisions were not checked.")
+    error = answer["certificate"]["energy_error"]
+    sentences.append(
+        f"A second program, which shares nothing with the solver but the motion, finds the same "
+        f"energy within {up(100 * error, 1)} %."
+    )
+    return " ".join(sentences)

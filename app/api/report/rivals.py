@@ -1,0 +1,114 @@
+"""Rivals of an answer, the parts of its energy and its limits, in the words of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from joulepath.app.api.report.numbers import digits, down, percent, up
+from joulepath.app.api.report.report import Part
+
+_PARTS = {
+    "friction": ("Friction in the joints", "#e08e2b"),
+    "idle": ("Electronics, always on", "#8796a5"),
+    "dwell": ("Standing and waiting", "#c3cbd3"),
+    "copper": ("Copper of the motors", "#8c3b2a"),
+    "potential": ("Lifting", "#3b8fc2"),
+    "inverter": ("Inverters", "#b9a24a"),
+    "braking": ("Braking resistor", "#b3261e"),
+    "kinetic": ("Left in motion", "#5b7fa6"),
+    "storage_loss": ("Loss of the storage", "#6c5b7b"),
+    "recovered": ("Fed back to the supply", "#14805f"),
+}
+_RIVALS = {
+    "trapezoid": "Trapezoid of speed",
+    "quintic": "Smooth polynomial",
+    "ruckig": "Fastest motion",
+    "ruckig_slowed": "Fastest motion, slowed",
+    "straight": "Straight line in joints",
+    "controller_default": "Controller's default",
+    "stopping": "With a rest at every stop",
+    "move_by_move": "Each move by itself",
+    "same_factor": "All moves slowed alike",
+    "fastest_then_wait": "Fastest cycle, then a wait",
+    "given_order": "Stops in the given order",
+    "without_storage": "Without the storage",
+}
+LIMITS = {
+    "velocity": "speed",
+    "acceleration": "acceleration",
+    "jerk": "jerk",
+    "torque": "torque",
+    "tcp_speed": "speed of the TCP",
+    "elbow_speed": "speed of the elbow",
+}
+EQUAL = 0.0005
+"""Largest saving that is none, to the digit after the point that is written."""
+_LEAST_PART = 0.003
+"""Least share of the energy of a part with a line of its own."""
+_FULLY = 0.99
+
+
+def rival_name(rival: Mapping[str, Any]) -> str:
+    """The name of a baseline in words."""
+    name: str = rival["name"]
+    return _RIVALS.get(name, name)
+
+
+def nearest_rival(answer: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The rival within the limits with the least saving."""
+    claimed = [each for each in answer["baselines"] if each["saving"] is not None]
+    return min(claimed, key=lambda each: float(each["saving"]), default=None)
+
+
+def saved(saving: float) -> str:
+    """A saving in words."""
+    return f"saves {percent(saving)}" if saving >= 0 else f"needs {percent(-saving)} less"
+
+
+def left_to_gain(subject: str, total: float, bound: float) -> str:
+    """What a proven lower bound says, in a sentence."""
+    if bound <= 0:
+        return "How little could be needed at least is not known here."
+    return (
+        f"{subject} needs less than {down(bound)} J: at most {up(total - bound)} J, "
+        f"{percent(max(total - bound, 0.0) / total, 'up')} of it, are left to gain."
+    )
+
+
+def parts_of(electrical: Mapping[str, Any]) -> tuple[Part, ...]:
+    """The parts of an electrical energy, largest first."""
+    total = electrical["total"]
+    known = {name: float(electrical.get(name) or 0.0) for name in _PARTS}
+    shown = {name: value for name, value in known.items() if abs(value) >= _LEAST_PART * abs(total)}
+    rest = total - sum(shown.values())
+    rows = sorted(shown.items(), key=lambda each: -each[1])
+    parts = [Part(*_PARTS[name], *_in_joules(value, total)) for name, value in rows]
+    if abs(rest) >= _LEAST_PART * abs(total):
+        parts.append(Part("Other", "#e2e7ec", *_in_joules(rest, total)))
+    return tuple(parts)
+
+
+def _in_joules(value: float, total: float) -> tuple[str, str]:
+    written = digits(value, 2 if abs(value) < 10 else 3)
+    return f"{written} J", f"{value / total:.0%}".replace("%", " %").replace("-", "−")
+
+
+def limits_used(worst_ratio: Mapping[str, float | None]) -> str:
+    """How far the limits are used: those to the full, and the shares of the others."""
+    ratios = {
+        name: value for name, value in worst_ratio.items() if name in LIMITS and value is not None
+    }
+    full = [LIMITS[name] for name, value in ratios.items() if value >= _FULLY]
+    others = [
+        f"{LIMITS[name]} to {value:.0%}".replace("%", " %")
+        for name, value in ratios.items()
+        if value < _FULLY
+    ]
+    return ", ".join(([f"{listed(full)} used fully"] if full else []) + others)
+
+
+def listed(words: list[str]) -> str:
+    """Words with commas, and `and` before the last."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
