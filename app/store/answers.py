@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import timedelta
+from typing import Any
 
-from sqlalchemy import and_, func, or_, select
+from sqlalchemy import Select, and_, func, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
@@ -24,23 +25,27 @@ def put(
     answer: StoredAnswer,
     study_id: str | None = None,
     owner: str | None = None,
+    is_part: bool = False,
 ) -> int:
     """Stores an answer, the JSON document of the endpoint `kind`. Returns its size as it is kept
-    [byte].
+    [byte]. A part is a motion of another answer.
 
     The answer of a study stays until the study is deleted; any other until `prune` deletes it.
     """
     body = packed(answer.body)
-    session.add(_row(kind, replace(answer, body=body), study_id=study_id, owner=owner))
+    stored = replace(answer, body=body)
+    session.add(_row(kind, stored, study_id=study_id, owner=owner, is_part=is_part))
     return len(body)
 
 
-def put_of_job(session: Session, kind: str, compressed: StoredAnswer, job: Job) -> None:
+def put_of_job(
+    session: Session, kind: str, compressed: StoredAnswer, job: Job, is_part: bool = False
+) -> None:
     """Stores a compressed answer until the deletion of its job."""
-    session.add(_row(kind, compressed, job_id=job.id, owner=job.owner))
+    session.add(_row(kind, compressed, job_id=job.id, owner=job.owner, is_part=is_part))
 
 
-def _row(kind: str, compressed: StoredAnswer, **whose: str | None) -> Answer:
+def _row(kind: str, compressed: StoredAnswer, **whose: str | bool | None) -> Answer:
     id, body, figures = compressed.id, compressed.body, compressed.figures
     return Answer(
         id=id, kind=kind, created=now(), size=len(body), body=body, **vars(figures), **whose
@@ -60,10 +65,40 @@ def of_job(session: Session, job_id: str, kind: str) -> bytes | None:
     return session.scalar(select(Answer.body).where(Answer.job_id == job_id, Answer.kind == kind))
 
 
-def page(session: Session, limit: int, after: str | None) -> tuple[list[Answer], str | None]:
+@dataclass(frozen=True)
+class Wanted:
+    """Which answers a list has."""
+
+    whole: bool = False
+    """Whether to leave out parts, and answers of jobs and studies."""
+    job: str | None = None
+    """Id of the job of the answers; None: all."""
+    search: str | None = None
+    """Text in the name, the robot or the kind, in upper or lower case; None: any."""
+
+    def of(self, query: Select[Any]) -> Select[Any]:
+        """The query for these answers."""
+        if self.whole:
+            query = query.where(
+                Answer.is_part.is_(False), Answer.job_id.is_(None), Answer.study_id.is_(None)
+            )
+        if self.job is not None:
+            query = query.where(Answer.job_id == self.job)
+        if self.search is not None:
+            places = (Answer.name, Answer.robot, Answer.kind)
+            query = query.where(
+                or_(*(each.icontains(self.search, autoescape=True) for each in places))
+            )
+        return query
+
+
+def page(
+    session: Session, limit: int, after: str | None, wanted: Wanted
+) -> tuple[list[Answer], str | None]:
     """Up to `limit` answers without their documents, newest first, and the `after` of the next
     page; None on the last page."""
-    query = select(Answer).order_by(Answer.created.desc(), Answer.id.desc()).limit(limit + 1)
+    query = wanted.of(select(Answer))
+    query = query.order_by(Answer.created.desc(), Answer.id.desc()).limit(limit + 1)
     if after is not None:
         created, answer_id = position_after(after)
         query = query.where(
@@ -72,6 +107,17 @@ def page(session: Session, limit: int, after: str | None) -> tuple[list[Answer],
     found = list(session.scalars(query.options(defer(Answer.body, raiseload=True))))
     more, found = len(found) > limit, found[:limit]
     return found, position_of(found[-1]) if more else None
+
+
+def rename(session: Session, answer_id: str, name: str | None, client: Client) -> Answer:
+    """Gives an answer a name, or none. Raises UnknownAnswer or NotOwner."""
+    query = select(Answer).where(Answer.id == answer_id).options(defer(Answer.body, raiseload=True))
+    answer = session.scalar(query) if is_id(answer_id) else None
+    if answer is None:
+        raise UnknownAnswer
+    check_owner(client, answer.owner)
+    answer.name = name
+    return answer
 
 
 def delete(session: Session, answer_id: str, client: Client) -> None:

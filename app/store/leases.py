@@ -300,7 +300,7 @@ def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome, mo
     )
     request.status, request.problem = own.status, outcome.problem
     for part in outcome.parts:
-        answers.put_of_job(session, outcome.parts_kind, part, job)
+        answers.put_of_job(session, outcome.parts_kind, part, job, is_part=True)
     if outcome.answer is not None:
         request.answer_id = outcome.answer_id or new_id()
         whole = StoredAnswer(request.answer_id, outcome.answer, own)

@@ -40,7 +40,7 @@ async def store_answers(
             known_motions.keep(session, cell, result.motions)
 
     if result.stored:
-        await _put(store, settings, kind, result.stored, owner, also=keep)
+        await _put(store, settings, kind, result.stored, owner, also=keep, are_parts=True)
     return replace(result, stored=(), motions={})
 
 
@@ -78,6 +78,7 @@ async def _put(
     owner: str | None,
     most: int | None = None,
     also: Callable[[Session], None] | None = None,
+    are_parts: bool = False,
 ) -> None:
     """Stores answers, and prunes if it is time; does something else in the same transaction.
 
@@ -85,7 +86,9 @@ async def _put(
     """
 
     def put(session: Session) -> int:
-        size = sum(answers.put(session, kind, answer, owner=owner) for answer in stored)
+        size = sum(
+            answers.put(session, kind, answer, owner=owner, is_part=are_parts) for answer in stored
+        )
         if most is not None and size > most:
             raise _TooLarge
         if also is not None:

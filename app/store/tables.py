@@ -17,6 +17,7 @@ from sqlalchemy import (
     MetaData,
     String,
     TypeDecorator,
+    false,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
@@ -162,6 +163,9 @@ class Answer(Table):
     size: Mapped[int]
     """Size of the compressed body [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
+    name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
+    is_part: Mapped[bool] = mapped_column(server_default=false())
+    """Whether the answer is a motion of another answer: of a cycle, of a front, of what-if."""
 
 
 class CachedAnswer(Table):

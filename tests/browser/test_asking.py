@@ -270,8 +270,8 @@ def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
     assert any(faint)
 
 
-def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
-    """An answer of a study, and one that this browser has seen."""
+def test_what_is_kept_has_names_and_opens_again(page: Page, service: Server) -> None:
+    """An answer of a study, and one that this browser has seen, found by a new name."""
     created = service.post("/studies", {"name": "press", "robot": "ur5e", "threshold": 60.0}).json()
     service.post(f"/studies/{created['id']}/iterations", {"optimize": move()})
     go(page, "Library")
@@ -281,9 +281,21 @@ def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
     assert state(page, "answered.solution.branch.goal.q") == pytest.approx(NEAR)
     assert not state(page, "stale")
     go(page, "Library")
+    kept = page.locator("#answers li")
     page.get_by_label("Search answers").fill("round")
-    page.locator("#answers button.choice").first.click()
+    expect(kept.first).to_contain_text("round · ur5e")
+    kept.first.get_by_role("button", name="Rename").click()
+    page.get_by_label("New name of").fill("Night tray")
+    page.keyboard.press("Enter")
+    page.get_by_label("Search answers").fill("NIGHT")
+    expect(kept).to_have_count(1)
+    page.locator("#answers button.choice", has_text="Night tray").click()
     until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.answered?.cycle)")
+    assert state(page, "project.name") == "Night tray"
+    go(page, "Library")
+    page.get_by_label("Search answers").fill("night tray")
+    page.get_by_role("button", name="Delete Night tray").click()
+    expect(kept).to_have_count(0)
 
 
 def test_a_page_stands_alone(browser: Browser, service: Server, tmp_path: Path) -> None:

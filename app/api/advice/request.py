@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -12,6 +12,8 @@ from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.examples.values import ANSWER_ID, OPTIMIZE
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.request import OptimizeRequest
+
+AdviceName = Literal["whole_cycle", "brakes", "without_home", "shorter_stops", "lighter_tool"]
 
 
 class AnsweredRequest(Request):
@@ -61,6 +63,14 @@ class AnsweredRequest(Request):
 
 class AdviceRequest(AnsweredRequest):
     """A motion or a cycle, as exactly one of `optimize` and `cycle`, and how often it comes."""
+
+    changes: list[AdviceName] | None = described(
+        "Changes to be computed; with an empty list, only the wait is. Null: all.",
+        None,
+        ["brakes"],
+        default=None,
+        max_length=len(get_args(AdviceName)),
+    )
 
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:

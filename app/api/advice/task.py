@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.api.advice.answered import answered, as_asked, documents_of, result_of
-from joulepath.app.api.advice.request import AdviceRequest
+from joulepath.app.api.advice.request import AdviceName, AdviceRequest
 from joulepath.app.api.advice.variants import (
     ADVICE,
-    AdviceName,
     Task,
     Variant,
     over_period,
@@ -32,6 +31,8 @@ from joulepath.optimizer.exceptions import DeclaredError
 Json = dict[str, Any]
 _START = "start"
 _RESTS = ("dwell", "wait")
+ALL: tuple[AdviceName, ...] = get_args(AdviceName)
+"""Names of all changes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +91,8 @@ class AdviceTask:
         answer, moves = answered(self.request, self.request_id, end.left)
         task = self.request.task
         assert task is not None
-        found = advised(task, answer, moves, self.request.period, end)
+        wanted = ALL if self.request.changes is None else self.request.changes
+        found = advised(task, answer, moves, self.request.period, end, wanted)
         return TaskResult.of_json(
             AdviceAnswer(request=self.request_id, robot=task.robot, **vars(found))
         )
@@ -112,7 +114,7 @@ def advised(
     moves: list[Json],
     period: float | None,
     end: Deadline,
-    changes: bool = True,
+    changes: Collection[AdviceName] = ALL,
 ) -> Advised:
     """What a task needs with its wait, and changes that need less.
 
@@ -122,7 +124,7 @@ def advised(
         moves: the answers of the moves of a cycle.
         period: time from one start to the next [s]; None: no wait beyond the request.
         end: no change is computed after this.
-        changes: whether changes are computed at all.
+        changes: names of the changes to be computed.
 
     Returns:
         Energies and changes; without changes unless the electrical energy is minimised.
@@ -139,10 +141,10 @@ def advised(
             whole = work.advice(Variant("whole_cycle", task), now)
             found += [] if whole is None else [whole]
             base = now if whole is None else min(whole.energy, now)
-        for variant in variants(task, rests):
-            each = work.advice(variant, base)
-            found += [] if each is None else [each]
-    worth = [each for each in found if each.share >= ADVICE.least]
+        wanted = (variant for variant in variants(task, rests) if variant.name in changes)
+        computed = (work.advice(variant, base) for variant in wanted)
+        found += [each for each in computed if each is not None]
+    worth = [each for each in found if each.share >= ADVICE.least and each.name in changes]
     home = _home(answer) if moves else None
     return Advised(now, waiting, home, sorted(worth, key=lambda each: -each.saving))
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
+from joulepath.app.api.advice.request import AdviceName
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.stop import StopRequest
 from joulepath.app.schemas.request import Dwell, Holding, OptimizeRequest
 
-AdviceName = Literal["whole_cycle", "brakes", "without_home", "shorter_stops", "lighter_tool"]
 Task = OptimizeRequest | CycleRequest
 
 

@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 
-from joulepath.app.schemas.common import Response, described, part
-from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED
+from pydantic import Field
+
+from joulepath.app.schemas.common import NO_CONTROLS, Request, Response, described, part
+from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, JOB_ID
+from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+
+Name = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS)]
+
+
+class AnswerName(Request):
+    """The name of an answer."""
+
+    name: Name | None = described("The name. Null: none.", None, "Night cell")
 
 
 class KeptAnswer(Response):
     """A kept answer without its document."""
 
     id: str = described("Id of the answer.", None, ANSWER_ID)
+    name: str | None = described("Its name, see `PATCH /answers/{id}`.", None, "Night cell")
     kind: str = described(
         "Endpoint of the answer, for example `optimize` or `cycle`.", None, "optimize"
     )
@@ -59,5 +71,21 @@ class AnswerList(Response):
 class AnswerPage(Query):
     """A page of the list of answers."""
 
+    whole: bool = described(
+        "Whether to leave out what belongs to something else: the motions of cycles, fronts and "
+        "what-ifs, and the answers of jobs and studies.",
+        None,
+        True,
+        default=False,
+    )
+    job: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
+        "Id of a job: only its answers. Null: those of all.", None, JOB_ID, default=None
+    )
+    search: Name | None = described(
+        "A text in the name, the robot or the kind, in upper or lower case. Null: any.",
+        None,
+        "night",
+        default=None,
+    )
     limit: int = limit_of("answers")
     after: str | None = after_of(ANSWER_ID)

@@ -8,7 +8,14 @@ from typing import Annotated
 import orjson
 from fastapi import APIRouter, Path, Query, Response
 
-from joulepath.app.api.answers.models import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
+from joulepath.app.api.answers.models import (
+    AnswerList,
+    AnswerName,
+    AnswerPage,
+    AnswerSummary,
+    KeptAnswer,
+    StoredAnswer,
+)
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.access import NotOwner
@@ -18,6 +25,7 @@ from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import ANSWER_ID
 from joulepath.app.store import answers
+from joulepath.app.store.tables import Answer
 
 router = APIRouter(prefix="/answers", tags=["results"])
 
@@ -31,12 +39,16 @@ AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore) -> AnswerList:
-    """All kept answers, newest first, page by page, with the motions of fronts and cycles and the
-    answers of studies and jobs."""
-    found, following = await store.read(partial(answers.page, limit=page.limit, after=page.after))
-    names = AnswerSummary.model_fields
-    listed = [AnswerSummary(**{name: getattr(answer, name) for name in names}) for answer in found]
-    return AnswerList(answers=listed, next=following)
+    """Kept answers, newest first, page by page: all, or those that are asked for."""
+    wanted = answers.Wanted(page.whole, page.job, page.search)
+    found, following = await store.read(
+        partial(answers.page, limit=page.limit, after=page.after, wanted=wanted)
+    )
+    return AnswerList(answers=[_summary(answer) for answer in found], next=following)
+
+
+def _summary(answer: Answer) -> AnswerSummary:
+    return AnswerSummary(**{name: getattr(answer, name) for name in AnswerSummary.model_fields})
 
 
 @router.get(
@@ -48,8 +60,22 @@ async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore
 async def show(id: AnswerId, store: ServiceStore) -> Response:
     """The complete answer with this id."""
     answer, body = await store.read(partial(answers.get, answer_id=id))
-    content = {name: getattr(answer, name) for name in ("id", "kind", "created", "owner")}
+    content = {name: getattr(answer, name) for name in KeptAnswer.model_fields}
     return result_response(TaskResult.of_json(content | {"answer": orjson.Fragment(body)}))
+
+
+@router.patch(
+    "/{id}",
+    summary="Name a stored answer",
+    response_model=AnswerSummary,
+    responses=problem_responses(InvalidRequest, UnknownAnswer, NotOwner, StoreUnavailable),
+)
+async def rename(
+    id: AnswerId, body: AnswerName, store: ServiceStore, client: ServiceClient
+) -> AnswerSummary:
+    """Gives the answer a name, by which `GET /answers` finds it."""
+    rename = partial(answers.rename, answer_id=id, name=body.name, client=client)
+    return await store.write(lambda session: _summary(rename(session)))
 
 
 @router.delete(

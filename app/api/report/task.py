@@ -11,7 +11,7 @@ import orjson
 
 from joulepath import __version__
 from joulepath.app.api.advice.answered import answered, as_asked
-from joulepath.app.api.advice.task import advised
+from joulepath.app.api.advice.task import ALL, advised
 from joulepath.app.api.evaluate.task import EvaluateAnswer, evaluated
 from joulepath.app.api.report import page, pdf
 from joulepath.app.api.report.build import report_of
@@ -79,7 +79,7 @@ class ReportTask:
             }
         assert asked.task is not None
         answer, moves = answered(asked, self.request_id, limit)
-        advice = advised(asked.task, answer, moves, asked.period, end, asked.advice)
+        advice = advised(asked.task, answer, moves, asked.period, end, ALL if asked.advice else ())
         return {
             "request": as_asked(asked.task),
             "answer": answer,

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from typing import Any
+from uuid import uuid4
 
 import orjson
 import pytest
@@ -21,6 +22,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
+from tests.app.job_clients import ended, optimization, sent
 from tests.app.problems import checked
 from tests.app.requests import EXAMPLES, HOME, NEAR, PATIENT, move
 from tests.app.store.test_store import with_store
@@ -113,6 +115,36 @@ def test_the_answers_are_listed(recorded: TestClient) -> None:
         whole["energy"] == done["energy"]["electrical"]["total"]
         and whole["duration"] == done["duration"]
     )
+
+
+def test_answers_have_names_and_are_found(recorded: TestClient) -> None:
+    """Without the motions of cycles, and the answers of jobs and studies, where it is asked for."""
+    tray = f"50% tray {uuid4().hex[:6]}"
+    own = recorded.post("/optimize", json=move()).json()["id"]
+    path = sent(recorded, [optimization(1.5)])
+    ended(recorded, path)
+    round_ = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}
+    cycle = recorded.post("/cycle", json=round_).json()
+    renamed = recorded.patch(f"/answers/{own}", json={"name": tray})
+    assert renamed.status_code == 200 and renamed.json()["name"] == tray
+
+    def found(**query: Any) -> list[Any]:
+        answer = recorded.get("/answers", params={"limit": 200, **query})
+        assert answer.status_code == 200, answer.text
+        AnswerList.model_validate_json(answer.content)
+        return [each["id"] for each in answer.json()["answers"]]
+
+    (of_job,) = found(job=path.rpartition("/")[2])
+    motions = {leg["answer"].rpartition("/")[2] for leg in cycle["legs"] if leg["kind"] == "move"}
+    assert {own, cycle["id"], of_job} | motions <= set(found())
+    whole = set(found(whole=True))
+    assert {own, cycle["id"]} <= whole and not whole & {of_job, *motions}
+    assert found(search=tray.upper()) == [own] and found(search="5_% tray") == []
+    assert recorded.get(f"/answers/{own}").json()["name"] == tray
+    assert recorded.patch(f"/answers/{own}", json={"name": None}).json()["name"] is None
+    assert found(search=tray) == []
+    assert recorded.patch(f"/answers/{uuid4()}", json={"name": "x"}).status_code == 404
+    assert recorded.patch(f"/answers/{own}", json={"name": ""}).status_code == 422
 
 
 @pytest.mark.parametrize("query", ["limit=0", "limit=201", "after=1", "after=x_y", "kind=optimize"])

@@ -1,22 +1,26 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Section } from "../ui/Section";
-import { costsOf, type Economics, type Sourced } from "../store/economics";
+import { costsOf, DEFAULT_ECONOMICS, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
 import { figure, fixed, parseNumber } from "../store/units";
-import { wait, waitFailed } from "./waits";
+import { adviceFailed, advised, waits } from "./advice";
 
 /** The parts of what one move or round costs. */
 function partsOf(shown: Answered): { name: string; joules: number }[] {
   const { total, dwell = 0 } = shown.solution.energy.electrical;
-  if (shown.cycle)
-    return [
-      { name: "Moves", joules: total - dwell },
-      { name: "At the stops", joules: dwell },
-    ];
-  const move = { name: "The move", joules: total - dwell };
-  const waiting = dwell || wait.value?.waiting || 0;
-  return waiting ? [move, { name: "Waiting, motors on", joules: waiting }] : [move];
+  const waiting = advised.value?.waiting ?? 0;
+  const parts = shown.cycle
+    ? [
+        { name: "Moves", joules: total - dwell },
+        { name: "At the stops", joules: dwell },
+        { name: "Waiting, motors on", joules: waiting },
+      ]
+    : [
+        { name: "The move", joules: total - dwell },
+        { name: "Waiting, motors on", joules: dwell || waiting },
+      ];
+  return parts.filter(({ joules }, k) => k === 0 || joules > 0);
 }
 
 /** What the motion costs in a cycle, a shift and a year. */
@@ -30,7 +34,7 @@ export function CostTable() {
       ? (shown.asked.dwell as { time: number }).time
       : shown.solution.duration;
   const costs = costsOf(partsOf(shown), whole, given);
-  const unpriced = given.cycle !== null && given.cycle > whole && !shown.cycle && !wait.value;
+  const unpriced = waits(shown, given.cycle) && !advised.value;
   const kwh = (value: number) => `${figure(value)} kWh`;
   return (
     <Section
@@ -99,7 +103,7 @@ export function CostTable() {
           ? "Back to back: say how often the move comes to price the wait."
           : ""}
         {unpriced
-          ? waitFailed.value
+          ? adviceFailed.value
             ? "The wait could not be computed."
             : "The wait is being priced."
           : ""}
@@ -163,12 +167,20 @@ function Assumptions() {
         sourceOf(given.carbon),
         (value) => value !== null && set({ carbon: yours(value) }),
       )}
-      {row("Shift", "h", given.shift, "", (value) => value !== null && set({ shift: value }))}
+      {row(
+        "Shift",
+        "h",
+        given.shift,
+        given.shift === DEFAULT_ECONOMICS.shift ? "assumed" : "yours",
+        (value) => value !== null && set({ shift: value }),
+      )}
       {row(
         "Shifts a year",
         "shifts",
         given.shiftsPerYear,
-        "two on 230 days",
+        given.shiftsPerYear === DEFAULT_ECONOMICS.shiftsPerYear
+          ? "assumed: two on 230 days"
+          : "yours",
         (value) => value !== null && set({ shiftsPerYear: value }),
       )}
       {row(

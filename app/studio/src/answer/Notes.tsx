@@ -1,25 +1,15 @@
+import type { ComponentChildren, JSX } from "preact";
 import { Button } from "../ui/Button";
 import { Note } from "../ui/Note";
 import { goTo } from "../picture/clock";
 import { optimise } from "../store/run";
-import { put } from "../store/pointer";
-import {
-  answered,
-  edit,
-  economics,
-  request,
-  show,
-  stale,
-  tab,
-  typed,
-  type Answered,
-} from "../store/state";
+import { answered, edit, show, stale, tab, typed, type Answered } from "../store/state";
 import { tell } from "../store/trouble";
-import { figure, percent } from "../store/units";
+import { figure } from "../store/units";
 import { plain } from "../store/facts";
-import { home } from "./home";
-import { wait } from "./waits";
+import { advised, CHANGES, wordsOf, type Change } from "./advice";
 
+const LEAST = 0.05; // share of a round below which its way home is no matter
 const MOST = 3;
 const SPARE = 0.002; // clearance beyond the margins that is worth a note [m]
 
@@ -27,101 +17,71 @@ const SPARE = 0.002; // clearance beyond the margins that is worth a note [m]
 export function Notes() {
   const shown = answered.value;
   if (!shown || stale.value) return null;
-  const notes = [
-    <Waiting key="wait" />,
-    <WayHome key="home" />,
-    <Close key="close" shown={shown} />,
-  ];
-  const warnings = shown.solution.warnings.map(plain);
-  const first = warnings.slice(0, MOST - 1);
-  const rest = warnings.slice(MOST - 1);
+  const advice = adviceNotes();
+  const warnings = shown.solution.warnings.map((text) => (
+    <Note kind="warning" key={text}>
+      {plain(text)}
+    </Note>
+  ));
+  const rest = [...advice.slice(MOST), ...warnings.slice(MOST - 1)];
   return (
     <div class="notes" id="notes">
-      {notes}
-      {first.map((text) => (
-        <Note kind="warning" key={text}>
-          {text}
-        </Note>
-      ))}
+      {advice.slice(0, MOST)}
+      <Close shown={shown} />
+      {warnings.slice(0, MOST - 1)}
       {rest.length > 0 && (
         <details class="fold">
           <summary>{rest.length} more</summary>
-          {rest.map((text) => (
-            <Note kind="warning" key={text}>
-              {text}
-            </Note>
-          ))}
+          {rest}
         </details>
       )}
     </div>
   );
 }
 
-/** How much of a cycle is waiting, and what the whole cycle would take. */
-function Waiting() {
-  const now = wait.value;
+/** What was computed on the wait, the way home, and changes of the task: the largest first. */
+function adviceNotes(): JSX.Element[] {
+  const now = advised.value;
   const shown = answered.value;
-  if (!now || !shown) return null;
-  const together = shown.solution.energy.electrical.total + now.waiting;
-  const less = now.whole === null ? null : 1 - now.whole / together;
+  if (!now || !shown) return [];
+  const of = (name: Change["name"]) => now.advice.find((each) => each.name === name);
+  const whole = of("whole_cycle");
+  const without = of("without_home");
+  const notes = now.advice
+    .filter((each) => each !== whole && each !== without)
+    .map((each) => <Advice key={each.name} change={each} />);
+  if (without || (now.home ?? 0) > LEAST * now.energy)
+    notes.unshift(
+      <Advice key="home" change={without}>
+        The start and back take {figure(now.home)} of{" "}
+        {figure(shown.solution.energy.electrical.total)} J.
+      </Advice>,
+    );
+  if (now.waiting)
+    notes.unshift(
+      <Advice key="wait" change={whole}>
+        {figure(now.waiting)} of {figure(now.energy)} J a cycle is waiting.
+      </Advice>,
+    );
+  return notes;
+}
+
+/** A fact, and what a change would need, with the button that makes it. */
+function Advice({ change, children }: { change?: Change; children?: ComponentChildren }) {
+  const next = change?.request;
   const use = () => {
-    const { duration: _, ...free } = request.value;
-    const next = put(free, "/dwell", { time: economics.value.cycle });
+    if (!next) return;
     edit(next, typed.value);
     optimise(next).catch((error) => tell(error, next));
   };
-  return (
-    <Note
-      kind="warning"
-      action={
-        less !== null &&
-        less > 0.001 && (
-          <Button small onClick={use}>
-            Use whole cycle
-          </Button>
-        )
-      }
-    >
-      <b>
-        {figure(now.waiting)} of {figure(together)} J a cycle is waiting.
-      </b>
-      {less !== null &&
-        (less > 0.001
-          ? ` Over all ${figure(now.cycle)} s: ${figure(now.whole)} J, ${percent(less)} less.`
-          : " No slower motion needs less over the whole cycle.")}
-    </Note>
+  const button = next && (
+    <Button small onClick={use}>
+      {CHANGES[change.name].button}
+    </Button>
   );
-}
-
-/** How much of a round goes from the start and back to it, and the round without that. */
-function WayHome() {
-  const now = home.value;
-  const shown = answered.value;
-  if (!now || !shown) return null;
-  const total = shown.solution.energy.electrical.total;
-  const { without } = now;
-  const less = without ? 1 - without.joules / total : 0;
-  const leave = () => {
-    edit(now.request, typed.value);
-    optimise(now.request).catch((error) => tell(error, now.request));
-  };
   return (
-    <Note
-      kind="warning"
-      action={
-        less > 0.001 && (
-          <Button small onClick={leave}>
-            Leave out
-          </Button>
-        )
-      }
-    >
-      <b>
-        The start and back take {figure(now.joules)} of {figure(total)} J.
-      </b>
-      {without &&
-        less > 0.001 &&
-        ` A round from the last stop: ${figure(without.joules)} J in ${figure(without.duration)} s, ${percent(less)} less.`}
+    <Note kind={children ? "warning" : "advice"} action={button}>
+      {children && <b>{children}</b>} {change && wordsOf(change)}
     </Note>
   );
 }

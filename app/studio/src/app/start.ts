@@ -1,9 +1,8 @@
 // What the page shows first: the cell of a link, the last project, or the example.
 import { play } from "../picture/clock";
 import { followRobot } from "../picture/pictured";
-import { followHome } from "../answer/home";
+import { followAdvice } from "../answer/advice";
 import { followPostures } from "../answer/postures";
-import { followWaits } from "../answer/waits";
 import { alone, embedded } from "../store/alone";
 import { openCell, openFirst, openKept, openLast } from "../store/open";
 import { followChanges } from "../store/persist";
@@ -22,8 +21,7 @@ export async function start(): Promise<void> {
   followTool();
   followChanges();
   followPostures();
-  followWaits();
-  followHome();
+  followAdvice();
   window.addEventListener(
     "hashchange",
     () => /^#(r|answer)=/.test(location.hash) && location.reload(),

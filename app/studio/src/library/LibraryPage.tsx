@@ -5,16 +5,8 @@ import { openKept } from "../store/open";
 import { forgetRobot, robotList, type RobotSummary } from "../store/service";
 import { trouble } from "../store/state";
 import { tell, trying } from "../store/trouble";
-import { figure, when, words } from "../store/units";
-
-interface Kept {
-  id: string;
-  kind: string;
-  created: string;
-  robot: string | null;
-  energy: number | null;
-  duration: number | null;
-}
+import { figure, when } from "../store/units";
+import { Answers } from "./Answers";
 
 interface Study {
   id: string;
@@ -31,36 +23,12 @@ interface Iteration {
 }
 
 const MOST = 50;
-const OPENED = ["optimize", "cycle"]; // endpoints whose answers are drawn
-const OF_LOGS = ["identify", "residuals"]; // answers of identifications, which have a list of their own
-
-const textOf = ({ kind, energy, duration, robot }: Kept) =>
-  `${kind === "optimize" ? "" : `${kind === "cycle" ? "round" : words(kind)}: `}${energy === null ? "" : `${figure(energy)} J, ${figure(duration)} s, `}${robot ?? ""}`;
 
 /** What the service keeps: answers, studies, and robots of one's own. */
 export function LibraryPage() {
-  const [answers, setAnswers] = useState<Kept[]>([]);
-  const [next, setNext] = useState<string | null>(null);
-  const [filter, setFilter] = useState("");
-  const load = async (after?: string) => {
-    const page = await get<{ answers: Kept[]; next: string | null }>(
-      `answers?limit=${MOST}${after ? `&after=${after}` : ""}`,
-    );
-    const own = page.answers.filter(({ kind }) => !OF_LOGS.includes(kind));
-    setAnswers((before) => (after ? [...before, ...own] : own));
-    setNext(page.next);
-  };
   useEffect(() => {
     trouble.value = null;
-    load().catch((error) => tell(error));
   }, []);
-  const drop = async (id: string) => {
-    await remove(`answers/${id}`);
-    setAnswers((before) => before.filter((each) => each.id !== id));
-  };
-  const shown = answers.filter((each) =>
-    `${textOf(each)} ${each.id}`.toLowerCase().includes(filter.toLowerCase()),
-  );
   return (
     <main class="page" id="library">
       {trouble.value && (
@@ -69,40 +37,7 @@ export function LibraryPage() {
         </p>
       )}
       <div class="columns">
-        <section aria-label="Answers">
-          <h2>Answers</h2>
-          <input
-            type="search"
-            class="search"
-            aria-label="Search answers"
-            placeholder="Search"
-            value={filter}
-            onInput={(event) => setFilter(event.currentTarget.value)}
-          />
-          <ul class="kept" id="answers">
-            {shown.map((each) => (
-              <li key={each.id}>
-                <button
-                  type="button"
-                  class="choice"
-                  disabled={!OPENED.includes(each.kind)}
-                  onClick={trying(() => openKept(each.id))}
-                >
-                  <b>{textOf(each)}</b>
-                  <small>{when(each.created)}</small>
-                </button>
-                <Button
-                  kind="quiet"
-                  icon="trash"
-                  label={`Delete the answer of ${when(each.created)}`}
-                  onClick={trying(() => drop(each.id))}
-                />
-              </li>
-            ))}
-          </ul>
-          {!shown.length && <p class="hint">none</p>}
-          {next && <Button onClick={trying(() => load(next))}>Older</Button>}
-        </section>
+        <Answers />
         <Studies />
         <OwnRobots />
       </div>
@@ -119,6 +54,10 @@ function Studies() {
       (error) => tell(error),
     );
   }, []);
+  const drop = async (id: string) => {
+    await remove(`studies/${id}`);
+    setAll((before) => before.filter((each) => each.id !== id));
+  };
   const open = async ({ id, name }: Study) =>
     setOpened({ name, rows: (await get<{ history: Iteration[] }>(`studies/${id}`)).history });
   const title = ({ number, kind, energy }: Iteration) =>
@@ -157,6 +96,12 @@ function Studies() {
                   {study.iterations} iterations · {when(study.created)}
                 </small>
               </button>
+              <Button
+                kind="quiet"
+                icon="trash"
+                label={`Delete ${study.name}`}
+                onClick={trying(() => drop(study.id))}
+              />
             </li>
           ))}
         </ul>

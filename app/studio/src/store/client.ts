@@ -23,6 +23,9 @@ export const get = async <T>(path: string, signal?: AbortSignal): Promise<T> =>
 export const post = async <T>(path: string, body: unknown, signal?: AbortSignal): Promise<T> =>
   (await send(path, posting(body, signal))).json() as Promise<T>;
 
+export const patch = async <T>(path: string, body: unknown): Promise<T> =>
+  (await send(path, { ...posting(body), method: "PATCH" })).json() as Promise<T>;
+
 export const remove = (path: string) => send(path, { method: "DELETE" });
 
 const posting = (

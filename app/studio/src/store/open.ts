@@ -61,7 +61,8 @@ export async function openKept(path: string): Promise<void> {
   const address = path.includes("/")
     ? path.replace(/^\//, "")
     : `answers/${encodeURIComponent(path)}`;
-  const { answer } = await get<{ answer: Solution & Partial<Cycle> }>(address);
+  const kept = await get<{ name?: string | null; answer: Solution & Partial<Cycle> }>(address);
+  const { answer } = kept;
   if (!answer?.branch && !answer?.legs)
     throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
   const known = answer.id ? await askedFor(answer.id) : null;
@@ -69,7 +70,7 @@ export async function openKept(path: string): Promise<void> {
     known?.request ??
     (answer.legs ? requestOfCycle(answer as unknown as Cycle) : requestOfMove(answer));
   replaceCell({
-    project: { id: newId(), name: `Kept ${answer.id?.slice(0, 8) ?? "answer"}` },
+    project: { id: newId(), name: kept.name ?? `Kept ${answer.id?.slice(0, 8) ?? "answer"}` },
     request,
     typed: known?.typed,
     economics: known?.economics,

@@ -33,6 +33,7 @@ export async function reportAnswer(format: ReportFormat): Promise<void> {
   const body = {
     [endpointOf(shown.asked)]: shown.asked,
     answer: shown.solution.id,
+    period: given.cycle,
     costs: costsFor(given, costsOf([], shown.solution.duration, given).cyclesPerShift),
   };
   await report(body, name, format);

@@ -1,14 +1,16 @@
 // The way of a request to the service and back, with its progress.
 import { batch } from "@preact/signals";
 import { obstaclesOf } from "./chain";
-import { Problem, stream } from "./client";
+import { patch, Problem, stream } from "./client";
 import { cycleAnswered } from "./cycle";
+import { askedFor } from "./persist";
 import { robotOf } from "./service";
 import { dressedLater } from "./tools";
 import { endpointOf } from "./request";
 import {
   answered,
   ghosts,
+  project,
   racers,
   request,
   run,
@@ -31,7 +33,13 @@ export async function optimise(asked: ApiRequest = request.value): Promise<void>
   const began = performance.now();
   const answer = await compute(endpointOf(asked), asked);
   if (!answer) return;
+  const { id } = answer as Solution;
+  const fresh = id !== null && !(await askedFor(id));
   await showAnswer(answer, asked, (performance.now() - began) / 1000);
+  if (fresh)
+    void patch(`answers/${id}`, { name: project.value.name.slice(0, 200) || null }).catch(
+      () => undefined,
+    );
   if (tab.value === "task") tab.value = "answer";
 }
 
