@@ -83,10 +83,8 @@ def pareto(
             `duration_max`. Its `deadline` holds for the whole front.
         points: largest number of motions, 2 to 100.
         clock: function that returns the time [s].
-        tell: receives the progress, with the durations as candidates and the motion of least
-            energy.
-        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
-            `tell` is given.
+        tell: receives the progress: durations as candidates, and the motion of least energy.
+        progress: whether a bar may show the progress, as of `optimize`.
 
     Returns:
         The motions of the front, fastest first.
@@ -133,9 +131,8 @@ class _Search:
             else self.keep(found)
         )
         if (answer := self.least.answer) is not None:
-            self.tell(
-                Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q)
-            )
+            best = Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q)
+            self.tell(best)
         while (
             len(self.nodes) < self.n
             and self.left() > 0
@@ -341,16 +338,13 @@ class _Search:
                 points.append(node.answer)
                 least = node.energy
         if not points:
-            raise DeadlineExceeded(
-                [candidate.report() for candidate in self.fastest_run.state.candidates]
-            )
+            reports = [each.report() for each in self.fastest_run.state.candidates]
+            raise DeadlineExceeded(reports)
+        solves = self.solves + self.fastest_run.state.solves
         return Front(
             status="optimal" if complete else "feasible",
             shortest=shortest,
             points=points,
             dropped=[each for each in dropped if math.isfinite(each.duration)],
-            solver=FrontSolver(
-                wall_time=self.clock() - self.began,
-                nlp_solves=self.solves + self.fastest_run.state.solves,
-            ),
+            solver=FrontSolver(wall_time=self.clock() - self.began, nlp_solves=solves),
         )
