@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -141,6 +142,35 @@ def by_field(
     )
 
 
+def _as_ros(value: Any) -> Any:
+    """A pose of ROS, with or without a header, in the form of the schemas: `orientation: {x, y, z,
+    w}` becomes `quaternion`, `position: {x, y, z}` a list, and `frame_id` the `frame`.
+    """
+    if isinstance(value, dict) and value.keys() == {"header", "pose"}:
+        header, pose = value["header"], value["pose"]
+        frame = header.get("frame_id") if isinstance(header, dict) else None
+        if not isinstance(pose, dict) or frame not in ("base", "base_link", "/base", "/base_link"):
+            raise PydanticCustomError(
+                "stamped", "A stamped pose needs a `pose`, and the `frame_id` base or base_link"
+            )
+        value = pose | {"frame": frame.lstrip("/")}
+    if not isinstance(value, dict):
+        return value
+    position, orientation = value.get("position"), value.get("orientation")
+    if isinstance(position, dict) and position.keys() == {*"xyz"}:
+        value = value | {"position": [position[part] for part in "xyz"]}
+    if "quaternion" in value or not isinstance(orientation, dict):
+        return value
+    if orientation.keys() == {*"xyzw"}:
+        value = value | {"quaternion": [orientation[part] for part in "xyzw"]}
+        del value["orientation"]
+    return value
+
+
+AS_IN_ROS = BeforeValidator(_as_ros)
+"""Also takes geometry_msgs/Pose and PoseStamped as JSON."""
+
+
 def number_or_object(number: str, error: str, message: str) -> Discriminator:
     """Discriminator of a union of a number, with the tag `number`, and an object, with the tag
     `range`.
@@ -207,7 +237,8 @@ class WithQuaternion(Request):
 
     quaternion: Quaternion = described(
         "Orientation as a quaternion [x, y, z, w]. Its norm must be within 0.001 of 1; it is then "
-        "normalised.",
+        "normalised. ROS's `orientation: {x, y, z, w}` is taken in its place, and a whole "
+        "PoseStamped in place of the pose.",
         "1",
         [0.0, 1.0, 0.0, 0.0],
     )
@@ -250,6 +281,7 @@ Pose = Annotated[
     | Annotated[RpyPose, Tag("by rpy")]
     | Annotated[RotvecPose, Tag("by rotvec")],
     by_field("quaternion", "rpy", "rotvec", beside="position", example=TURNED),
+    AS_IN_ROS,
 ]
 
 Frame = Literal["base", "base_link"]
@@ -293,6 +325,7 @@ BasePose = Annotated[
     | Annotated[BaseRpyPose, Tag("by rpy")]
     | Annotated[BaseRotvecPose, Tag("by rotvec")],
     by_field("quaternion", "rpy", "rotvec", beside="position", example=TURNED),
+    AS_IN_ROS,
 ]
 
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])

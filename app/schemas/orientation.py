@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Discriminator, Tag
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.schemas.common import (
+    AS_IN_ROS,
     BaseQuaternionPose,
     BaseRotvecPose,
     BaseRpyPose,
@@ -138,4 +139,5 @@ TargetPose = Annotated[
     | Annotated[BaseRotvecPose, Tag("by rotvec")]
     | Annotated[ConeOrientedPose, Tag("by orientation")],
     by_field("quaternion", "rpy", "rotvec", "orientation", beside="position", example=TURNED),
+    AS_IN_ROS,
 ]
