@@ -1,15 +1,15 @@
 """Cycles of stops: what deciding all stops together saves against move by move, the proven gap, and
 the time.
 
-    python -m benchmarks.rounds --count 20
-    python -m benchmarks.rounds --count 50 --dwell 0
-    python -m benchmarks.rounds --count 50 --anywhere
-    python -m benchmarks.rounds --count 50 --turned
-    python -m benchmarks.rounds --count 5 --stops 12
-    python -m benchmarks.rounds --count 10 --time 1.5
-    python -m benchmarks.rounds --count 20 --stops 5 --passes 4
-    python -m benchmarks.rounds --count 5 --stops 12 --free
-    python -m benchmarks.rounds --count 1 --stops 245 --deadline 600
+    python -m benchmarks.cycles --count 20
+    python -m benchmarks.cycles --count 50 --dwell 0
+    python -m benchmarks.cycles --count 50 --anywhere
+    python -m benchmarks.cycles --count 50 --turned
+    python -m benchmarks.cycles --count 5 --stops 12
+    python -m benchmarks.cycles --count 10 --time 1.5
+    python -m benchmarks.cycles --count 20 --stops 5 --passes 4
+    python -m benchmarks.cycles --count 5 --stops 12 --free
+    python -m benchmarks.cycles --count 1 --stops 245 --deadline 600
 
 A UR5e starts from rest at given joint positions over the table, takes up 2 kg at every other stop,
 puts it down at the next one, and comes back. Poses are drawn with the tool nearly down where the

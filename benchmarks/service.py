@@ -165,33 +165,6 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
                 process.wait()
 
 
-@contextlib.contextmanager
-def a_cluster(workers: int) -> Iterator[str]:
-    """A Dask scheduler, whose address this is, and one machine with that many workers."""
-    port = _free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    commands = [
-        [
-            "distributed.cli.dask_scheduler",
-            "--host",
-            "127.0.0.1",
-            "--port",
-            f"{port}",
-            "--no-dashboard",
-        ],
-        ["joulepath.app.cli", "cluster-worker", address],
-    ]
-    given = os.environ | {"JOULEPATH_WORKERS": f"{workers}", "JOULEPATH_LOG_LEVEL": "error"}
-    with contextlib.ExitStack() as stack:
-        for command in commands:
-            process = subprocess.Popen(
-                [sys.executable, "-m", *command], cwd=ROOT, env=given, stderr=subprocess.DEVNULL
-            )
-            stack.callback(process.wait)
-            stack.callback(process.terminate)
-        yield address
-
-
 def _free_port() -> int:
     """A port that no connection of a client gets by chance: Linux gives them ports from 32768
     on."""
@@ -200,27 +173,6 @@ def _free_port() -> int:
             free.bind(("127.0.0.1", port))
             return port
     raise RuntimeError("no free port: end other services")
-
-
-def processor_time(pid: int) -> float:
-    """Processor time that a process has used [s]."""
-    times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-    return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
-
-
-def descendants(pid: int) -> set[int]:
-    """The processes that a process has started, and those that these have started."""
-    parents: dict[int, int] = {}
-    for folder in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            parents[int(folder.name)] = int(
-                (folder / "stat").read_text().rpartition(")")[2].split()[1]
-            )
-    found, waiting = set[int](), {pid}
-    while waiting:
-        waiting = {child for child, parent in parents.items() if parent in waiting}
-        found |= waiting
-    return found
 
 
 def resident(pid: int) -> float:

@@ -58,7 +58,7 @@ from .optimizer.identify.logs.log_options import LogOptions
 from .optimizer.identify.logs.log_report import LogReport
 from .optimizer.identify.logs.reading import LogReading, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
-from .optimizer.identify.results import Advice, Parameter, Validation
+from .optimizer.identify.results import Advice, IdentifiedParameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
 from .optimizer.motion.spline import Spline
 from .optimizer.optimize import optimize
@@ -194,6 +194,7 @@ __all__ = [
     "IKSolutions",
     "Identification",
     "IdentificationOptions",
+    "IdentifiedParameter",
     "Improved",
     "InCollision",
     "IntervalEnergy",
@@ -234,7 +235,6 @@ __all__ = [
     "Optimized",
     "Outcome",
     "OutsideLimits",
-    "Parameter",
     "PathInfeasible",
     "Payload",
     "PayloadUnknown",

@@ -38,8 +38,8 @@ class Internal:
     """Marks a field of the library that no answer shows."""
 
 
-class NullIfInfinite:
-    """Marks a possibly infinite number, shown as null in JSON."""
+class NullIfNotFinite:
+    """Marks a number that may be infinite or NaN, shown as null in JSON."""
 
 
 class NotEmpty:

@@ -27,7 +27,7 @@ from typing import (
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from joulepath.optimizer.declared import Axes, Keys, NotEmpty, NullIfInfinite, Unit
+from joulepath.optimizer.declared import Axes, Keys, NotEmpty, NullIfNotFinite, Unit
 from joulepath.optimizer.presentation.declared_fields import (
     hints_of,
     is_declared,
@@ -143,7 +143,7 @@ def _annotated(inner: Any, markers: tuple[Any, ...]) -> Any:
     axes = [name for marker in markers if isinstance(marker, Axes) for name in marker.names]
     keys = [marker.of for marker in markers if isinstance(marker, Keys)]
     found: Any = model_of(keys[0]) if keys else float if axes else _type(inner)
-    if NullIfInfinite in markers:
+    if NullIfNotFinite in markers:
         found = found | None
     for _ in axes:
         found = list[found]

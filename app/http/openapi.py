@@ -138,7 +138,7 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
         if "answer" not in example:
             continue
         responses = document["paths"][path]["post"]["responses"]
-        answer = next(responses[status] for status in ("200", "201") if status in responses)
+        answer = next(responses[status] for status in ("200", "201", "202") if status in responses)
         add_examples(schemas, answer["content"]["application/json"]["schema"], example["answer"])
     _add_access(document, with_keys)
     add_pages(document)

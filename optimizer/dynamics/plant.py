@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar
 
@@ -126,29 +126,6 @@ class Plant:
                 cannot depend on a charge.
             width: smoothing width of the corners of the cost [W].
         """
-        return self._parameters(electrical, mechanical, time, regeneration, width).pack()
-
-    @cached_property
-    def frictionless_parameters(self) -> Array:
-        """Packed kernel parameters without friction and with zero cost: the limited torque is then
-        the torque of rigid bodies and rotors.
-        """
-        parts, none = (
-            self._parameters(0.0, 0.0, 0.0, None, SMOOTHING.power_width),
-            np.zeros(self.arm.robot.nq),
-        )
-        return replace(
-            parts, coulomb=none, curved=none, viscous=none, load=none, link_side=0.0
-        ).pack()
-
-    def _parameters(
-        self,
-        electrical: float,
-        mechanical: float,
-        time: float,
-        regeneration: float | None,
-        width: float,
-    ) -> Parameters:
         payload, friction, drives, nq = (
             self.arm.payload,
             self.arm.friction_law,
@@ -182,7 +159,7 @@ class Plant:
             time=time,
             knee=SMOOTHING.knee,
             width=width,
-        )
+        ).pack()
 
     @cached_property
     def electrical_parameters(self) -> Array:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.declared import NullIfInfinite, Ratio, Seconds, Unit
+from joulepath.optimizer.declared import NullIfNotFinite, Ratio, Seconds, Unit
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
 from joulepath.optimizer.evaluate.piecewise_motion import Indices, PiecewiseMotion
 from joulepath.optimizer.kinematics.path_constraints import path_constraints_of
@@ -45,7 +45,7 @@ STEPS = StepSettings()
 class LimitReport:
     """One limit, at the instant of the motion with the largest value / limit."""
 
-    worst_ratio: Annotated[Ratio, NullIfInfinite]
+    worst_ratio: Annotated[Ratio, NullIfNotFinite]
     """|value| / limit; for positions: distance from the middle of the range / half of the range.
     Null
     if the value is infinite."""
@@ -57,7 +57,7 @@ class LimitReport:
     """Name of the joint; null for `tool_cone`, `tcp_speed` and `elbow_speed`."""
     t: Seconds
     """Time of this instant, from the start of the motion."""
-    value: Annotated[float, Unit("SI"), NullIfInfinite]
+    value: Annotated[float, Unit("SI"), NullIfNotFinite]
     """Value at this instant, in the unit of the limit: rad, rad/s, rad/s², rad/s³, N·m or m/s. Null
     if it is infinite: the acceleration at a velocity step, the jerk at an acceleration step."""
     bound: Annotated[float, Unit("SI")]

@@ -35,8 +35,8 @@ from joulepath.optimizer.identify.results import (
     Advice,
     Curves,
     IdentifiedFigures,
+    IdentifiedParameter,
     MeasuredNoise,
-    Parameter,
     Physical,
     Residuals,
     Structure,
@@ -57,7 +57,7 @@ class Identification:
     options: IdentificationOptions
     fitted: FitResult
     spread: Spread
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[IdentifiedParameter, ...]
     structure: Structure
     physical: Physical | None
     residuals: Residuals

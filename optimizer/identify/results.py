@@ -3,65 +3,85 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.declared import (
+    Count,
+    Internal,
+    NullIfNotFinite,
+    PerJoint,
+    Ratio,
+    Unit,
+    Watts,
+)
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.estimates.grouped import IntArray
 
+Percent = Annotated[float, Unit("%")]
+PercentPerJoint = Annotated[PerJoint, Unit("%"), NullIfNotFinite]
+Kelvin = Annotated[PerJoint, Unit("K"), NullIfNotFinite]
+PerKelvin = Annotated[PerJoint, Unit("1/K"), NullIfNotFinite]
+
 
 @dataclass(frozen=True)
-class Parameter:
+class IdentifiedParameter:
     """One figure, with its uncertainty."""
 
     figure: str
-    joint: int | None
-    """Number of the joint from 0; None for a figure of the whole arm."""
-    value: float
-    sd: float
+    """Name of the figure, as in `GET /robots/{name}`, or the expression of a base parameter."""
+    joint: Count | None
+    """Number of the joint, from 0; null for a figure of the whole arm."""
+    value: Annotated[float, Unit("SI")]
+    """The value that is used."""
+    sd: Annotated[float, Unit("SI")]
     """Standard deviation of the value."""
-    previous: float
+    previous: Annotated[float, Unit("SI")]
     """The robot's own value."""
     identified: bool
+    """Whether the logs determine the figure."""
     why: str
-    """Reason for not identifying it, or empty."""
+    """Reason for not identifying it; empty if the logs determine it."""
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueErrors:
-    """Errors of predicted torques."""
+    """Errors of predicted torques; null for joints at rest."""
 
-    rmse: Array
-    """Root mean square of the error of each joint (nq,) in motion [N·m]."""
-    relative: Array
-    """Error over the measured torque of each joint (nq,) in motion [%]."""
-    relative_all: Array
-    """Error over the measured torque of each joint (nq,) in all rows [%]."""
-    shaft_energy: float
-    """Error of the energy at the shafts [%]."""
-    copper_energy: float
-    """Error of the energy in the copper [%]."""
+    rmse: Annotated[PerJoint, Unit("N·m")]
+    """Root mean square of the error of each joint in motion."""
+    relative: PercentPerJoint
+    """Error over the measured torque of each joint in motion."""
+    relative_all: PercentPerJoint
+    """Error over the measured torque of each joint in all rows."""
+    shaft_energy: Annotated[Percent, NullIfNotFinite]
+    """Error of the energy at the shafts."""
+    copper_energy: Annotated[Percent, NullIfNotFinite]
+    """Error of the energy lost in copper."""
 
 
 @dataclass(frozen=True, eq=False)
 class PowerErrors:
     """Errors of predicted power."""
 
-    rmse: float
-    """Root mean square of the error of rows in motion [W]."""
-    energy_mean: float
-    """Mean error of the energy of a move [%]."""
-    energy_p90: float
-    """90th percentile of the error of the energy of a move [%]."""
-    energy_max: float
-    """Largest error of the energy of a move [%]."""
+    rmse: Watts
+    """Root mean square of the error of rows in motion."""
+    energy_mean: Percent
+    """Mean error of the energy of a move."""
+    energy_p90: Percent
+    """90th percentile of the error of the energy of a move."""
+    energy_max: Percent
+    """Largest error of the energy of a move."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Errors of one set of figures on held-out moves; None for a channel that was not logged."""
+    """Errors of one set of figures on held-out moves."""
 
     torque: TorqueErrors | None
+    """Errors of torques; null without efforts."""
     power: PowerErrors | None
+    """Errors of power; null without power."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,19 +109,19 @@ class Curves:
 class Validation:
     """Errors on moves that were not part of the fit."""
 
-    moves: int
+    moves: Count
     """Number of these moves."""
     fitted: Prediction
     """Errors of the identified figures."""
     own: Prediction
     """Errors of the robot's own figures."""
     constant: PowerErrors | None
-    """Errors of a constant power; None without power."""
-    coverage: float | None
-    """Share of the moves with a measured energy between P5 and P95 [1]; None without power."""
-    half_width: float | None
-    """Mean of half the interval from P5 to P95 [%]; None without power."""
-    curves: Curves
+    """Errors of a constant power; null without power."""
+    coverage: Ratio | None
+    """Share of the moves with a measured energy between P5 and P95; null without power."""
+    half_width: Percent | None
+    """Mean of half the interval from P5 to P95; null without power."""
+    curves: Annotated[Curves, Internal]
     """The moves, as predicted by the fit without them."""
 
 
@@ -109,17 +129,17 @@ class Validation:
 class Structure:
     """Standard and base parameters of bodies and rotors."""
 
-    standard: int
+    standard: Count
     """Number of standard parameters."""
-    base: int
+    base: Count
     """Number of base parameters."""
     base_expressions: tuple[str, ...]
     """Base parameters as sums of standard parameters."""
-    condition: float | None
+    condition: Ratio | None
     """Condition number of the columns of the base parameters in the logs, scaled to unit length;
-    None where the inertials are not fitted."""
-    excited: int | None
-    """Rank of these columns; None where the inertials are not fitted."""
+    null without a refit of the inertials."""
+    excited: Count | None
+    """Rank of these columns; null without a refit of the inertials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,49 +148,49 @@ class Physical:
 
     consistent: bool
     """Whether the inertials of every link belong to a real body."""
-    min_eigenvalue: Array
-    """Least eigenvalue of each pseudo-inertia (nq,)."""
+    min_eigenvalue: Annotated[PerJoint, Unit("SI")]
+    """Least eigenvalue of the pseudo-inertia of each link."""
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Correlation of neighbouring residuals, NaN for a channel that was not logged."""
+    """Correlation of neighbouring residuals; null for a channel that was not logged."""
 
-    torque_lag_one: Array
-    """Correlation of torque residuals of each joint (nq,) [1]."""
-    power_lag_one: float
-    """Correlation of power residuals [1]."""
+    torque_lag_one: Annotated[PerJoint, Unit("1"), NullIfNotFinite]
+    """Correlation of torque residuals of each joint."""
+    power_lag_one: Annotated[Ratio, NullIfNotFinite]
+    """Correlation of power residuals."""
     white: bool
     """Whether all correlations are below 0.3."""
-    sessions: tuple[float, ...]
-    """Friction of each log over the fitted friction [1]."""
+    sessions: Annotated[tuple[float, ...], Unit("1")]
+    """Friction of each log over the fitted friction."""
 
 
 @dataclass(frozen=True, eq=False)
 class Temperatures:
     """Friction over temperature per joint: friction(T) = friction(T0)·exp(-k (T - T0))."""
 
-    reference: Array
-    """Reference temperature T0 (nq,) [°C]; NaN without temperatures."""
-    span: Array
-    """Span of the temperatures (nq,) [K]; NaN without temperatures."""
-    k: Array
-    """Rate (nq,) [1/K]; NaN where the span is too small."""
-    sd: Array
-    """Standard deviation of the rate (nq,) [1/K]."""
+    reference: Annotated[PerJoint, Unit("°C"), NullIfNotFinite]
+    """Reference temperature T0, the mean of the logs; null without temperatures."""
+    span: Kelvin
+    """Span of the temperatures of the logs; null without temperatures."""
+    k: PerKelvin
+    """Rate k; null where the span is below 8 K."""
+    sd: PerKelvin
+    """Standard deviation of the rate."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredNoise:
     """Noise of a periodic motion."""
 
-    periods: int
+    periods: Count
     """Number of periods."""
-    deviation: Array
-    """Standard deviation of the torque of a row (nq,) [N·m]."""
-    excess: float
-    """Mean square of the residuals over that of the noise [1]: 1 for a correct model, more for a
-    model that misses an effect."""
+    deviation: Annotated[PerJoint, Unit("N·m")]
+    """Standard deviation of the torque of each joint in a row."""
+    excess: Ratio
+    """Mean square of the residuals over that of the noise: 1 for a correct model, more for a model
+    that misses an effect."""
 
 
 @dataclass(frozen=True)
@@ -179,12 +199,12 @@ class Advice:
 
     figure: str
     """Figure whose better knowledge would reduce the variance of the energy most."""
-    joint: int | None
-    """Number of the joint from 0; None for a figure of the whole arm."""
-    share: float
-    """Share of the variance that would vanish [1]."""
+    joint: Count | None
+    """Number of the joint, from 0; null for a figure of the whole arm."""
+    share: Ratio
+    """Share of the variance that would vanish."""
     do: str
-    """Motion or channel to log."""
+    """Motion or channel to log. Four times as many such moves halve the standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)

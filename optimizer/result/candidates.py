@@ -12,7 +12,7 @@ from joulepath.optimizer.declared import (
     Count,
     Internal,
     Joules,
-    NullIfInfinite,
+    NullIfNotFinite,
     PerJoint,
     Seconds,
     Unit,
@@ -78,7 +78,7 @@ class CandidateReport(NamedTuple):
     one may exist. `unvisited`: not solved."""
     reason: str
     """Reason for the status, in words."""
-    lower_bound: Annotated[Joules, NullIfInfinite]
+    lower_bound: Annotated[Joules, NullIfNotFinite]
     """Lower bound of the objective for this pair of configurations; null if no motion exists or
     none was computed."""
     energy: Joules | None = None

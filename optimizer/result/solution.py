@@ -11,7 +11,7 @@ from joulepath.optimizer.declared import (
     Count,
     MetresPerSecond,
     NotEmpty,
-    NullIfInfinite,
+    NullIfNotFinite,
     PerJoint,
     PerSample,
     PerSampleAndJoint,
@@ -100,7 +100,7 @@ class LimitsInForce(Comparable):
     """Joint velocity."""
     acceleration: Annotated[PerJoint, Unit("rad/s²")]
     """Joint acceleration."""
-    jerk: Annotated[PerJoint, Unit("rad/s³"), NullIfInfinite]
+    jerk: Annotated[PerJoint, Unit("rad/s³"), NullIfNotFinite]
     """Joint jerk."""
     torque: Annotated[PerJoint, Unit("N·m")]
     """Torque at the joint, on the side of the robot's `limits.torque_side`."""

@@ -36,8 +36,7 @@ from joulepath.optimizer.search.outer_turns import FAMILIES, families_of, settle
 from joulepath.optimizer.search.sharpening import SHARPENING, follow_in_time
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
-from joulepath.optimizer.solve.methods.method import above
-from joulepath.optimizer.solve.methods.refined_work import refine_work
+from joulepath.optimizer.solve.methods.method import Method, above
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 
@@ -210,37 +209,23 @@ class _LeastWorkSearch:
 
     def _sharpen(self, motion: CoarseMotion) -> bool:
         """Follow a motion to sharp corners, unless it falls behind; whether it succeeds."""
-        result = self._sharpened(motion)
-        if result.spline is not None:
-            self.tried.add(motion.candidate)
-        elif result.status is SolveStatus.PRUNED:
-            self.behind.add(motion.candidate)
-        return result.spline is not None
-
-    def _sharpened(self, motion: CoarseMotion) -> SolveResult:
-        """A candidate's solve with sharp corners; by the SQP if the motion collides or fails."""
-        state, found = self.state, list[Array]()
-
-        def sharpen() -> SolveResult:
-            result, points = refine_work(
-                state.prepared,
-                motion.on(SHARPENING.dense_points),
-                self.solver.duration,
-                LEAST_WORK.first_width,
-                self._least_energy,
-            )
-            found.append(points)
-            return result
-
-        result = in_time(state, sharpen)
-        if result.spline is None and result.status is not SolveStatus.PRUNED and found:
-            width, progress = SMOOTHING.sharper_power_widths[-1], SHARPENING.last_progress
-            return self._solved(motion, found[0], width, progress)
-        if result.spline is not None:
-            energy = state.prepared.energy(result.spline)
-            state.accept_if_better(motion.candidate, result, energy)
-            state.tell_tried(motion.candidate)
-        return result
+        *wide, last = SHARPENING.steps
+        points = motion.on(SHARPENING.dense_points)
+        for step in wide:
+            solver = self._solver(motion.candidate, step.width)
+            attempt = partial(solver.solve_control_points, unchecked=True)
+            result = self._attempt(attempt, points, step.progress)
+            if result.spline is None:
+                break
+            cost = self.state.prepared.cost_of(result.spline)
+            if cost > SHARPENING.rounder_ratio * self._least_energy:
+                self.behind.add(motion.candidate)
+                return False
+            points = result.spline.control_points
+        if self._solved(motion, points, last.width, last.progress).spline is None:
+            return False
+        self.tried.add(motion.candidate)
+        return True
 
     def _solve_promising(self) -> None:
         """Solve candidates whose coarse motions promise less than the best energy."""
@@ -293,15 +278,10 @@ class _LeastWorkSearch:
         """
         state, candidate = self.state, motion.candidate
         is_dense = len(points) == SHARPENING.dense_points
-        interval = duration_intervals(state.prepared, candidate.q_goal, width=width)[0]
-        solver = solver_of(state, candidate, interval, below)
+        solver = self._solver(candidate, width, below)
         result = SolveResult(SolveStatus.FAILED, SolveReason.TOO_SHORT_FOR_EVEN_KNOTS)
         if is_dense or self.solver.duration >= SPLINE_SPACES.tight * candidate.shortest:
-            space, duration = bspline.uniform(len(points)), self.solver.duration
-            result = in_time(
-                state,
-                partial(solver.solve_control_points, space, points, duration, progress),
-            )
+            result = self._attempt(solver.solve_control_points, points, progress)
         if result.status is SolveStatus.FAILED and not is_dense:
             result = in_time(state, solver.solve)
         state.cut_short |= result.cut_short
@@ -313,6 +293,18 @@ class _LeastWorkSearch:
         if candidate.status is not CandidateStatus.UNVISITED:
             state.tell_tried(candidate)
         return result
+
+    def _solver(self, candidate: Candidate, width: float, below: float = np.inf) -> Method:
+        """The method for a candidate, with corners of a width [W]; `below` as of `_solved`."""
+        interval = duration_intervals(self.state.prepared, candidate.q_goal, width=width)[0]
+        return solver_of(self.state, candidate, interval, below)
+
+    def _attempt(
+        self, attempt: Callable[..., SolveResult], points: Array, progress: float
+    ) -> SolveResult:
+        """The result of a solve from evenly spaced control points (n, nq) [rad]."""
+        space, duration = bspline.uniform(len(points)), self.solver.duration
+        return in_time(self.state, partial(attempt, space, points, duration, progress))
 
     def not_promising(self) -> list[Candidate]:
         """The open candidates whose coarse motions do not promise less than the best energy."""

@@ -51,8 +51,6 @@ class LeastWorkSettings:
     """Largest ratio of work of a motion without collision that is followed."""
     most_followed: int = 6
     """Largest number of motions followed."""
-    first_width: float = 0.2
-    """First width of their corners [W]."""
     promise: float = 0.97
     """Ratio of work with all control points and sharp corners to work of a coarse motion."""
     colliding_ratio: float = 1.05

@@ -13,6 +13,7 @@ from joulepath.app.api.identifications.models import (
     Identification,
     IdentificationList,
     IdentificationPage,
+    IdentificationSummary,
     ListedIdentification,
     ResidualCurves,
 )
@@ -73,7 +74,7 @@ async def add(
     store: ServiceStore,
     client: ServiceClient,
     key: Key = None,
-) -> Identification:
+) -> IdentificationSummary:
     """Finds friction, rotor inertia and power of one arm from its logs, with their prediction
     errors on held-out moves. The work is a job with the same id: see `GET /jobs/{id}`."""
     robots = set()
@@ -107,7 +108,7 @@ async def list_identifications(
     response_model=Identification,
     responses=problem_responses(UnknownIdentification, StoreUnavailable),
 )
-async def show(id: IdentificationId, store: ServiceStore) -> Identification:
+async def show(id: IdentificationId, store: ServiceStore) -> IdentificationSummary:
     """The state of an identification and, once it is done, its result."""
     return await _shown(store, id)
 
@@ -128,7 +129,7 @@ async def residuals(id: IdentificationId, store: ServiceStore) -> Response:
     return result_response(TaskResult.of_json(content))
 
 
-async def _shown(store: ServiceStore, job_id: str) -> Identification:
+async def _shown(store: ServiceStore, job_id: str) -> IdentificationSummary:
     content = await store.read(partial(_content, job_id=job_id))
     return Identification.model_validate_json(orjson.dumps(content))
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from joulepath.app.answers.envelope import AnswerFigures
+from joulepath.app.api.identifications.answer import IdentificationResult
 from joulepath.app.api.identifications.request import Fraction, IdentifyRequest
 from joulepath.app.convert.arm import robot_named
 from joulepath.app.convert.fields import location
@@ -21,7 +21,6 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.fits.payload_fit import IdentifiedPayload
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
@@ -60,7 +59,7 @@ class IdentifyTask:
         curves = StoredAnswer(
             str(uuid.uuid4()), json_document({"moves": moves}), AnswerFigures(robot.name)
         )
-        return TaskResult.of_json(_identification_fields(found, others), (curves,))
+        return TaskResult.of_json(IdentificationResult.of(found, others), (curves,))
 
 
 def _to_options(request: IdentifyRequest) -> IdentificationOptions:
@@ -79,26 +78,6 @@ def _to_options(request: IdentifyRequest) -> IdentificationOptions:
         velocity_threshold=request.velocity_threshold,
         prior_weight=request.prior_weight,
     )
-
-
-def _identification_fields(found: Identification, validation: Validation) -> dict[str, Any]:
-    """Fields of an answer about an identification."""
-    return {
-        "robot": found.robot.name,
-        "document": found.document(datetime.now(UTC).date().isoformat()),
-        "parameters": [asdict(each) for each in found.parameters],
-        "structure": asdict(found.structure),
-        "physical": None if found.physical is None else asdict(found.physical),
-        "validation": {
-            name: value for name, value in asdict(validation).items() if name != "curves"
-        },
-        "residuals": asdict(found.residuals),
-        "temperatures": asdict(found.temperatures),
-        "noise": None if found.noise is None else asdict(found.noise),
-        "thresholds": found.thresholds,
-        "advice": None if found.advice is None else asdict(found.advice),
-        "payload": None if found.payload is None else _payload_fields(found.payload),
-    }
 
 
 def _residual_fields(
@@ -136,14 +115,3 @@ def _series(measured: Array, modelled: Array) -> dict[str, Any] | None:
 def _rounded(values: Array) -> Array:
     # The resolution exceeds that of sensors, and the document is half as long.
     return np.ascontiguousarray(values.round(_DECIMALS))
-
-
-def _payload_fields(carried: IdentifiedPayload) -> dict[str, Any]:
-    mass_sd, *com_sd = np.sqrt(np.diag(carried.covariance)).tolist()
-    told = {
-        "log": carried.log,
-        "mass": carried.mass,
-        "com": carried.com.tolist(),
-        "why": carried.why,
-    }
-    return told | {"mass_sd": mass_sd, "com_sd": com_sd}

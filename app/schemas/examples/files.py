@@ -2,7 +2,8 @@
 
 `examples/openapi/<path>.json` lists the requests that the OpenAPI document shows, by the names of
 their files in `examples/<path>`, each with its summary and description. It has an answer, too,
-unless the models of the answer have examples of their own. Parameters are left out of a path: where
+unless the models of the answer have examples of their own, and no requests if they are in a module
+of this room. Parameters are left out of a path: where
 it has one, the files may be in folders, which give the examples their names.
 """
 
@@ -44,7 +45,7 @@ def shown() -> dict[str, dict[str, Any]]:
 def body_examples(path: str) -> dict[str, dict[str, Example]]:
     """Examples of the body of a path: by media type, then by name."""
     found: dict[str, dict[str, Example]] = {}
-    for name, words in shown()[path]["requests"].items():
+    for name, words in shown()[path].get("requests", {}).items():
         file = folder() / _PARAMETER.sub("", path)[1:] / name
         text = file.read_text(encoding="utf-8")
         value = json.loads(text) if file.suffix == ".json" else text

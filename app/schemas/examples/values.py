@@ -23,7 +23,6 @@ LOG_ID = "1f4e6a0b-52f7-4c9e-9a0c-6f1d2e3b4a59"
 OTHER_LOG_ID = "8c2d7e15-0b3a-4f6d-8e41-2a9b5c7d6e30"
 IDENTIFICATION_ID = "3d0b7c55-8e0a-4a6b-b1f0-7a5d9c2e4f18"
 CREATED = "2025-03-14T09:26:53.589793Z"
-STANDING_STILL = [0.0] * 6
 
 POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 TURNED = {"position": [-0.35, 0.4, 0.3], "rotvec": [0.0, 3.14, 0.0]}

@@ -28,7 +28,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
 from joulepath.optimizer.identify.fits.block import moving_rows
 from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.results import Parameter
+from joulepath.optimizer.identify.results import IdentifiedParameter
 from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of, effective_variance
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 from joulepath.optimizer.problem.arm import Payload
@@ -83,13 +83,13 @@ class IdentifiedPayload:
     why: str
     """Reason for not identifying it, or empty."""
 
-    def parameters(self, stated: Payload) -> tuple[Parameter, ...]:
+    def parameters(self, stated: Payload) -> tuple[IdentifiedParameter, ...]:
         """Figures of the payload, beside the values stated with the log."""
         own = [stated.mass, *stated.com.tolist()]
         values = [self.mass, *self.com.tolist()]
         deviations = np.sqrt(np.diag(self.covariance)).tolist()
         return tuple(
-            Parameter(*name, value, sd, previous, not self.why, self.why)
+            IdentifiedParameter(*name, value, sd, previous, not self.why, self.why)
             for name, value, sd, previous in zip(FIGURE_NAMES, values, deviations, own, strict=True)
         )
 

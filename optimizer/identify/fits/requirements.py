@@ -14,7 +14,7 @@ from joulepath.optimizer.identify.fits.payload_fit import joints_without_gravity
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.results import Parameter
+from joulepath.optimizer.identify.results import IdentifiedParameter
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
@@ -66,7 +66,7 @@ def check_logs(
 
 
 def check_identified(
-    parameters: Sequence[Parameter], logs: Sequence[Log], options: IdentificationOptions
+    parameters: Sequence[IdentifiedParameter], logs: Sequence[Log], options: IdentificationOptions
 ) -> None:
     """Check that at least one requested figure is identified.
 

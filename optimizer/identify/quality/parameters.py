@@ -14,12 +14,12 @@ from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE
 from joulepath.optimizer.identify.fits.torque_fit import AT_BOUND, TORQUE_FIT, UNCERTAIN
 from joulepath.optimizer.identify.fits.whole_fit import LINK
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.results import Parameter
+from joulepath.optimizer.identify.results import IdentifiedParameter
 
 
 def parameters_of(
     robot: Robot, estimate: Estimate, options: IdentificationOptions
-) -> tuple[Parameter, ...]:
+) -> tuple[IdentifiedParameter, ...]:
     """Parameters of an estimate, with the reason for every parameter that is not identified."""
     base = BaseTerms.of(robot, [], options) if options.reduced else None
     own = {} if base is None else dict(zip(base.names, base.own.tolist(), strict=True))
@@ -33,12 +33,14 @@ def parameters_of(
     )
 
 
-def _parameter(name: Name, value: float, sd: float, previous: float, reason: str) -> Parameter:
+def _parameter(
+    name: Name, value: float, sd: float, previous: float, reason: str
+) -> IdentifiedParameter:
     if not reason and value == 0:
         reason = AT_BOUND
     elif not reason and not sd <= TORQUE_FIT.max_relative_sd * abs(value):
         reason = UNCERTAIN.format(sd / abs(value))
-    return Parameter(*name, value, sd, previous, not reason, reason)
+    return IdentifiedParameter(*name, value, sd, previous, not reason, reason)
 
 
 def _own_value(robot: Robot, name: Name) -> float:

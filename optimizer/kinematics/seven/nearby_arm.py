@@ -9,21 +9,24 @@ closed form, and are near those of the arm itself.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.joint_axes import JointAxes
-from joulepath.optimizer.kinematics.seven.nearby_loops import Loops, loops
+from joulepath.optimizer.kinematics.seven.redundant_arm import curves_of
+from joulepath.optimizer.kinematics.seven.redundant_curve import members
 from joulepath.optimizer.kinematics.seven.redundant_pose import RedundantPose
 from joulepath.optimizer.kinematics.seven.spherical_shoulder import SphericalShoulder
 
 
 @dataclass(frozen=True)
 class NearbyArmSettings:
-    """Poses beside one out of reach."""
+    """Seeds along curves, and poses beside one out of reach."""
+
+    seeds: int = 4
+    """Number of seeds along each curve of the simple arm."""
 
     shifts: tuple[float, ...] = (1e-3, 2e-3)
     """Distances of poses beside one that only the exact arm reaches, because the two arms differ
@@ -56,42 +59,23 @@ class NearbyArm:
                 return cls(form, mirrored, JointAxes.of(each))
         return None
 
-    def loops(self, T: Array) -> tuple[Loops, list[Array]]:
-        """Closed curves of the simple arm with its flange at T (4, 4), see `nearby_loops`.
-
-        Returns:
-            The closed curves, and points (m, 7) [rad] along each of the other curves.
+    def seeds(self, T: Array) -> Array:
+        """Configurations (n, 7) [rad] along all curves of the simple arm with its flange at
+        T (4, 4).
         """
-        found, rest = loops(
-            RedundantPose(self.form, np.asarray(np.linalg.inv(T)) if self.mirrored else T)
-        )
-        return Loops(self._both_shoulders(found.points), 2 * found.counts), [
-            self._both_shoulders(each) for each in rest
-        ]
+        pose = np.asarray(np.linalg.inv(T)) if self.mirrored else T
+        share = (np.arange(SETTINGS.seeds) + 0.5) / SETTINGS.seeds
+        curves = curves_of(RedundantPose(self.form, pose))
+        if not curves:
+            return np.zeros((0, 7))
+        at = [low + share * (high - low) for curve in curves for low, high in curve.arcs]
+        q = np.concatenate(members(curves, at))
+        # From the flange, the joints come in reverse order and turn the other way.
+        return -q[:, ::-1] if self.mirrored else q
 
-    def _both_shoulders(self, q: Array) -> Array:
-        """Points q (m, 7) [rad] on the right shoulder as configurations (2m, 7) of the simple arm:
-        on the right shoulder, then on the left one.
-        """
-        # With the left shoulder the third axis leans to the other side.
-        scale, shift = self._left
-        if self.mirrored:
-            # From the flange, the joints come in reverse order and turn the other way.
-            q = -q[:, ::-1]
-        return np.concatenate([q, scale * q + shift])
-
-    @cached_property
-    def _left(self) -> tuple[Array, Array]:
-        """Factors (7,) and offsets (7,) [rad] from configurations on the right shoulder to the left
-        one.
-        """
-        scale, shift = np.ones(7), np.zeros(7)
-        scale[1], shift[:3] = -1.0, (np.pi, -2 * self.form.lean_at_zero, np.pi)
-        return (scale[::-1], -shift[::-1]) if self.mirrored else (scale, shift)
-
-    def beside(self, T: Array) -> list[Array]:
-        """Points (m, 7) [rad] along the curves of the simple arm at poses shifted from T (4, 4)
-        along the base axes.
+    def beside(self, T: Array) -> Array:
+        """Configurations (n, 7) [rad] of the simple arm at poses shifted from T (4, 4) along the
+        base axes.
 
         There are some if T is beyond the reach of the simple arm by less than the two arms differ.
         """
@@ -100,6 +84,5 @@ class NearbyArm:
             for shift in distance * np.vstack([np.eye(3), -np.eye(3)]):
                 near = T.copy()
                 near[:3, 3] += shift
-                closed, rest = self.loops(near)
-                found += [*closed.each(), *rest]
-        return found
+                found.append(self.seeds(near))
+        return np.concatenate(found)

@@ -79,16 +79,7 @@ class RedundantArm:
         limits, then the self-motions at singularities with a constant last angle.
         """
         pose = RedundantPose(self.form, T)
-        curves = [
-            RedundantCurve.of(pose, signs, interval, label_of(signs))
-            for elbow in pose.elbows(limits)
-            for interval in pose.intervals(elbow)
-            for signs in (
-                np.array([shoulder, elbow, wrist])
-                for shoulder, wrist in product((1.0, -1.0), repeat=2)
-            )
-        ]
-        aligned: Sequence[RedundantCurve] = curves
+        aligned = curves = curves_of(pose)
         if limits is not None:
             curves, aligned = cut_to_limits(curves, limits.q_min, limits.q_max)
         return [*curves, *crossing(aligned), *stretched(pose, label_of(np.ones(3)))]
@@ -154,6 +145,18 @@ class RedundantArm:
             *self.form.shoulder_harmonics.T.tolist(),
             *self.form.placements[5][:3, :2].T.tolist(),
         ]
+
+
+def curves_of(pose: RedundantPose) -> list[RedundantCurve]:
+    """All curves of a pose over the last angle."""
+    return [
+        RedundantCurve.of(pose, signs, interval, label_of(signs))
+        for elbow in (1.0, -1.0)
+        for interval in pose.intervals(elbow)
+        for signs in (
+            np.array([shoulder, elbow, wrist]) for shoulder, wrist in product((1.0, -1.0), repeat=2)
+        )
+    ]
 
 
 def label_of(signs: Array) -> Label:

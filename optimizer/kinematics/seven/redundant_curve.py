@@ -8,7 +8,7 @@ half cos u, they change evenly with the parameter u.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,10 +25,8 @@ from joulepath.optimizer.problem.branches import Label
 class RedundantCurveSettings:
     """Settings of cutting curves to limits and of finding members."""
 
-    coarse_parts: int = 40
+    parts: int = 320
     """Number of parts of a curve that are tested against the limits."""
-    fine_parts: int = 8
-    """Number of parts of each undecided part."""
     near: float = 1e-9
     """Joint distance from a member below which its parameter is accepted [rad]."""
     far: float = 1e-2
@@ -161,11 +159,11 @@ def cut_to_limits(
 ) -> tuple[list[RedundantCurve], list[RedundantCurve]]:
     """Curves of one pose, cut to the limits.
 
-    Each curve must be given with both shoulders. Parts that are left out are proven by their boxes
-    to be outside. The arcs extend beyond the limits by some hundredths of a radian.
+    Parts that are left out are proven by their boxes to be outside. The arcs extend beyond the
+    limits by some hundredths of a radian.
 
     Args:
-        curves: curves of one pose.
+        curves: whole curves of one pose.
         q_min: lower limits, shape (7,) [rad].
         q_max: upper limits, shape (7,) [rad].
 
@@ -175,78 +173,25 @@ def cut_to_limits(
     """
     if not curves:
         return [], []
-    owner = np.array(
-        [[k for k, curve in enumerate(curves) if curve.signs[0] * side > 0] for side in (1.0, -1.0)]
-    )
-    right = CurveStack.of([curves[k] for k in owner[0]])
-    kept, passing = _kept(
-        right, np.array([curves[k].arcs[0] for k in owner[0]]), _LimitRanges.of(q_min, q_max)
-    )
-    found: list[list[tuple[float, float]]] = [[] for _ in curves]
-    for k, arc in zip(owner.ravel()[kept[0]].tolist(), kept[1], strict=True):
-        found[k].append(arc)
-    cut = [
-        RedundantCurve(curve.pose, curve.signs, curve.interval, curve.label, own)
-        for curve, own in zip(curves, found, strict=True)
-        if own
-    ]
-    return cut, [curves[k] for k in sorted(owner[passing].tolist())]
-
-
-def _kept(
-    curves: CurveStack, arcs: Array, limits: _LimitRanges
-) -> tuple[tuple[Rows, list[tuple[float, float]]], Mask]:
-    """Parts of curves on the right shoulder, and of their counterparts on the left one, that may be
-    within limits.
-
-    Args:
-        curves: m curves on the right shoulder.
-        arcs: arc of each, shape (m, 2).
-        limits: position limits.
-
-    Returns:
-        Rows (k,) of the 2 m curves and k arcs; and a mask (2, m) of the curves that may pass the
-        shoulder's singularity within the limits.
-    """
-    m, (coarse, fine) = len(arcs), (SETTINGS.coarse_parts, SETTINGS.fine_parts)
-    whole, ends = _cut(arcs, coarse), np.empty((m, coarse * fine + 1))
-    ends[:, :-1] = _cut(np.stack([whole[:, :-1], whole[:, 1:]], axis=2).reshape(-1, 2), fine)[
-        :, :-1
-    ].reshape(m, -1)
-    ends[:, -1] = arcs[:, 1]
-    q7 = curves.last_angle(ends.T, np.arange(m)).T
-    signs = curves.signs[np.arange(m).repeat(coarse)]
-    cells = Cells(q7[:, :-fine:fine].ravel(), q7[:, fine::fine].ravel(), signs)
-    held, inside, aligned = _judged(curves.pose, cells, limits)
-    decided = held & inside
-    passing: Mask = np.logical_or.reduce((decided & aligned).reshape(2, m, coarse), axis=2)
-    # Fine parts of each coarse part that may be within the limits.
-    parts = np.empty((2, m * coarse, fine), dtype=bool)
-    parts[:] = decided[:, :, None]
-    open_ = held > inside
-    (left,) = (open_[0] | open_[1]).nonzero()
-    if len(left):
-        low, high = q7[:, :-1].reshape(-1, fine)[left], q7[:, 1:].reshape(-1, fine)[left]
-        held, _, aligned = _judged(
-            curves.pose, Cells(low.ravel(), high.ravel(), signs[left.repeat(fine)]), limits
-        )
-        held = held.reshape(2, -1, fine) & open_[:, left, None]
-        parts[:, left] |= held
-        side, row = np.logical_or.reduce(held & aligned.reshape(-1, fine), axis=2).nonzero()
-        passing[side, left[row] // coarse] = True
+    stack, m, parts = CurveStack.of(curves), len(curves), SETTINGS.parts
+    low, high = np.array([curve.arcs[0] for curve in curves]).T
+    ends = np.linspace(low, high, parts + 1, axis=1)
+    q7 = stack.last_angle(ends.T, np.arange(m)).T
+    signs = stack.signs.repeat(parts, axis=0)
+    centre, half = boxes_of(stack.pose, Cells(q7[:, :-1].ravel(), q7[:, 1:].ravel(), signs))
+    width = (q_max - q_min) / 2 + SETTINGS.rounding
+    beyond = np.abs(wrapped(centre - (q_min + q_max) / 2)) - np.where(width < np.pi, width, np.inf)
+    inside = (beyond <= half).all(axis=1).reshape(m, parts)
+    passing = (inside & (half[:, 0] >= np.pi).reshape(m, parts)).any(axis=1)
     # An arc starts at a change of the mask, and ends at the next one.
-    padded = np.zeros((2 * m, coarse * fine + 2), dtype=bool)
-    padded[:, 1:-1] = parts.reshape(2 * m, -1)
-    row, at = (padded[:, 1:] != padded[:, :-1]).nonzero()
-    bounds = ends[row % m, at].tolist()
-    return (row[::2], list(zip(bounds[::2], bounds[1::2], strict=True))), passing
-
-
-def _cut(arcs: Array, count: int) -> Array:
-    """Ends (m, count + 1) of equal parts of arcs (m, 2)."""
-    ends = arcs[:, :1] + (arcs[:, 1:] - arcs[:, :1]) / count * np.arange(count + 1)
-    ends[:, -1] = arcs[:, 1]
-    return np.asarray(ends)
+    changes = np.diff(inside, axis=1, prepend=False, append=False)
+    cut = list[RedundantCurve]()
+    for curve, own, changing in zip(curves, ends, changes, strict=True):
+        bounds = own[changing].tolist()
+        arcs = list(zip(bounds[::2], bounds[1::2], strict=True))
+        if arcs:
+            cut.append(replace(curve, arcs=arcs))
+    return cut, [curves[k] for k in np.flatnonzero(passing).tolist()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,56 +227,6 @@ class CurveStack:
         ends = np.where(self.whole[rows], ends, np.clip(ends, 0.0, np.pi))
         low, high = self.last_angle(ends, rows)
         return boxes_of(self.pose, Cells(low, high, self.signs[rows]))
-
-
-@dataclass(frozen=True, eq=False)
-class _LimitRanges:
-    """Middles (10, 1) and half widths (10, 1) [rad] of the limits of the seven joints, then again
-    of the first three.
-
-    A joint that may turn all around has an infinite half width.
-    """
-
-    middle: Array
-    width: Array
-
-    @classmethod
-    def of(cls, q_min: Array, q_max: Array) -> _LimitRanges:
-        """Ranges of limits (7,) [rad]."""
-        joints = [*range(7), 0, 1, 2]
-        middle = (q_min + q_max)[joints, None] / 2
-        width = (q_max - q_min)[joints, None] / 2 + SETTINGS.rounding
-        width[width >= np.pi] = np.inf
-        return cls(middle, width)
-
-
-def _judged(pose: RedundantPose, cells: Cells, limits: _LimitRanges) -> tuple[Mask, Mask, Mask]:
-    """Decides which cells with the right shoulder, and their counterparts with the left one, are
-    within limits.
-
-    Returns:
-        Masks (2, n), right shoulder first, of the cells that may have members within the limits,
-        and of the cells with all members inside; and a mask (n,) of the cells that may pass the
-        shoulder's singularity.
-    """
-    right, half = boxes_of(pose, cells)
-    q, sides = np.empty((10, len(half))), np.empty((2, 10, len(half)))
-    # With the other shoulder the third axis leans to the other side, and the last four joints are
-    # the same.
-    q[:7], q[7:] = right.T, right.T[:3]
-    q[7:10:2] += np.pi
-    q[8] = -q[8] - 2 * pose.form.lean_at_zero
-    sides[0, :7], sides[0, 7:] = half.T, half.T[:3]
-    np.negative(sides[0], out=sides[1])
-    beyond = np.abs(wrapped(q - limits.middle)) - limits.width
-    within = beyond <= sides
-    last = np.logical_and.reduce(within[:, 3:7], axis=1)
-    first, mirrored = (last & np.logical_and.reduce(within[:, k : k + 3], axis=1) for k in (0, 7))
-    return (
-        np.array([first[0], mirrored[0]]),
-        np.array([first[1], mirrored[1]]),
-        np.asarray(half[:, 0] >= np.pi),
-    )
 
 
 def last_angle(u: Array, interval: Array, whole: Mask) -> Array:

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import acos, remainder, tau
 
 import numpy as np
 
-from joulepath.models.robot import Array, Limits
+from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.seven.interval_edges import interval_edges
 from joulepath.optimizer.kinematics.seven.spherical_shoulder import (
@@ -29,8 +28,6 @@ class PoseSettings:
 
     rounding: float = 1e-12
     """Squared sine down to which, below zero, it counts as zero: cosines are clipped to 1."""
-    limit_rounding: float = 1e-9
-    """Angle beyond a limit that is due to rounding [rad]."""
     edge: float = 1e-7
     """Largest squared sine at an edge of an interval: the angle of a double zero is found to some
     1e-8 rad.
@@ -211,26 +208,6 @@ class RedundantPose:
     def _from_last(self) -> Complex:
         """Unitary matrix that carries spinors from the last link to joint 1 at q1 = 0."""
         return unitary(self.form.placements[0, :3, :3].T @ self.orientation)
-
-    def elbows(self, limits: Limits | None) -> list[float]:
-        """Signs of θ with which the fourth joint may be within the limits."""
-        form, square, low, high = self.form, self.coefficients[0], -np.pi, np.pi
-        if limits is not None:
-            low, high = float(limits.q_min[3]), float(limits.q_max[3])
-        size, scale = float(np.hypot(square[1], square[2])), 2 * form.rho * form.nu
-        cosines = [
-            (form.squares - float(square[0]) + side * size) / scale + side * SETTINGS.rounding
-            for side in (1.0, -1.0)
-        ]
-        least, most = (acos(min(max(each, -1.0), 1.0)) for each in cosines)
-        middle, half = (least + most) / 2, (most - least + high - low) / 2
-        away = {
-            elbow: remainder(form.q4_at_zero - elbow * middle - (low + high) / 2, tau)
-            for elbow in (1.0, -1.0)
-        }
-        return [
-            elbow for elbow, each in away.items() if abs(each) <= half + SETTINGS.limit_rounding
-        ]
 
     def intervals(self, elbow: float) -> list[tuple[float, float]]:
         """Intervals [rad] of q7, each within a turn, with configurations on both branches of an

@@ -1,10 +1,9 @@
 """Inverse kinematics of any seven-joint arm: self-motions traced point by point.
 
-If the closed form of a nearby arm is known (`nearby_arm`), its curves are projected onto those of
-the arm, all points at once (`nearby_loops`). Next to a singularity they only give seeds. For other
-arms, the seeds come from a table of configurations within the joint ranges (`seed_table`). Newton's
-method leads seeds onto curves, and each curve is traced once around (`curve_tracing`). A curve
-without a seed is missed, and so may be curves through a singularity: the result is never
+If the closed form of a nearby arm is known (`nearby_arm`), the seeds are points along its curves.
+For other arms, they come from a table of configurations within the joint ranges (`seed_table`).
+Newton's method leads seeds onto curves, and each curve is traced once around (`curve_tracing`). A
+curve without a seed is missed, and so may be curves through a singularity: the result is never
 `complete`.
 """
 
@@ -22,9 +21,8 @@ from joulepath.optimizer.exceptions import SingularPose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.newton import solved
-from joulepath.optimizer.kinematics.seven.curve_tracing import TracedPath, trace
+from joulepath.optimizer.kinematics.seven.curve_tracing import trace
 from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
-from joulepath.optimizer.kinematics.seven.nearby_loops import project_loops, seeds_along
 from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
 from joulepath.optimizer.kinematics.seven.traced_curve_stack import TracedCurveStack
@@ -146,67 +144,39 @@ class TracedArm:
         found = solved(self._chain, around.reshape(-1, 7), T, SETTINGS.steps)
         return np.concatenate([q, found[0]]), np.concatenate([residual, found[1]])
 
-    def _beside_nearby(self, T: Array) -> tuple[TracedCurveStack, Array]:
-        """Curves along those of the nearby arm at the flange pose T (4, 4), and seeds (n, 7) for
-        the others.
-        """
-        none = np.zeros((0, 7))
-        if self._nearby is None:
-            return TracedCurveStack.of([]), none
-        loops, rest = self._nearby.loops(T)
-        stack, good = project_loops(self._chain, loops, T)
-        if good.all() and not rest:
-            return stack, none
-        left = [
-            each[:-1] for each, held in zip(loops.each(), good.tolist(), strict=True) if not held
-        ]
-        return stack, np.vstack([none, *map(seeds_along, [*rest, *left])])
-
-    def _beside(self, T: Array) -> list[Array]:
-        """Seeds (n, 7) of the nearby arm at poses beside T (4, 4): the arm itself may reach
-        slightly farther.
-        """
-        return (
-            [] if self._nearby is None else [seeds_along(each) for each in self._nearby.beside(T)]
-        )
-
     def _curves(self, matrix: bytes) -> list[TracedCurve]:
         T = np.frombuffer(matrix).reshape(4, 4)
         checkpoint()
-        stack, starts = self._beside_nearby(T)
-        count = len(stack.first)
-        if len(starts) or not count:
-            stack = stack.joined(self._through(starts, T, count > 0))
-        return self._different(stack, T)
+        paths = trace(self._chain, self._starts(T), T)
+        return self._different(TracedCurveStack.of(paths), T) if paths else []
 
-    def _through(self, starts: Array, T: Array, others: bool) -> list[TracedPath]:
-        """Curves of the flange pose T (4, 4) traced from seeds (n, 7).
+    def _starts(self, T: Array) -> Array:
+        """Configurations (n, 7) [rad] that reach the flange pose T (4, 4), without singular ones.
 
-        If there are no other curves, seeds of the table and of the nearby arm beside T are used,
-        too.
+        The seeds are those of the nearby arm. If none of them reaches T, seeds of the table and of
+        the nearby arm at poses beside T are used.
         """
-        q, residual = solved(self._chain, starts, T, SETTINGS.steps)
-        if not others and not (residual < SETTINGS.solved).any():
-            starts = np.vstack([self._seeds.starts(T), *self._beside(T)])
-            q, residual = solved(self._chain, starts, T, SETTINGS.steps)
+        none, nearby = np.zeros((0, 7)), self._nearby
+        seeds = none if nearby is None else nearby.seeds(T)
+        q, residual = solved(self._chain, seeds, T, SETTINGS.steps)
+        if not (residual < SETTINGS.solved).any():
+            beside = none if nearby is None else nearby.beside(T)
+            seeds = np.concatenate([self._seeds.starts(T), beside])
+            q, residual = solved(self._chain, seeds, T, SETTINGS.steps)
         q, residual = self._with_near(q, residual, T)
-        if not others and not (residual < SETTINGS.solved).any():
-            q, residual = solved(self._chain, starts[: SETTINGS.few_seeds], T, SETTINGS.most_steps)
+        if not (residual < SETTINGS.solved).any():
+            q, residual = solved(self._chain, seeds[: SETTINGS.few_seeds], T, SETTINGS.most_steps)
         # A pose error that is small after many steps indicates a singularity.
-        q = q[
-            residual
-            < (SETTINGS.solved if others or (residual < SETTINGS.solved).any() else SETTINGS.edge)
-        ]
+        is_solved = bool((residual < SETTINGS.solved).any())
+        q = q[residual < (SETTINGS.solved if is_solved else SETTINGS.edge)]
         smallest = np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1]
         regular = smallest > SETTINGS.singular
-        if len(q) and not others and not regular.any():
+        if len(q) and not regular.any():
             raise SingularPose("goal", float(smallest.min()))
-        return trace(self._chain, q[regular], T)
+        return q[regular]
 
     def _different(self, stack: TracedCurveStack, T: Array) -> list[TracedCurve]:
         """Distinct curves of a stack, in the order of their numbers."""
-        if not len(stack.first):
-            return []
         found = list[TracedCurve]()
         order, beside = stack.order_and_neighbours()
         near = beside.tolist()

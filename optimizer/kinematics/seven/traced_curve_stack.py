@@ -20,12 +20,12 @@ class StackSettings:
 
     open_half: float = 3.0
     """Half the range of the parameter of an open curve: less than π, so that its ends differ."""
-    steps: int = 8
-    """Largest number of Newton steps towards the point of a cubic across from a configuration."""
+    steps: int = 40
+    """Largest number of steps towards the point of a cubic across from a configuration."""
     beyond: float = 0.25
     """Largest share beyond the ends of a segment in this search."""
-    tolerance: float = 1e-8
-    """Step at which the search ends, relative to the segment; its square is negligible."""
+    tolerance: float = 1e-12
+    """Step at which the search ends, relative to the segment."""
     beside: float = 0.15
     """Largest distance of a curve from the segment between two of its points [rad]."""
     least_length: float = 1e-300
@@ -55,8 +55,6 @@ class TracedCurveStack:
     @classmethod
     def of(cls, paths: Sequence[TracedPath]) -> TracedCurveStack:
         """Stack of the curves along paths."""
-        if not paths:
-            return cls(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0, dtype=np.intp), np.zeros(0))
         counts = [len(path.q) for path in paths]
         half = [
             np.pi if path.closed else SETTINGS.open_half if count > 1 else 0.0
@@ -65,20 +63,6 @@ class TracedCurveStack:
         nodes = np.concatenate([path.q for path in paths])
         tangents = np.concatenate([path.tangents for path in paths])
         return cls(nodes, tangents, np.cumsum([0, *counts[:-1]]), np.array(half))
-
-    def joined(self, paths: Sequence[TracedPath]) -> TracedCurveStack:
-        """This stack, extended by the curves along paths."""
-        if not paths:
-            return self
-        others = TracedCurveStack.of(paths)
-        if not len(self.first):
-            return others
-        return TracedCurveStack(
-            np.concatenate([self.nodes, others.nodes]),
-            np.concatenate([self.tangents, others.tangents]),
-            np.concatenate([self.first, others.first + len(self.nodes)]),
-            np.concatenate([self.half, others.half]),
-        )
 
     @cached_property
     def last(self) -> Rows:
@@ -173,34 +157,15 @@ class TracedCurveStack:
         A configuration is across from a point if their difference is perpendicular to the direction
         `along` there. Shares of segments of length zero do not change.
         """
-        length, after = self.segment_lengths[k], self._after(k)
-        sides = np.empty((4, *q.shape))
-        t, bend, chord, away = sides
-        t[:], bend[:] = self.tangents[k], self.tangents[after]
-        bend -= t
-        np.subtract(self.nodes[after], self.nodes[k], out=chord)
-        np.subtract(q, self.nodes[k], out=away)
-        (tt, _), (tb, bb), (tc, bc), (e0, e1) = np.einsum("xij,yij->xyi", sides, sides[:2])
-        # The cubic is node + a s + b s² + c s³ with a = length · t, b = 3 chord - length (3 t +
-        # bend) and c = length (2 t + bend) - 2 chord; the condition is a quartic in s.
-        e1 = e1 - length * tt
-        e2 = length * (3 * tt) - 3 * tc
-        e3 = length * (2 * tb + bb - 2 * tt) + 2 * tc - 3 * bc
-        e4 = 2 * bc - length * (2 * tb + bb)
-        moving = length > 0
-        least = -np.maximum(length, SETTINGS.least_length)
+        length = self.segment_lengths[k]
+        moving, scale = length > 0, np.maximum(length, SETTINGS.least_length)
         for _ in range(SETTINGS.steps):
-            value = e0 + share * (e1 + share * (e2 + share * (e3 + share * e4)))
-            slope = e1 + share * (2 * e2 + share * (3 * e3 + share * (4 * e4)))
-            step = value / np.where(slope < 0, slope, least)
-            share = np.where(
-                moving,
-                np.minimum(np.maximum(share - step, -SETTINGS.beyond), 1 + SETTINGS.beyond),
-                share,
-            )
-            if np.abs(step).max(initial=0.0) < SETTINGS.tolerance:
+            ahead = ((q - self.at(k, share)) * self.along(k, share)).sum(axis=1)
+            near = np.clip(share + ahead / scale, -SETTINGS.beyond, 1 + SETTINGS.beyond)
+            before, share = share, np.where(moving, near, share)
+            if np.abs(share - before).max(initial=0.0) < SETTINGS.tolerance:
                 break
-        return np.asarray(share)
+        return share
 
     def order_and_neighbours(self) -> tuple[Array, Mask]:
         """Numbers that order the curves, and the curves near the first point of each.

@@ -137,7 +137,12 @@ class Method(ABC):
         return SolveResult(SolveStatus.FAILED, SolveReason.NO_EVEN_CONTROL_POINTS)
 
     def solve_control_points(
-        self, space: Basis, points: Array, duration: float, progress: float = SQP.progress
+        self,
+        space: Basis,
+        points: Array,
+        duration: float,
+        progress: float = SQP.progress,
+        unchecked: bool = False,
     ) -> SolveResult:
         """Solve from the control points of a motion, in their own spline space.
 
@@ -146,6 +151,7 @@ class Method(ABC):
             points: control points, shape (n, nq) [rad].
             duration: duration of the motion [s].
             progress: relative decrease of the cost below which the solve ends.
+            unchecked: as in `Guess`.
         """
         return SolveResult(SolveStatus.FAILED, SolveReason.NO_FREE_CONTROL_POINTS)
 

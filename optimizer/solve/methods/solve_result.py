@@ -72,7 +72,6 @@ class SolveReason(Enum):
     BASELINE = "the {0} motion itself"
     GOAL_PROPOSAL = "a proposal"
 
-    NOT_CONVERGED = "it did not converge"
     NO_MOTION_WITHIN_LIMITS = "found no motion of {0} control points within the limits"
     LIMITS_BETWEEN_NODES = "the motion exceeds limits between the nodes"
     NO_TIME_SCALE_WITHIN_LIMITS = "found no time scale within the limits"

@@ -143,12 +143,16 @@ class SplineMethod(SqpMethod):
         return self._solve_in(self.spaces.of_first_solve(count, float(t[-1])), q, t, progress)
 
     def solve_control_points(
-        self, space: Basis, points: Array, duration: float, progress: float = SQP.progress
+        self,
+        space: Basis,
+        points: Array,
+        duration: float,
+        progress: float = SQP.progress,
+        unchecked: bool = False,
     ) -> SolveResult:
         """Solve from control points (n, nq) [rad] of a motion of a duration [s]."""
-        return self.improve(
-            Guess(space, self.coordinates.from_joints(points), duration, progress=progress)
-        )
+        own = self.coordinates.from_joints(points)
+        return self.improve(Guess(space, own, duration, progress=progress, unchecked=unchecked))
 
     def _solve_in(
         self, space: Basis, q: Array, t: Array, progress: float = SQP.progress

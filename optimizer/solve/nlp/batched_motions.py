@@ -32,9 +32,6 @@ class BatchedMotionSettings:
     """Cost of the mean squared excess over the limits, as ratios of the limit and of the first
     cost."""
 
-    rate_points: int = 4
-    """Points per span at which the rates are limited."""
-
     largest_step: float = 1.5
     """Largest change of a coordinate of a control point in one step [rad]."""
 
@@ -304,20 +301,9 @@ class BatchedMotions(TimedMotions):
             hessian[k] += (J[k] * curvature[:, :, None]).transpose(0, 2, 1) @ J[k]
         return gradient, hessian.reshape(-1, 3, r, 3, r).transpose(0, 1, 3, 2, 4)
 
-    @cached_property
-    def _rate_places(self) -> list[Array]:
-        """Points within every span, and the ends."""
-        edges, count = np.unique(self.basis.knots), BATCHED_MOTIONS.rate_points
-        within = (np.arange(count) + 0.5) / count
-        return [
-            np.concatenate(
-                [[0.0], (edges[:-1, None] + np.diff(edges)[:, None] * within).ravel(), [1.0]]
-            )
-        ] * 3
-
     @property
     def _rate_count(self) -> int:
-        return len(self._rate_places[0])
+        return len(self._rate_places)
 
     @cached_property
     def _rate_curvature(self) -> tuple[Array, Array]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,8 +13,19 @@ from joulepath.optimizer.motion.bspline import Basis, basis_matrix
 from joulepath.optimizer.solve.nlp.control_point_pairs import ControlPointPairs
 
 
+@dataclass(frozen=True)
+class TimedMotionSettings:
+    """Settings of motions of one duration."""
+
+    rate_points: int = 4
+    """Points per span at which the rates are limited."""
+
+
+TIMED_MOTIONS = TimedMotionSettings()
+
+
 @dataclass(frozen=True, eq=False)
-class TimedMotions(ABC):
+class TimedMotions:
     """Motions of duration T [s] with m free control points of r = nq joints, at rest at both ends.
 
     Arrays may have leading dimensions (...), for several motions at once.
@@ -25,11 +35,6 @@ class TimedMotions(ABC):
     basis: Basis
     limits: Limits
     T: float
-
-    @property
-    @abstractmethod
-    def _rate_places(self) -> list[Array]:
-        """Points in [0, 1] of the limits on speed, acceleration and jerk, one array for each."""
 
     def points(self, ends: Array, free: Array) -> Array:
         """All control points (..., n, r), from ends (..., 2, r) and free ones (..., m, r)."""
@@ -67,10 +72,18 @@ class TimedMotions(ABC):
         return np.ascontiguousarray(self._at_nodes[:, self.basis.free])
 
     @cached_property
+    def _rate_places(self) -> Array:
+        """Points (K,) within every span, and the ends, at which the rates are limited."""
+        edges = np.unique(self.basis.knots)
+        within = (np.arange(TIMED_MOTIONS.rate_points) + 0.5) / TIMED_MOTIONS.rate_points
+        inner = edges[:-1, None] + np.diff(edges)[:, None] * within
+        return np.concatenate([[0.0], inner.ravel(), [1.0]])
+
+    @cached_property
     def _at_rates(self) -> Array:
-        """Map (k, n) from control points to the limited derivatives by τ of orders 1 to 3."""
-        places = enumerate(self._rate_places, 1)
-        return np.concatenate([basis_matrix(self.basis.knots, at, d) for d, at in places])
+        """Map (3 K, n) from control points to the limited derivatives by τ of orders 1 to 3."""
+        knots, places = self.basis.knots, self._rate_places
+        return np.concatenate([basis_matrix(knots, places, order) for order in (1, 2, 3)])
 
     @cached_property
     def _R(self) -> Array:
@@ -78,9 +91,9 @@ class TimedMotions(ABC):
 
     @cached_property
     def _rate_limits(self) -> Array:
-        """Limits (k, r) on the derivatives by τ."""
+        """Limits (3 K, r) on the derivatives by τ."""
         by_tau = self.limits.rates * (self.T ** np.arange(1, 4))[:, None]
-        return np.repeat(by_tau, [len(each) for each in self._rate_places], axis=0)
+        return np.repeat(by_tau, len(self._rate_places), axis=0)
 
     @cached_property
     def _pairs(self) -> ControlPointPairs:

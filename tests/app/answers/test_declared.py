@@ -25,7 +25,7 @@ from joulepath.optimizer.declared import (
     Joules,
     Keys,
     NotEmpty,
-    NullIfInfinite,
+    NullIfNotFinite,
     PerJoint,
     Unit,
 )
@@ -58,7 +58,7 @@ class First:
 
     name: Literal["a", "b"]
     """Name."""
-    bound: Annotated[Joules, NullIfInfinite] = math.inf
+    bound: Annotated[Joules, NullIfNotFinite] = math.inf
     """Bound."""
 
 
@@ -68,7 +68,7 @@ class Whole(First):
 
     q: Annotated[PerJoint, Unit("rad")] | None
     """Joint positions."""
-    rows: Annotated[PerJoint, Axes(("row",)), NullIfInfinite]
+    rows: Annotated[PerJoint, Axes(("row",)), NullIfNotFinite]
     """Rows."""
     places: Annotated[list[Place], NotEmpty]
     """Places."""

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from joulepath.app.api.identifications.models import IdentificationResult
+from joulepath.app.answers.declared import model_of
+from joulepath.app.api.identifications.answer import IdentificationResult
 from joulepath.app.cli.identify import summary_of
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NothingHeldOut
@@ -18,6 +19,7 @@ from tests.app.problems import checked
 from tests.identification_logs import csv_of, recorded, truth_of
 
 ROBOT = load_robot("ur5e")
+RESULT = model_of(IdentificationResult)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,7 @@ def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> Non
         "identify", logs[0], "--validate", logs[1], "--payload", "0", "-o", str(output)
     )
     assert code == 0
-    result = IdentificationResult.model_validate_json(output.read_bytes())
+    result = RESULT.model_validate_json(output.read_bytes())
     assert result.validation.moves == 3
     assert "log0" in result.document["friction_laws"]["identified"]["coulomb"]["source"]
     assert b"log1" not in told
@@ -56,7 +58,7 @@ def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path
         "viscous",
     )
     assert here.run("identify", logs[0], *chosen, "--payload", "0", "-o", str(output))[0] == 0
-    result = IdentificationResult.model_validate_json(output.read_bytes())
+    result = RESULT.model_validate_json(output.read_bytes())
     found = {each.figure for each in result.parameters}
     # the log has power, which is added by itself
     assert found == {
@@ -84,7 +86,7 @@ def test_a_payload_is_that_of_the_last_log(here: Here, tmp_path: Path) -> None:
         here.run("identify", *files, "--fit", "payload", "--payload", "0", "-o", str(output))[0]
         == 0
     )
-    payload = IdentificationResult.model_validate_json(output.read_bytes()).payload
+    payload = RESULT.model_validate_json(output.read_bytes()).payload
     assert payload is not None and payload.log == 1
     assert abs(payload.mass - 2.0) <= 4 * payload.mass_sd < 0.2
     assert summary_of(json.loads(output.read_bytes()))["payload"].startswith(
@@ -104,7 +106,7 @@ def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path
     output = tmp_path / "figures.json"
     command = ("identify", logs[0], "--payload", "0", "--term", "coulomb", "--term", "viscous")
     assert here.run(*command, "--method", "base_parameters", "-o", str(output))[0] == 0
-    result = IdentificationResult.model_validate_json(output.read_bytes())
+    result = RESULT.model_validate_json(output.read_bytes())
     assert any("·" in each.figure for each in result.parameters)
     assert result.physical is None and result.structure.excited == result.structure.base
     assert "inertials" not in result.document

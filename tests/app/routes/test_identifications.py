@@ -13,7 +13,6 @@ from joulepath.app.api.excitation.task import ExcitationRequest
 from joulepath.app.api.identifications.models import (
     Identification,
     IdentificationList,
-    IdentificationResult,
     IdentificationSummary,
     ResidualCurves,
     ResidualMove,
@@ -64,7 +63,7 @@ def add_log(
     return str(answer.json()["id"])
 
 
-def ended(client: TestClient, **body: Any) -> Identification:
+def ended(client: TestClient, **body: Any) -> Any:
     """The identification that a body asks for, after its end."""
     answer = client.post("/identifications", json=body)
     assert answer.status_code == 202, answer.text
@@ -79,7 +78,7 @@ def ended(client: TestClient, **body: Any) -> Identification:
     return found
 
 
-def done(client: TestClient, **body: Any) -> IdentificationResult:
+def done(client: TestClient, **body: Any) -> Any:
     found = ended(client, **body)
     assert found.problem is None and found.result is not None, found.problem
     return found.result
@@ -181,6 +180,7 @@ def test_residuals_of_other_logs_are_held_out(client: TestClient, log: str) -> N
 
 
 def test_identifications_are_listed(client: TestClient, log: str) -> None:
+    ended(client, logs=[log])
     found = ended(client, logs=[log])
     first = IdentificationList.model_validate_json(client.get("/identifications?limit=1").content)
     assert [each.model_dump() for each in first.identifications] == [

@@ -173,7 +173,7 @@ def test_else_the_coarse_motion_is_checked(why: str, monkeypatch: pytest.MonkeyP
     wait, is_sole = 0.8 if why == "little time" else 60.0, why != "another candidate"
     own = solver(START, GOAL, wait=wait, is_sole=is_sole)
     if why == "refining fails":
-        failed = SolveResult(SolveStatus.FAILED, SolveReason.NOT_CONVERGED, 5, 1)
+        failed = SolveResult(SolveStatus.FAILED, SolveReason.MOTION_COLLIDES, 5, 1)
         monkeypatch.setattr(FreeSpline, "refined", lambda *_, **__: failed)
     result = own.solve()
     assert FreeSpline.may_refine(spline(result))
