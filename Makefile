@@ -2,6 +2,7 @@
 #   make serve      the service on http://HOST:PORT
 #   make test       every check: lint, types, architecture, tests
 #   make test-long  the same, and the long tests: fuzzing, the studio page in a browser, more cases of other tests
+#   make docs       the pages as a site, which the service sends at /help
 #   make bench      the benchmarks
 #   make lock       renew the lockfiles
 #   make clean      remove what these made
@@ -18,6 +19,9 @@ INSTALL := $(PY) scripts/install.py
 STUDIO := app/static/studio
 STUDIO_SOURCES := $(shell find app/studio -type f -not -path '*/node_modules/*' -not -path '*/.node/*') \
 	examples/optimize/bin_to_shelf.json
+HELP := app/static/help
+HELP_SOURCES := $(shell find docs examples -type f -not -name '*.pyc') zensical.toml requirements-docs.lock CONTRIBUTING.md \
+	joulepath/__init__.pyi scripts/build_docs.py
 NATIVE := optimizer/native/libjoulepath.so.1
 SOURCES := app optimizer models tests benchmarks examples scripts
 
@@ -31,7 +35,7 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-.PHONY: serve test test-long bench lock clean ready lint mypy style types kernels pytest pytest-long vitest
+.PHONY: serve test test-long docs bench lock clean ready lint mypy style types kernels pytest pytest-long vitest
 
 serve: $(VENV)/.runtime $(VENV)/.package kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
@@ -75,6 +79,9 @@ types: $(PY)
 vitest: $(PY)
 	$(PY) scripts/build_studio.py test
 
+docs: $(PY)
+	$(PY) scripts/build_docs.py
+
 bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
@@ -89,7 +96,7 @@ $(VENV)/.runtime: requirements.lock $(PY)
 	@touch $@
 
 # The package itself: `joulepath` and `import joulepath` work from any folder, with the sources of this one.
-$(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/index.html $(NATIVE)
+$(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/index.html $(HELP)/index.html $(NATIVE)
 	@$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
@@ -102,6 +109,12 @@ $(NATIVE): $(wildcard optimizer/native/*.c) optimizer/native/build.py | $(PY) $(
 $(STUDIO)/index.html: $(STUDIO_SOURCES) scripts/build_studio.py $(PY)
 	@echo "Building the studio page into $(STUDIO) ..."
 	@$(PY) scripts/build_studio.py
+	@touch $@
+
+# The pages. What builds them comes as packages of an environment of its own.
+$(HELP)/index.html: $(HELP_SOURCES) $(PY)
+	@echo "Building the pages into $(HELP) ..."
+	@$(PY) scripts/build_docs.py
 	@touch $@
 
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
@@ -135,7 +148,8 @@ lock: $(VENV)/.dev
 		--output-file requirements-cluster.lock
 	$(LOCK) --group compiler --output-file requirements-compiler.lock
 	$(LOCK) --group node --output-file requirements-node.lock
+	$(LOCK) --group docs --output-file requirements-docs.lock
 
 clean:
-	rm -rf $(VENV) $(NATIVE) $(STUDIO) app/studio/node_modules app/studio/.node build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(NATIVE) $(STUDIO) $(HELP) app/studio/node_modules app/studio/.node build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

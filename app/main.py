@@ -13,7 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
-from joulepath.app.api import cluster, docs, health, metrics, problems, studio
+from joulepath.app.api import cluster, docs, health, help, metrics, problems, studio
 from joulepath.app.api.advice import route as advice
 from joulepath.app.api.answers import route as answers
 from joulepath.app.api.compare import route as compare
@@ -82,6 +82,7 @@ ROUTES = (
     cluster,
     problems,
     docs,
+    help,
     studio,
 )
 """Modules of routes, in the order of the documentation pages."""

@@ -3,8 +3,8 @@
     python -m benchmarks.foreign FILE
     python -m benchmarks.foreign FILE --count 10 --seed 1 --families cage box --kinds joint
 
-FILE is JSON in the format of docs/foreign_scenes.md, which says where such sets come from. Every
-problem is asked with its goal as joint positions and as a pose, as a worker runs it: from the
+FILE is JSON in the format of docs/explained/foreign_scenes.md, which names sources of such sets.
+Every problem is asked with its goal as joint positions and as a pose, as a worker runs it: from the
 validated request, with a deadline. Pinocchio and Coal replay every answer at a period of 1 ms. The
 exit code is 1 if an answer collides.
 """

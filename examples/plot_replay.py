@@ -1,7 +1,7 @@
 """Draws the motors' torques of a motion, planned and played in MuJoCo, on the arm as planned and
 with more friction.
 
-    .venv/bin/python -m examples.plot_replay docs/replay_torques.png
+    .venv/bin/python -m examples.plot_replay docs/images/replay_torques.png
 
 The motion is that of `examples/replay/lift_with_payload.json`. Needs matplotlib and MuJoCo.
 """

@@ -2,7 +2,7 @@
 of the TCP.
 
     .venv/bin/python -m examples.plot_swept_arm examples/optimize/bin_to_shelf.json
-    docs/bin_to_shelf.png
+    docs/images/bin_to_shelf.png
 
 Solves the request with the library, from the repository's folder. Needs matplotlib.
 """

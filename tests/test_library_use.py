@@ -305,7 +305,7 @@ def python_of(page: Path) -> list[str]:
 def test_pages_and_examples_use_the_public_names() -> None:
     pages = [
         ROOT / "README.md",
-        *(ROOT / "docs").glob("*.md"),
+        *(ROOT / "docs").rglob("*.md"),
         *(ROOT / "examples" / "library").glob("*.py"),
     ]
     imports = [

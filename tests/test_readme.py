@@ -30,7 +30,7 @@ def test_the_snippet_prints_what_the_readme_says() -> None:
 @pytest.mark.long
 def test_the_snippet_of_the_cycles_page_goes_round() -> None:
     (code,) = re.findall(
-        r"```python\n(.*?)```", (ROOT / "docs" / "cycles.md").read_text(), re.DOTALL
+        r"```python\n(.*?)```", (ROOT / "docs" / "reference" / "cycle.md").read_text(), re.DOTALL
     )
     run = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True

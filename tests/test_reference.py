@@ -1,27 +1,30 @@
-"""The reference page says what the service's OpenAPI document says."""
+"""The pages of the reference say what the service's OpenAPI document says."""
 
 from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
+from typing import Any
 
+import pytest
+
+from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
-from scripts.reference import PAGE, reference
-
-DOCS = Path(__file__).parents[1] / "docs"
+from scripts.reference import ERRORS, PAGE, errors, reference
 
 
-def test_the_page_is_current() -> None:
-    made = reference(json.loads(json.dumps(create_app(Settings()).openapi())))
-    assert PAGE.read_text(encoding="utf-8") == made, "run `python -m scripts.reference`"
+@pytest.fixture(scope="module")
+def document() -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(json.dumps(create_app(Settings()).openapi()))
+    return content
 
 
-def test_every_link_to_the_page_has_a_target() -> None:
-    titles = re.findall(r"^#+ (.+)$", PAGE.read_text(encoding="utf-8"), re.M)
-    anchors = {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
-    inside = set(re.findall(r"\]\(#([^)]+)\)", PAGE.read_text(encoding="utf-8")))
-    pages = (page.read_text(encoding="utf-8") for page in DOCS.glob("*.md"))
-    linked = inside.union(*(re.findall(r"\]\(reference\.md#([^)]+)\)", page) for page in pages))
-    assert inside and linked <= anchors
+def test_the_pages_are_current(document: dict[str, Any]) -> None:
+    for page, made in ((PAGE, reference(document)), (ERRORS, errors(document))):
+        assert page.read_text(encoding="utf-8") == made, "run `python -m scripts.reference`"
+
+
+def test_every_error_has_its_section() -> None:
+    sections = re.findall(r"^## (\S+)$", ERRORS.read_text(encoding="utf-8"), re.M)
+    assert sections == sorted(kind.slug() for kind in types_of_error())

@@ -122,7 +122,7 @@ def test_the_studio_page_imports_downwards_and_in_no_circle() -> None:
 
 
 def test_the_architecture_page_names_every_room_of_the_studio_page() -> None:
-    page = (ROOT / "docs" / "architecture.md").read_text()
+    page = (ROOT / "docs" / "explained" / "architecture.md").read_text()
     _, _, section = page.partition("### app/studio/")
     cells = [
         row.split("|")[1] for row in section.partition("\n#")[0].splitlines() if row.startswith("|")
@@ -179,10 +179,10 @@ def test_the_floors_name_exactly_what_there_is(package: str) -> None:
 
 @pytest.mark.parametrize("package", STOREYED)
 def test_the_architecture_page_names_every_room(package: str) -> None:
-    page = (ROOT / "docs" / "architecture.md").read_text()
+    page = (ROOT / "docs" / "explained" / "architecture.md").read_text()
     _, _, section = page.partition(f"### {package}/")
     table = section.partition("\n#")[0]
-    assert table, f"docs/architecture.md has no section {package}/"
+    assert table, f"docs/explained/architecture.md has no section {package}/"
     cells = [row.split("|")[1] for row in table.splitlines() if row.startswith("|")]
     assert contents(package) <= {word for cell in cells for word in re.findall(r"`(\w+)`", cell)}
 

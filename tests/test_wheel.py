@@ -101,8 +101,8 @@ def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
 
 
 def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
-    """Every tracked file of the three packages, the C library, the libraries of the page, the
-    examples, and nothing else beside the metadata."""
+    """Every tracked file of the three packages, the C library, the libraries of the page, the pages
+    of the documentation, the examples, and nothing else beside the metadata."""
     tracked = subprocess.run(
         [
             "git",
@@ -119,16 +119,26 @@ def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
         text=True,
         check=True,
     ).stdout.split()
-    page = (ROOT / "app" / "static" / "studio").rglob("*")
+    built = [
+        path
+        for folder in ("studio", "help")
+        for path in (ROOT / "app" / "static" / folder).rglob("*")
+    ]
     sources = ("app/studio/", "joulepath/app/studio/")
     present = {name for name in tracked if (ROOT / name).is_file() and not name.startswith(sources)}
-    present |= {str(each.relative_to(ROOT)) for each in (LIBRARY, *page) if each.is_file()}
+    present |= {str(each.relative_to(ROOT)) for each in (LIBRARY, *built) if each.is_file()}
     present = {f"app/static/{name}" if name.startswith("examples/") else name for name in present}
     present = {name if name.startswith("joulepath/") else f"joulepath/{name}" for name in present}
     assert LIBRARY.is_file()
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
+        licences = {
+            folder: archive.read(f"joulepath/app/static/{folder}/licences.txt").decode()
+            for folder in ("studio", "help")
+        }
     assert held == present
+    assert "three\n" in licences["studio"] and "uplot\n" in licences["studio"]
+    assert "Zensical" in licences["help"] and "ISC License" in licences["help"]
     assert "joulepath/py.typed" in held
     assert "joulepath/models/ur5e/figures.yaml" in held
     assert any(name.startswith("joulepath/app/store/migrations/versions/v0001") for name in held)

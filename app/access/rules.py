@@ -10,6 +10,7 @@ from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow
 
 PUBLIC = re.compile(
     r"/healthz|/readyz|/openapi\.json|/redoc|/docs(/[^/]+)?|/problems/[^/]+|/|/studio(/\w[\w.-]*)*"
+    r"|/help(/|(/\w[\w.-]*)*/?)"
 )
 """Paths without user data: probes, documentation, problem pages, the studio page."""
 _READING = ("GET", "HEAD", "OPTIONS")

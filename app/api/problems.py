@@ -66,6 +66,7 @@ def _page(slug: str) -> str:
         f"<p>{_text(occasion(kind))}</p><p>{_text(kind.remedy)}</p>"
         + (f"<h2>Fields of its own</h2><dl>{fields}</dl>" if fields else "")
         + f"<h2>Example</h2><pre>{escape(example)}</pre>"
+        f'<p><a href="../help/reference/errors/#{slug}">All errors</a></p>'
     )
 
 

@@ -44,7 +44,7 @@ METHOD = click.option(
     type=click.Choice(get_args(Method)),
     default="automatic",
     show_default=True,
-    help="How it is found; docs/identification.md says what each method needs.",
+    help="How it is found; docs/reference/identification.md says what each method needs.",
 )
 PERIOD = click.option(
     "--period",

@@ -48,7 +48,8 @@ Example:
 def add(file: Path, name: str | None, replace: bool) -> None:
     """Adds an arm of your own to the database of the service: JOULEPATH_DATABASE_URL.
 
-    FILE is a YAML file with the path of a URDF and further figures: see docs/own_robot.md.
+    FILE is a YAML file with the path of a URDF and further figures: see
+    docs/reference/own_robot.md.
     """
     from joulepath.app.access.client import OPERATOR
     from joulepath.app.api.robots.request import NAME_PATTERN

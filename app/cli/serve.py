@@ -30,7 +30,7 @@ Example:
 def serve(host: str | None, port: int | None) -> None:
     """Starts the HTTP service, as `python -m joulepath.app` does.
 
-    All other settings are environment variables, see docs/settings.md.
+    All other settings are environment variables, see docs/reference/settings.md.
     """
     # worker processes read the settings, too
     if host is not None:

@@ -49,7 +49,7 @@ def to_arm(request: asked.ArmRequest) -> Arm:
         robot=robot,
         T_flange_tcp=to_tcp(request.tcp, request.tool),
         payload=with_tool(request.tool, to_payload(request.payload)),
-        gravity=np.array(request.gravity),
+        gravity=robot.gravity if request.gravity is None else np.array(request.gravity),
         limits=to_limits(request.limits, robot),
         friction=request.friction,
         inverter=Inverter(

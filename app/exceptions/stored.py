@@ -8,20 +8,19 @@ from typing import Annotated, Literal
 from joulepath.app.exceptions.base import ServiceError
 from joulepath.optimizer.declared import Internal, Unit
 
-StoreFault = Literal["full", "read-only", "locked", "deleted", "unreachable"]
+StoreFault = Literal["full", "read-only", "locked", "deleted", "other-version", "unreachable"]
 """Faults of the database."""
 _FAULTS: dict[StoreFault, str] = {
     "full": "The disk of the database is full: delete studies that are not needed, or enlarge the "
-    "disk. Deleting "
-    "works.",
+    "disk. Deleting works.",
     "read-only": "The database is read-only: reading works, and the operator of the service must "
     "make it writable.",
     "locked": "Another process locks the database: try again later, or ask the operator of the "
-    "service to end that "
-    "process.",
+    "service to end that process.",
     "deleted": "The file of the database was deleted or replaced: the operator of the service must "
-    "put it back, or "
-    "restart the service, which then begins an empty one.",
+    "put it back, or restart the service, which then begins an empty one.",
+    "other-version": "Another version of the service made the database: the operator must start "
+    "that version, or move the database away, after which the service begins an empty one.",
     "unreachable": "The database does not answer: try again later, or ask the operator of the "
     "service.",
 }
@@ -40,8 +39,8 @@ class StoreUnavailable(ServiceError):
 
     cause: StoreFault
     """`full`: no space is left. `read-only`: it takes no changes. `locked`: another process locks
-    it. `deleted`: its file was deleted or replaced while the service ran. `unreachable`: it does
-    not answer, or cannot be read."""
+    it. `deleted`: its file was deleted or replaced while the service ran. `other-version`: another
+    version of the service made its tables. `unreachable`: it does not answer, or cannot be read."""
 
     def __str__(self) -> str:
         return _FAULTS[self.cause]

@@ -18,6 +18,22 @@ class NotFound(ServiceError):
     detail = "This path does not exist: GET /openapi.json lists all paths."
 
 
+class PagesNotBuilt(ServiceError):
+    """This installation was made without the pages at this path: the studio, or the documentation
+    at `/help`."""
+
+    status = 404
+    title = "Pages not built"
+    remedy = (
+        "Install the wheel or the image, which have them, or build them in a clone: "
+        "`python scripts/build_studio.py`, `python scripts/build_docs.py`."
+    )
+    detail = (
+        "This installation was made without these pages: build them by scripts/build_studio.py or "
+        "scripts/build_docs.py, or install the wheel."
+    )
+
+
 class MethodNotAllowed(ServiceError):
     """This path does not support the HTTP method of the request."""
 

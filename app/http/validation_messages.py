@@ -78,8 +78,10 @@ def _message(error: Mapping[str, Any]) -> str:
     if error["type"] == "string_pattern_mismatch":
         return _PATTERNS.get(context["pattern"], str(error["msg"]))
     if error["type"] in ("too_short", "too_long"):
-        bound = "most {max_length}" if error["type"] == "too_long" else "least {min_length}"
-        return f"Give at {bound.format_map(context)} items, not {context['actual_length']}"
+        is_long = error["type"] == "too_long"
+        bound = context["max_length" if is_long else "min_length"]
+        items = f"{bound} item{'' if bound == 1 else 's'}"
+        return f"Give at {'most' if is_long else 'least'} {items}, not {context['actual_length']}"
     return str(_MESSAGES.get(error["type"], error["msg"]))
 
 

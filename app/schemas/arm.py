@@ -266,14 +266,16 @@ class ArmRequest(CellRequest):
         {"mass": 2.0, "com": [0.0, 0.0, 0.05]},
         default=None,
     )
-    gravity: Annotated[
-        list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)
-    ] = described(
+    gravity: (
+        Annotated[list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)]
+        | None
+    ) = described(
         "Acceleration of gravity, [x, y, z] in the robot's base frame (`base`). For a ceiling "
-        "mount: [0, 0, 9.81].",
+        "mount: [0, 0, 9.81]. Null: [0, 0, -9.81], or the robot's `kinematics.gravity`, for a "
+        "robot of yours whose base is tilted in its URDF.",
         "m/s²",
         [0.0, 0.0, -9.81],
-        default=[0.0, 0.0, -9.81],
+        default=None,
     )
     limits: Limits = described(
         "Limits of this request. They may only tighten the robot's limits.",

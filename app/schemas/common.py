@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from itertools import islice
 from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -17,7 +20,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.declared import with_unit
-from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID
+from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID, TURNED
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.names import TYPOS, nearest
 from joulepath.optimizer.problem.names import is_plain
@@ -106,11 +109,13 @@ class MotionAnswer(Answer):
     )
 
 
-def by_field(*names: str, beside: str | None = None) -> Discriminator:
+def by_field(
+    *names: str, beside: str | None = None, example: Mapping[str, Any] | None = None
+) -> Discriminator:
     """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one
     field of `names`.
 
-    `beside` is a field that all members have.
+    `beside` is a field that all members have. The message of the error shows the `example`.
     """
 
     def choose(value: Any) -> str | None:
@@ -129,11 +134,41 @@ def by_field(*names: str, beside: str | None = None) -> Discriminator:
         return f"by {present[0]}" if len(present) == 1 else None
 
     also = f"{beside} and " if beside else ""
+    like = f", for example {json.dumps(example)}" if example else ""
     return Discriminator(
         choose,
         custom_error_type="exactly_one",
-        custom_error_message=f"Give an object with {also}exactly one of {', '.join(names)}",
+        custom_error_message=f"Give an object with {also}exactly one of {', '.join(names)}{like}",
     )
+
+
+def _as_ros(value: Any) -> Any:
+    """A pose of ROS, with or without a header, in the form of the schemas: `orientation: {x, y, z,
+    w}` becomes `quaternion`, `position: {x, y, z}` a list, and `frame_id` the `frame`.
+    """
+    if isinstance(value, dict) and value.keys() == {"header", "pose"}:
+        header, pose = value["header"], value["pose"]
+        frame = header.get("frame_id") if isinstance(header, dict) else None
+        if not isinstance(pose, dict) or frame not in ("base", "base_link", "/base", "/base_link"):
+            raise PydanticCustomError(
+                "stamped", "A stamped pose needs a `pose`, and the `frame_id` base or base_link"
+            )
+        value = pose | {"frame": frame.lstrip("/")}
+    if not isinstance(value, dict):
+        return value
+    position, orientation = value.get("position"), value.get("orientation")
+    if isinstance(position, dict) and position.keys() == {*"xyz"}:
+        value = value | {"position": [position[part] for part in "xyz"]}
+    if "quaternion" in value or not isinstance(orientation, dict):
+        return value
+    if orientation.keys() == {*"xyzw"}:
+        value = value | {"quaternion": [orientation[part] for part in "xyzw"]}
+        del value["orientation"]
+    return value
+
+
+AS_IN_ROS = BeforeValidator(_as_ros)
+"""Also takes geometry_msgs/Pose and PoseStamped as JSON."""
 
 
 def number_or_object(number: str, error: str, message: str) -> Discriminator:
@@ -202,7 +237,8 @@ class WithQuaternion(Request):
 
     quaternion: Quaternion = described(
         "Orientation as a quaternion [x, y, z, w]. Its norm must be within 0.001 of 1; it is then "
-        "normalised.",
+        "normalised. ROS's `orientation: {x, y, z, w}` is taken in its place, and a whole "
+        "PoseStamped in place of the pose.",
         "1",
         [0.0, 1.0, 0.0, 0.0],
     )
@@ -244,7 +280,8 @@ Pose = Annotated[
     Annotated[QuaternionPose, Tag("by quaternion")]
     | Annotated[RpyPose, Tag("by rpy")]
     | Annotated[RotvecPose, Tag("by rotvec")],
-    by_field("quaternion", "rpy", "rotvec", beside="position"),
+    by_field("quaternion", "rpy", "rotvec", beside="position", example=TURNED),
+    AS_IN_ROS,
 ]
 
 Frame = Literal["base", "base_link"]
@@ -287,7 +324,8 @@ BasePose = Annotated[
     Annotated[BaseQuaternionPose, Tag("by quaternion")]
     | Annotated[BaseRpyPose, Tag("by rpy")]
     | Annotated[BaseRotvecPose, Tag("by rotvec")],
-    by_field("quaternion", "rpy", "rotvec", beside="position"),
+    by_field("quaternion", "rpy", "rotvec", beside="position", example=TURNED),
+    AS_IN_ROS,
 ]
 
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])

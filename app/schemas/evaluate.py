@@ -42,7 +42,7 @@ SecondsPerSegment = Annotated[
 
 class LoggedTrajectory(Request):
     """Joint positions over time, from a log or from the answer of `POST /optimize`; arrays are
-    [sample][joint].
+    `[sample][joint]`.
     """
 
     t: Times = described(

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Discriminator, Tag
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.schemas.common import (
+    AS_IN_ROS,
     BaseQuaternionPose,
     BaseRotvecPose,
     BaseRpyPose,
@@ -22,6 +23,7 @@ from joulepath.app.schemas.common import (
     by_field,
     described,
 )
+from joulepath.app.schemas.examples.values import TURNED
 
 SHORTEST_AXIS = 1e-6
 """Smallest length of an axis."""
@@ -136,5 +138,6 @@ TargetPose = Annotated[
     | Annotated[BaseRpyPose, Tag("by rpy")]
     | Annotated[BaseRotvecPose, Tag("by rotvec")]
     | Annotated[ConeOrientedPose, Tag("by orientation")],
-    by_field("quaternion", "rpy", "rotvec", "orientation", beside="position"),
+    by_field("quaternion", "rpy", "rotvec", "orientation", beside="position", example=TURNED),
+    AS_IN_ROS,
 ]

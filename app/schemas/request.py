@@ -16,6 +16,7 @@ from joulepath.app.schemas.common import (
     described,
     number_or_object,
 )
+from joulepath.app.schemas.examples.values import HOME
 from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
@@ -63,7 +64,7 @@ class PoseTarget(Request):
 
 SingleTarget = Annotated[
     Annotated[JointTarget, Tag("by q")] | Annotated[PoseTarget, Tag("by pose")],
-    by_field("q", "pose"),
+    by_field("q", "pose", example={"q": HOME}),
 ]
 
 
@@ -87,7 +88,7 @@ Target = Annotated[
     Annotated[JointTarget, Tag("by q")]
     | Annotated[PoseTarget, Tag("by pose")]
     | Annotated[AnyOfTarget, Tag("by any_of")],
-    by_field("q", "pose", "any_of"),
+    by_field("q", "pose", "any_of", example={"q": HOME}),
 ]
 
 

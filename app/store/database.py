@@ -14,11 +14,11 @@ from alembic import command
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from alembic.util import CommandError
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
+from joulepath.app.store.faults import OtherVersion
 from joulepath.app.store.sqlite_file import check, identity
 
 logger = logging.getLogger(__name__)
@@ -47,17 +47,6 @@ DATABASE = DatabaseSettings()
 _PAGES = ("freelist_count", "page_size")
 _MIGRATION_LOCK = 0x6A6F756C65
 """Key of the advisory lock in PostgreSQL, different from the keys of other programs."""
-
-
-class OtherVersion(CommandError):
-    """The database belongs to another version of the service; `revision` of its tables."""
-
-    def __init__(self, revision: str, url: URL) -> None:
-        super().__init__(
-            f"Another version of the service made the tables of {url.render_as_string()} (revision "
-            f"{revision}), and this one cannot migrate them: start that version, or move the "
-            "database away (or set another JOULEPATH_DATABASE_URL), and a new one is made."
-        )
 
 
 def create_database_engine(url: str) -> Engine:

@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from alembic.util import CommandError
+from sqlalchemy import URL
 from sqlalchemy.exc import DBAPIError
 
 from joulepath.app.exceptions.stored import StoreFault
@@ -24,10 +26,23 @@ class DatabaseMoved(OSError):
     """The file of the database was replaced after it was opened."""
 
 
+class OtherVersion(CommandError):
+    """The database belongs to another version of the service; `revision` of its tables."""
+
+    def __init__(self, revision: str, url: URL) -> None:
+        super().__init__(
+            f"Another version of the service made the tables of {url.render_as_string()} (revision "
+            f"{revision}), and this one cannot migrate them: start that version, or move the "
+            "database away (or set another JOULEPATH_DATABASE_URL), and a new one is made."
+        )
+
+
 def fault_of(error: Exception, file: Path | None) -> StoreFault:
     """The fault behind an error of the driver; `file` is the file of an SQLite database."""
     if isinstance(error, DatabaseMoved):
         return "deleted"
+    if isinstance(error, OtherVersion):
+        return "other-version"
     if not isinstance(error, DBAPIError):
         return "unreachable"
     code = getattr(error.orig, "sqlite_errorcode", None)

@@ -131,18 +131,18 @@ class Motion:
 class Description:
     """A user's own arm: text of the URDF, link `tip` at the end of the arm, further figures.
 
-    `acceleration` [rad/s²], `payload` [kg]. `base` is the link with the world frame (default: the
-    root). `velocity` [rad/s] and `torque` [N·m] replace the limits of the URDF, `torque_side` says
-    whether torque limits include friction and rotor; `jerk` [rad/s³]. `locked` has positions [rad]
-    or [m] of fixed joints; "others" holds all joints that are not between base and tip, at zero or
-    the limit nearest to it. `source` is the origin of the URDF, `trust` its trust letter. `srdf` is
-    the text of an SRDF with disabled collision checks. `meshes` has mesh files by path.
+    `payload` [kg]. `base` is the link with the world frame (default: the root). `acceleration`
+    [rad/s²], `velocity` [rad/s], `torque` [N·m] and `jerk` [rad/s³] replace the limits of the URDF;
+    `torque_side` says whether torque limits include friction and rotor. `locked` has positions
+    [rad] or [m] of fixed joints; "others" holds all joints that are not between base and tip, at
+    zero or the limit nearest to it. `source` is the origin of the URDF, `trust` its trust letter.
+    `srdf` is the text of an SRDF with disabled collision checks. `meshes` has mesh files by path.
     """
 
     urdf: str
     tip: str
-    acceleration: PerJoint
     payload: float
+    acceleration: PerJoint | None = None
     base: str | None = None
     title: str | None = None
     source: str = "given by the user"

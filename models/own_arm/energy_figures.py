@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from joulepath.models.own_arm.description import Description, InvalidArm
-from joulepath.models.own_arm.figure import assumed, either, per_joint
+from joulepath.models.own_arm.description import Description, InvalidArm, PerJoint
+from joulepath.models.own_arm.figure import assumed, either, per_joint, stated
 from joulepath.models.own_arm.rules import NOTES, RULES
+from joulepath.models.own_arm.urdf_chain import Chain
+from joulepath.models.own_arm.urdf_tree import listed
 from joulepath.models.robot import Array
 
 _PLAIN = "Behind the gear."
@@ -85,31 +87,55 @@ def electronics(description: Description, nq: int) -> dict[str, Any]:
     }
 
 
-def friction(description: Description, joints: tuple[str, ...], tau_max: Array) -> dict[str, Any]:
-    """The friction law: Coulomb and viscous."""
-    given = description.drives
-    coulomb = per_joint("drives.coulomb", given.coulomb, joints, zero=True)
-    viscous = per_joint("drives.viscous", given.viscous, joints, zero=True)
-    zeros, ones = np.zeros(len(joints)), np.ones(len(joints))
-    is_given = coulomb is not None and viscous is not None
+def friction(description: Description, chain: Chain, tau_max: Array) -> dict[str, Any]:
+    """The friction law: Coulomb and viscous, as given, else of the URDF, else by the rules from the
+    torques `tau_max` (nq,) [N·m].
+    """
+    given, zeros, ones = description.drives, np.zeros(chain.nq), np.ones(chain.nq)
+    coulomb = _friction(
+        description, chain, "coulomb", "N·m", given.coulomb, RULES.coulomb * tau_max
+    )
+    viscous = _friction(
+        description, chain, "viscous", "N·m·s/rad", given.viscous, RULES.viscous * tau_max
+    )
+    is_known = "E" not in (coulomb["trust"], viscous["trust"])
     return {
-        "coulomb": either(
-            description, coulomb, RULES.coulomb * tau_max, "N·m", (_PLAIN, NOTES["coulomb"])
-        ),
+        "coulomb": coulomb,
         "curved": either(
-            description, zeros if is_given else None, zeros, "N·m", ("Not in this law.",) * 2
+            description, zeros if is_known else None, zeros, "N·m", ("Not in this law.",) * 2
         ),
         "speed": either(
             description,
-            ones if is_given else None,
+            ones if is_known else None,
             ones,
             "rad/s",
             ("Without effect, as `curved` is zero.",) * 2,
         ),
-        "viscous": either(
-            description, viscous, RULES.viscous * tau_max, "N·m·s/rad", (_PLAIN, NOTES["viscous"])
-        ),
+        "viscous": viscous,
     }
+
+
+def _friction(
+    description: Description,
+    chain: Chain,
+    part: Literal["coulomb", "viscous"],
+    unit: str,
+    given: PerJoint | None,
+    ruled: Array,
+) -> dict[str, Any]:
+    """A coefficient of the friction law."""
+    values = per_joint(f"drives.{part}", given, chain.joints, zero=True)
+    if values is not None:
+        return stated(description, values, unit, _PLAIN)
+    of_urdf = chain.facts.coulomb if part == "coulomb" else chain.facts.viscous
+    known = of_urdf > 0
+    if known.all():
+        return stated(description, of_urdf, unit, "Of <dynamics> in the URDF.")
+    note = NOTES[part]
+    if known.any():
+        names = listed(name for name, own in zip(chain.joints, known, strict=True) if own)
+        note = f"Of <dynamics> in the URDF: {names}. The others: {note}"
+    return assumed(np.where(known, of_urdf, ruled), unit, note)
 
 
 def _most(most: float) -> str:

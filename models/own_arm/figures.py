@@ -27,10 +27,13 @@ from joulepath.models.own_arm.rules import NOTES, RULES
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
 from joulepath.models.own_arm.urdf_tree import CHAIN, listed, refuse
+from joulepath.models.robot import UPRIGHT, Array
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
 _PLACEMENT = "x, y, z, roll, pitch, yaw"
+LEVEL = 1e-6
+"""Deviation of gravity [m/s²] below which a base is upright: rounding of angles."""
 
 
 def own_figures(
@@ -48,17 +51,7 @@ def own_figures(
     """
     chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
-    warnings = list[str]()
-    if chain.rounded > CHAIN.rounded_angle:
-        warnings.append(
-            "Angles of joint origins written with few decimals, such as 1.571, are read as the "
-            f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
-        )
-    if chain.coarse:
-        warnings.append(
-            f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as they "
-            "stand, so that the axes are not at right angles. Write 1.5708 and 3.1416 if they are."
-        )
+    warnings = _chain_warnings(chain)
     problems = Problems()
     with problems.noted():
         inertials = _inertials(description, chain, upright, warnings)
@@ -69,6 +62,7 @@ def own_figures(
     torques = HoldingTorques.of(chain, acceleration, description.payload)
     warnings += torques.warnings(chain.joints, tau_max)
     ruling = torques.ruling(tau_max)
+    warnings += chain.facts.warnings(description.drives, chain.joints, ruling)
     figures = {
         "title": description.title or name,
         "kinematics": _kinematics(description, chain, upright, links),
@@ -80,7 +74,7 @@ def own_figures(
         "friction_table": {
             "knee": assumed(RULES.knee, "rad/s", "Coulomb friction is smoothed over this speed.")
         },
-        "friction_laws": {"coulomb_viscous": friction(description, chain.joints, ruling)},
+        "friction_laws": {"coulomb_viscous": friction(description, chain, ruling)},
     }
     if (motion := description.default_motion) is not None:
         if min(motion.velocity, motion.acceleration) <= 0:
@@ -98,6 +92,28 @@ def own_figures(
         *warnings,
         f"Engineering defaults, see their notes: {defaults}.",
     ] if defaults else warnings
+
+
+def _chain_warnings(chain: Chain) -> list[str]:
+    """Warnings of a tilted base and of rounded angles."""
+    warnings, gravity = list[str](), _gravity(chain)
+    if gravity is not None:
+        warnings.append(
+            "The base is tilted against the root link of the URDF, which is taken to be upright: "
+            f"gravity in its frame is {gravity.round(4).tolist()} m/s² unless a request gives "
+            "another."
+        )
+    if chain.rounded > CHAIN.rounded_angle:
+        warnings.append(
+            "Angles of joint origins written with few decimals, such as 1.571, are read as the "
+            f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
+        )
+    if chain.coarse:
+        warnings.append(
+            f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as they "
+            "stand, so that the axes are not at right angles. Write 1.5708 and 3.1416 if they are."
+        )
+    return warnings
 
 
 def _link_names(chain: Chain) -> list[str]:
@@ -133,7 +149,16 @@ def _kinematics(
     if (ros_base := chain.T_base_base_link) is not None:
         text = f"{_PLACEMENT} of the link `base_link` in the base."
         figures["base_link_origin"] = stated(description, _row(pin.SE3(ros_base)), "m, rad", text)
+    if (gravity := _gravity(chain)) is not None:
+        text = "In the base, whose frame is tilted against the root link; for requests without it."
+        figures["gravity"] = stated(description, gravity, "m/s²", text)
     return figures
+
+
+def _gravity(chain: Chain) -> Array | None:
+    """Gravity (3,) [m/s²] in the base if the root link is upright; None for an upright base."""
+    gravity = chain.T_base[:3, :3].T @ UPRIGHT
+    return None if np.abs(gravity - UPRIGHT).max() < LEVEL else np.asarray(gravity)
 
 
 def _row(placement: pin.SE3) -> list[float]:
@@ -181,14 +206,12 @@ def _limits(description: Description, chain: Chain, warnings: list[str]) -> dict
     warnings += SPEED.warnings(names, found["velocity"])
     warnings += ACCELERATION.warnings(names, found["acceleration"])
     warnings += MASS.warnings(("payload",), np.array([description.payload]))
-    acceleration = found["acceleration"]
+    acceleration, range_of = found["acceleration"], "A joint without end has one turn each way."
+    if chain.facts.soft:
+        range_of += f" By the soft limits of the URDF: {listed(chain.facts.soft)}."
     return {
-        "position_min": stated(
-            description, chain.q_min, "rad", "A joint without end has one turn to either side."
-        ),
-        "position_max": stated(
-            description, chain.q_max, "rad", "A joint without end has one turn to either side."
-        ),
+        "position_min": stated(description, chain.q_min, "rad", range_of),
+        "position_max": stated(description, chain.q_max, "rad", range_of),
         "velocity": stated(description, found["velocity"], "rad/s", "Symmetric."),
         "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
         "jerk": either(
@@ -214,11 +237,12 @@ def _checked_limits(description: Description, chain: Chain) -> dict[str, Any]:
     Raises:
         InvalidArm: limits are missing or impossible, or the payload is.
     """
-    problems, found = Problems(), dict[str, Any]()
-    for field in ("acceleration", "jerk"):
-        with problems.noted():
-            found[field] = per_joint(field, getattr(description, field), chain.joints)
+    problems, found, facts = Problems(), dict[str, Any](), chain.facts
+    with problems.noted():
+        jerk = tuple(facts.jerk) if (facts.jerk > 0).all() else None
+        found["jerk"] = per_joint("jerk", description.jerk or jerk, chain.joints)
     for field, given, of_urdf, part in (
+        ("acceleration", description.acceleration, facts.acceleration, "acceleration"),
         ("velocity", description.velocity, chain.v_max, "velocity"),
         ("torque", description.torque, chain.tau_max, "effort"),
     ):

@@ -14,8 +14,6 @@ import pinocchio as pin
 from joulepath.models.own_arm.urdf_chain import Chain
 from joulepath.models.robot import Array
 
-GRAVITY = 9.81
-
 
 @dataclass(frozen=True)
 class TorqueSettings:
@@ -49,7 +47,7 @@ class HoldingTorques:
 
     @staticmethod
     def of(chain: Chain, acceleration: Array, payload: float) -> HoldingTorques:
-        """Torques of a chain that stands upright on its base.
+        """Torques of a chain whose root link is upright.
 
         Args:
             chain: the chain.
@@ -57,7 +55,6 @@ class HoldingTorques:
             payload: rated payload [kg].
         """
         bare = chain.model.copy()
-        bare.gravity.linear = chain.T_base[:3, :3] @ np.array([0.0, 0.0, -GRAVITY])
         loaded = bare.copy()
         last = loaded.njoints - 1
         tip = pin.Inertia(payload, chain.T_tip[:3, 3], np.zeros((3, 3)))

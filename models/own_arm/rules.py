@@ -20,6 +20,8 @@ class DefaultRules:
     """Coulomb friction over tau_max [1]."""
     viscous: float = 0.055
     """Viscous friction over tau_max [s/rad]."""
+    likely_friction: tuple[float, float] = (0.1, 10.0)
+    """Friction of a URDF over that of these rules, beyond which it is likely a placeholder."""
     copper: float = 0.5
     """Copper loss times tau_max [W/(N·m)]."""
     idle_power: float = 6.0

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, Problems
+from joulepath.models.own_arm.joint_facts import JointFacts
 from joulepath.models.own_arm.robot_xml import number, numbers
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
@@ -48,7 +49,8 @@ class Chain:
     pose of the tip in the frame of the last joint, `T_base_base_link` (4, 4) the pose of the link
     `base_link` in the base; None if it is the base or not fixed to it. Limits (nq,) are position
     [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of the URDF
-    links fixed to the base and to every moving link. `rounded` [rad] is the largest change of a
+    links fixed to the base and to every moving link. `facts` are further figures of the joints.
+    `rounded` [rad] is the largest change of a
     rounded angle to the quarter turn that it stands for, `coarse` has the names of the joints with
     angles rounded too far for this.
     """
@@ -66,6 +68,7 @@ class Chain:
     v_max: Array
     tau_max: Array
     root: Element
+    facts: JointFacts
     rounded: float
     coarse: tuple[str, ...]
 
@@ -157,6 +160,9 @@ def _check_moving(joint: Element) -> None:
             f"Joint {name!r} cannot move, its lower limit being no less than the upper: make it "
             "fixed.",
         )
+    lower, upper, *_ = joint_range(joint)
+    if not lower < upper:
+        refuse("urdf", f"Joint {name!r} cannot move: its soft limits are beyond its <limit>.")
 
 
 def _check_rest(tree: UrdfTree, moving: list[Element], locked: Mapping[str, float]) -> None:
@@ -238,6 +244,7 @@ def _merged(
         v_max,
         tau_max,
         root,
+        JointFacts.of(root, tuple(names)),
         rounded,
         tuple(name for name in names if is_coarse(tree.joints[name])),
     )

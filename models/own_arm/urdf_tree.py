@@ -191,12 +191,31 @@ def _exact_angle(text: str) -> float:
 
 
 def joint_range(joint: Element) -> tuple[float, float, float, float]:
-    """Least and greatest position, greatest speed and torque; 0 without a limit."""
+    """Least and greatest position, soft limits included, greatest speed and torque; 0 without a
+    limit.
+    """
     ends = (-CONTINUOUS, CONTINUOUS)
     if joint.get("type") == "revolute":
         ends = joint_limit(joint, "lower"), joint_limit(joint, "upper")
+        soft = soft_range(joint) or ends
+        ends = max(ends[0], soft[0]), min(ends[1], soft[1])
     speed, torque = (abs(joint_limit(joint, part)) for part in ("velocity", "effort"))
     return *ends, speed, torque
+
+
+def soft_range(joint: Element) -> tuple[float, float] | None:
+    """Soft position limits [rad] of a revolute joint's <safety_controller>; None without both."""
+    soft = joint.find("safety_controller")
+    names = ("soft_lower_limit", "soft_upper_limit")
+    if (
+        soft is None
+        or joint.get("type") != "revolute"
+        or not all(each in soft.attrib for each in names)
+    ):
+        return None
+    where = f"Joint {name_of(joint)!r} has a <safety_controller>"
+    lower, upper = (number(soft, each, where) for each in names)
+    return (lower, upper) if lower < upper else None
 
 
 def joint_axis(joint: Element) -> Array:

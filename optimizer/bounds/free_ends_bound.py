@@ -11,6 +11,7 @@ moves the TCP more.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
 
@@ -46,6 +47,9 @@ class PairingSettings:
 
 PAIRING = PairingSettings()
 
+EndBoxes = tuple[Array, Array]
+"""Middles and half sides of boxes at one end, shape (b, nq) [rad]."""
+
 
 def reversed_problem(problem: Problem, start: Target, goal: Target) -> Problem:
     """The problem of motions from `start` to `goal` under inverted gravity.
@@ -73,8 +77,32 @@ def bound_between_free_ends(
         enough: sufficient bound, at which the search ends [J].
     """
     arm = prepared.arm
-    ends = within_cone(arm, start), within_cone(arm, goal)
-    return _BoxPairs(prepared, *ends, SearchLimits.of(prepared, deadline, enough)).least_bound()
+    problem = prepared.problem
+    inverted = PreparedProblem.of(reversed_problem(problem, problem.start, problem.goal))
+    families = (
+        PoseFamily(inverted, within_cone(arm, start), False),
+        PoseFamily(prepared, within_cone(arm, goal), False),
+    )
+    limits = SearchLimits.of(prepared, deadline, enough)
+    return _BoxPairs(prepared, families, _paired_boxes(families), limits).least_bound()
+
+
+def bound_between_boxes(
+    prepared: PreparedProblem,
+    families: tuple[PoseFamily, PoseFamily],
+    boxes: Sequence[EndBoxes],
+    limits: SearchLimits,
+) -> float:
+    """Lower bound on motions from the configurations of one family to those of another [J].
+
+    Args:
+        prepared: problem of the motions.
+        families: configurations at start and goal; those at the start have the potential of
+            inverted gravity, whose least value is minus the greatest one.
+        boxes: boxes of both ends that hold all these configurations.
+        limits: limits on the effort; less effort gives a weaker bound.
+    """
+    return _BoxPairs(prepared, families, boxes, limits).least_bound()
 
 
 class _BoxPairs(BoxSubdivision[Boxes]):
@@ -83,41 +111,23 @@ class _BoxPairs(BoxSubdivision[Boxes]):
     def __init__(
         self,
         prepared: PreparedProblem,
-        start: ConeOrientedPose,
-        goal: ConeOrientedPose,
+        families: tuple[PoseFamily, PoseFamily],
+        boxes: Sequence[EndBoxes],
         limits: SearchLimits,
     ) -> None:
-        problem = prepared.problem
-        inverted = PreparedProblem.of(reversed_problem(problem, problem.start, problem.goal))
-        self.limits = limits
+        self.families, self.boxes, self.limits = families, boxes, limits
         self.position_limits, self.bound = prepared.arm.active_limits, LeastBound(prepared)
-        # the greatest potential energy at the start is the least one under inverted gravity
-        self.families = PoseFamily(inverted, start, False), PoseFamily(prepared, goal, False)
 
     def is_settled(self, half: Array) -> bool:
         """Whether both boxes of a pair, half sides (2, nq) [rad], are too small to split."""
         return all(family.is_settled(box) for family, box in zip(self.families, half, strict=True))
 
     def first(self) -> Boxes:
-        """Pairs of the smallest boxes that are not too many."""
-        nq = len(self.position_limits.q_min)
-        sides = [
-            _reaching(family, *one_turn_boxes(nq, PAIRING.boxes_per_joint))
-            for family in self.families
-        ]
-        chosen = sides
-        for _ in range(PAIRING.halvings):
-            sides = [
-                _reaching(family, *halved(family, *side))
-                for family, side in zip(self.families, sides, strict=True)
-            ]
-            counts = [len(centre) for centre, _ in sides]
-            if max(counts) > PAIRING.most_boxes:
-                break
-            if prod(counts) <= PAIRING.most_pairs:
-                chosen = sides
-        a, b = (rows.ravel() for rows in np.indices([len(centre) for centre, _ in chosen]))
-        centre, half = (np.stack([chosen[0][k][a], chosen[1][k][b]], axis=1) for k in (0, 1))
+        """Pairs of the boxes of both ends."""
+        a, b = (rows.ravel() for rows in np.indices([len(centre) for centre, _ in self.boxes]))
+        centre, half = (
+            np.stack([self.boxes[0][k][a], self.boxes[1][k][b]], axis=1) for k in (0, 1)
+        )
         return Boxes(self._bounds(centre, half), centre, half)
 
     def divided(self, parts: Boxes, rows: Indices) -> Boxes:
@@ -149,6 +159,26 @@ class _BoxPairs(BoxSubdivision[Boxes]):
             for k, family in enumerate(self.families)
         )
         return np.where(possible, self.bound.of(displacement, goal + start), np.inf)
+
+
+def _paired_boxes(families: Sequence[PoseFamily]) -> Sequence[EndBoxes]:
+    """The smallest boxes of both ends whose pairs are not too many."""
+    sides = [
+        _reaching(family, *one_turn_boxes(family.prepared.arm.robot.nq, PAIRING.boxes_per_joint))
+        for family in families
+    ]
+    chosen = sides
+    for _ in range(PAIRING.halvings):
+        sides = [
+            _reaching(family, *halved(family, *side))
+            for family, side in zip(families, sides, strict=True)
+        ]
+        counts = [len(centre) for centre, _ in sides]
+        if max(counts) > PAIRING.most_boxes:
+            break
+        if prod(counts) <= PAIRING.most_pairs:
+            chosen = sides
+    return chosen
 
 
 def _reaching(family: PoseFamily, centre: Array, half: Array) -> tuple[Array, Array]:

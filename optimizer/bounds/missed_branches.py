@@ -11,9 +11,11 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.end_curves import Curve, EndCurves
-from joulepath.optimizer.bounds.free_goal_bound import family_bound
+from joulepath.optimizer.bounds.free_ends_bound import bound_between_boxes, reversed_problem
+from joulepath.optimizer.bounds.free_goal_bound import PoseFamily, family_bound
 from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.bounds.pair import Pair
+from joulepath.optimizer.bounds.pose_cover import POSE_COVER, CoveredPose, cover
 from joulepath.optimizer.bounds.self_motion_bound import bound_between_curves, self_motion_bound
 from joulepath.optimizer.bounds.subdivide import SUBDIVISION, SearchLimits
 from joulepath.optimizer.deadline import NEVER, Deadline
@@ -21,12 +23,16 @@ from joulepath.optimizer.kinematics.covers.branch_covers import branch_covers
 from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.orientation_tolerance import within_cone
 from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target, members
+
+SIX_JOINTS = 6
+"""Number of joints up to which the configurations of a pose are isolated."""
 
 
 def all_branches_known(problem: Problem) -> bool:
@@ -47,9 +53,10 @@ def bound_of_missed_branches(
 
     - If all branches are known, the other configurations are members of self-motions.
     - Else, if the arm is nearly of a form with known curves, `branch_covers` hold them.
-    - Else, from given joint positions, the bound covers the motions to the goal poses with any
-      rotation about their z axes, by boxes of joint positions, without inverse kinematics.
-    - Else, between poses, the bound covers the motions between any two configurations.
+    - Else, between given joint positions and poses, the bound covers the poses with any rotation
+      about the last joint's axis, by boxes of joint positions, without inverse kinematics.
+    - Else, between poses, it covers the motions between the boxes of `pose_cover` at both ends, or
+      those between any two configurations for more than six joints, whose boxes would be too many.
 
     Args:
         prepared: problem of the motions.
@@ -60,24 +67,73 @@ def bound_of_missed_branches(
     problem = prepared.problem
     if all_branches_known(problem):
         return self_motion_bound(prepared, candidates, deadline, enough)
-    between_poses = bool(_poses(problem.start))
     has_free_goal = any(isinstance(goal, ConeOrientedPose) for goal in members(problem.goal))
-    if not (between_poses and has_free_goal):
+    if not (_poses(problem.start) and has_free_goal):
         starts = _covered(prepared, [pair.start for pair in candidates], problem.start)
         goals = _covered(prepared, [pair.goal for pair in candidates], problem.goal)
         if starts is not None and goals is not None:
             return bound_between_curves(prepared, starts, goals, deadline, enough)
-    if between_poses:
+    if _poses(problem.start) and problem.arm.robot.nq > SIX_JOINTS:
         return _bound_of_any(prepared)
-    poses = [
-        ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)
+    return _bound_by_boxes(prepared, candidates, deadline)
+
+
+def _bound_by_boxes(
+    prepared: PreparedProblem, candidates: Sequence[Pair], deadline: Deadline
+) -> float:
+    """Lower bound on motions from or to poses, in any of their configurations [J]."""
+    problem = prepared.problem
+    if problem.tool_path is not None:
+        problem = prepared.freed(candidates[0].q_start)
+    back = reversed_problem(problem, problem.goal, problem.start)
+    starts, goals = _poses(prepared.problem.start), _poses(problem.goal)
+    known = [pair.start for pair in candidates], [pair.goal for pair in candidates]
+    found = [
+        _bound_from_given(
+            problem, _beside_poses(known[0], prepared.problem.start), goals, deadline
+        ),
+        _bound_from_given(back, _beside_poses(known[1], problem.goal), starts, deadline),
     ]
-    curves = EndCurves.of([pair.start for pair in candidates])
+    free = [each for each in members(problem.goal) if isinstance(each, ConeOrientedPose)]
+    searches, tight = len(starts) * len([*goals, *free]), problem.bound == "tight"
+    rounds = POSE_COVER.tight_rounds if tight else POSE_COVER.rounds
+    effort = SearchLimits(max(1, rounds // max(searches, 1)), deadline)
+    limits = SearchLimits(max(1, _rounds(problem) // max(searches, 1)), deadline)
+    for start in starts:
+        # the greatest potential energy at the start is the least one under inverted gravity
+        covered = CoveredPose.of(back, start)
+        boxes = covered.boxes(effort)
+        for goal in goals:
+            to = CoveredPose.of(problem, goal)
+            ends = (covered.family, to.family), (boxes, to.boxes(effort))
+            found.append(bound_between_boxes(prepared, *ends, limits))
+        for cone in free:
+            family = PoseFamily(prepared, within_cone(prepared.arm, cone), False)
+            ends = (covered.family, family), (boxes, cover(family, effort))
+            found.append(bound_between_boxes(prepared, *ends, limits))
+    return min(found)
+
+
+def _beside_poses(ends: Sequence[EndConfiguration], target: Target) -> list[EndConfiguration]:
+    """The ends that reach no pose of fixed orientation among the targets."""
+    single = members(target)
+    return [end for end in ends if not isinstance(single[end.target], Pose)]
+
+
+def _bound_from_given(
+    problem: Problem, ends: Sequence[EndConfiguration], poses: Sequence[Pose], deadline: Deadline
+) -> float:
+    """Lower bound on motions from given ends to poses in any configuration [J]; inf for none."""
+    if not ends or not poses:
+        return np.inf
+    curves = EndCurves.of(ends)
     boxes, half = curves.boxes(curves.first())
-    tight = problem.bound == "tight"
-    rounds = SUBDIVISION.tight_rounds if tight else SUBDIVISION.early_rounds
-    limits = SearchLimits(max(1, rounds // len(poses)), deadline)
-    return min(family_bound(prepared, pose, boxes, limits, half, curves.given) for pose in poses)
+    limits = SearchLimits(max(1, _rounds(problem) // len(poses)), deadline)
+    families = [CoveredPose.of(problem, pose).family for pose in poses]
+    return min(
+        family_bound(each.prepared, each.pose, boxes, limits, half, curves.given)
+        for each in families
+    )
 
 
 def _covered(
@@ -98,6 +154,11 @@ def _covered(
             return None
         curves += covers
     return EndCurves(arm.robot.nq, curves, not poses)
+
+
+def _rounds(problem: Problem) -> int:
+    """Rounds of the subdivision of boxes, shared by all searches."""
+    return SUBDIVISION.tight_rounds if problem.bound == "tight" else SUBDIVISION.early_rounds
 
 
 def _bound_of_any(prepared: PreparedProblem) -> float:

@@ -108,8 +108,8 @@ class ExcitationProblem:
             )
         nq = self.arm.robot.nq
         if self.centre is not None:
-            object.__setattr__(self, "centre", frozen(self.centre, (nq,), "centre"))
-            self.arm.check_inside("centre", self.centre)
+            centre = self.arm.inside("centre", frozen(self.centre, (nq,), "centre"))
+            object.__setattr__(self, "centre", centre)
         default = REQUEST_LIMITS.default_noise * self.arm.robot.limits.tau_max
         given = default if self.noise is None else self.noise
         object.__setattr__(

@@ -147,7 +147,7 @@ def export(
 
     Args:
         motion: solution of a problem or of a cycle, or a program of moves and rests.
-        format: name of the format; docs/exports.md describes each.
+        format: name of the format; docs/reference/export.md describes each.
         options: options of this format; None for its defaults.
         problem: problem of a `Solution`, which contains its arm; other motions contain theirs.
         speed_scale: fraction of the speed in (0, 1]. Moves are slowed down, rests are not.

@@ -42,6 +42,8 @@ class Ros2Options:
     encoding: Encoding = "yaml"
     controller: str = "joint_trajectory_controller"
     """Name of the controller's node."""
+    prefix: str = ""
+    """Prefix of all joint names."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class MoveitOptions:
     """Options of `moveit`."""
 
     encoding: Encoding = "yaml"
+    prefix: str = ""
+    """Prefix of all joint names."""
 
 
 def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile:
@@ -56,22 +60,20 @@ def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile
 
     Args:
         program: the motion.
-        options: message, encoding and controller; None for the defaults.
+        options: message, encoding, controller and prefix; None for the defaults.
 
     Raises:
         FormatUnsuitable: the motion is too long.
     """
     options = options or Ros2Options()
     points = quintic_points(program, "ros2")
-    trajectory = _trajectory(program, points)
-    action, topic = (
-        f"/{options.controller}/follow_joint_trajectory",
-        f"/{options.controller}/joint_trajectory",
-    )
+    trajectory = _trajectory(program, points, options.prefix)
+    controller = options.controller.lstrip("/")
+    action, topic = f"/{controller}/follow_joint_trajectory", f"/{controller}/joint_trajectory"
     if options.message == "goal":
         tolerance = [
             {"name": name, "position": GOAL.position_tolerance}
-            for name in program.robot.joint_names
+            for name in trajectory["joint_names"]
         ]
         message = {
             "trajectory": trajectory,
@@ -100,28 +102,27 @@ def to_moveit(program: Program, options: MoveitOptions | None = None) -> Written
 
     Args:
         program: the motion.
-        options: encoding; None for the defaults.
+        options: encoding and prefix; None for the defaults.
 
     Raises:
         FormatUnsuitable: the motion is too long.
     """
-    encoding, points = (options or MoveitOptions()).encoding, quintic_points(program, "moveit")
+    options, points = options or MoveitOptions(), quintic_points(program, "moveit")
     message = {
-        "joint_trajectory": _trajectory(program, points),
+        "joint_trajectory": _trajectory(program, points, options.prefix),
         "multi_dof_joint_trajectory": {"joint_names": []},
     }
     kind = "moveit_msgs/msg/RobotTrajectory"
-    return _file(
-        program, points, encoding, kind, "for MoveGroupInterface::execute", message, message
-    )
+    use = "for MoveGroupInterface::execute"
+    return _file(program, points, options.encoding, kind, use, message, message)
 
 
-def _trajectory(program: Program, points: QuinticPoints) -> dict[str, Any]:
+def _trajectory(program: Program, points: QuinticPoints, prefix: str) -> dict[str, Any]:
     rows = zip(
         points.nanoseconds, points.q.tolist(), points.v.tolist(), points.a.tolist(), strict=True
     )
     return {
-        "joint_names": list(program.robot.joint_names),
+        "joint_names": [prefix + name for name in program.robot.joint_names],
         "points": [
             {
                 "positions": q,

@@ -18,5 +18,5 @@ Method = Literal[
     "threshold_velocity",
     "temperature",
 ]
-"""Methods to find figures; docs/identification.md lists their requirements and uses."""
+"""Methods to find figures; docs/reference/identification.md lists their requirements and uses."""
 DEFAULT_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "load", "offset")

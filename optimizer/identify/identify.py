@@ -109,7 +109,7 @@ class Identification:
 
         Returns:
             Value, unit, source, trust letter and standard deviation of each figure, and their
-            covariance; see docs/identification.md.
+            covariance; see docs/reference/identification.md.
         """
         return document_of(self.figures(), date)
 

@@ -45,7 +45,7 @@ class Spline(Comparable):
     knots: Annotated[Array, Axes(("knot",)), Unit("s")]
     """Knots."""
     control_points: Annotated[Array, Axes(("point", "joint")), Unit("rad")]
-    """Control points, [point][joint]."""
+    """Control points, `[point][joint]`."""
 
     def __repr__(self) -> str:
         points, joints = self.control_points.shape

@@ -25,6 +25,8 @@ class ArmRanges:
 
     least_speed: float = 1e-3
     """Least speed limit of a point [m/s]; below it, motions would exceed the longest duration."""
+    limit_grace: float = 1e-4
+    """Distance beyond a position limit that is rounding [rad], as of 3.1416 or 6.28319."""
     max_tool_parts: int = 16
     """Most capsules of a tool."""
     link_mass_scales: tuple[float, float] = (0.1, 10.0)
@@ -118,7 +120,7 @@ class Arm:
         robot: the robot.
         T_flange_tcp: pose of the TCP in the flange frame, shape (4, 4).
         payload: body carried.
-        gravity: gravity in the base frame, shape (3,) [m/s²].
+        gravity: gravity in the base frame, shape (3,) [m/s²]; None for that of the robot.
         limits: joint limits, at most those of the robot; None for these.
         friction: name of one of the robot's friction laws; None for its default.
         inverter: replaced coefficients of the inverters.
@@ -139,7 +141,8 @@ class Arm:
     robot: Robot
     T_flange_tcp: Array = field(default_factory=lambda: np.eye(4))
     payload: Payload = field(default_factory=Payload)
-    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    # None is replaced on construction
+    gravity: Array = field(default=None)  # type: ignore[arg-type]
     limits: Limits | None = None
     friction: str | None = None
     inverter: Inverter = field(default_factory=Inverter)
@@ -154,7 +157,8 @@ class Arm:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tcp", rigid_transform(self.T_flange_tcp, "tcp"))
-        object.__setattr__(self, "gravity", frozen(self.gravity, (3,), "gravity"))
+        gravity = self.gravity if self.gravity is not None else self.robot.gravity  # type: ignore[redundant-expr]
+        object.__setattr__(self, "gravity", frozen(gravity, (3,), "gravity"))
         object.__setattr__(
             self, "limits", self.robot.limits if self.limits is None else self.limits
         )
@@ -231,23 +235,29 @@ class Arm:
             return self.bus.efficiency
         return 0.0 if self.bus.mode == "isolated" else self.robot.electronics.regeneration
 
-    def check_inside(self, target: str, q: Array) -> None:
-        """Check that joint positions are in range.
+    def inside(self, target: str, q: Array) -> Array:
+        """Joint positions within the limits, to which those beyond by rounding are moved.
 
         Args:
             target: name of the target, for the error.
             q: joint positions, shape (nq,) [rad].
 
+        Returns:
+            Read-only joint positions, shape (nq,) [rad].
+
         Raises:
             OutsideLimits: a joint is out of range.
         """
         lower, upper = self.active_limits.q_min, self.active_limits.q_max
-        outside = np.flatnonzero((q < lower) | (q > upper))
+        within = np.clip(q, lower, upper)
+        outside = np.flatnonzero(np.abs(within - q) > ARM_RANGES.limit_grace)
         if outside.size:
             j = int(outside[0])
             raise OutsideLimits(
                 target, self.robot.joint_names[j], float(q[j]), float(lower[j]), float(upper[j])
             )
+        within.setflags(write=False)
+        return np.asarray(within)
 
     def _check_touches(self) -> None:
         """Check that all links touched by tool or payload exist."""

@@ -107,9 +107,7 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
         )
     if isinstance(target, Pose | ConeOrientedPose):
         return target
-    q = frozen(target, (arm.robot.nq,), f"{name}.q")
-    arm.check_inside(name, q)
-    return q
+    return arm.inside(name, frozen(target, (arm.robot.nq,), f"{name}.q"))
 
 
 def validated_in_cycle(arm: Arm, field: str, target: Target) -> Target:

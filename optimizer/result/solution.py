@@ -46,7 +46,7 @@ JointTorques = Annotated[PerSampleAndJoint, Unit("N·m")]
 
 @dataclass(frozen=True, eq=False)
 class Samples(Comparable):
-    """Samples of a motion; arrays are [sample][joint]."""
+    """Samples of a motion; arrays are `[sample][joint]`."""
 
     t: Annotated[PerSample, Unit("s")]
     """Time of each sample, from the start of the motion."""
@@ -68,7 +68,7 @@ class Samples(Comparable):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory(Samples):
-    """The motion: its spline, and samples of it; arrays are [sample][joint]."""
+    """The motion: its spline, and samples of it; arrays are `[sample][joint]`."""
 
     spline: Spline
     """The motion itself; all samples follow from it."""

@@ -132,12 +132,9 @@ def _ends_of(
     problem = prepared.problem
     robot, limits = problem.arm.robot, problem.arm.active_limits
     if not isinstance(target, Pose | ConeOrientedPose):
-        problem.arm.check_inside(name, target)
-        return [
-            EndConfiguration(
-                label_of(robot, target), target, [[value] for value in target.tolist()], True, index
-            )
-        ]
+        q = problem.arm.inside(name, target)
+        turns = [[value] for value in q.tolist()]
+        return [EndConfiguration(label_of(robot, q), q, turns, True, index)]
     kinematics = required_inverse_kinematics(robot, name)
     if isinstance(target, ConeOrientedPose):
         return _ends_of_samples(prepared, name, target, index, samples)

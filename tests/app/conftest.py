@@ -52,8 +52,7 @@ def server() -> Iterator[Server]:
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """The service in this process, with recorded results instead of searches. Its database is its
-    own: it would take the jobs of another service in the same one.
-    """
+    own, since services with the same one share their jobs."""
     database = f"sqlite:///{tmp_path_factory.mktemp('recorded')}/joulepath.db"
     with recorded_service(database_url=database) as client:
         yield client

@@ -29,26 +29,44 @@ TOTAL, BOUND, GAP = ("energy/electrical/total", "energy/lower_bound", "energy/op
 # the field it states
 SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
     ("README.md", r"saves more than another ([\d.]+) %", "optimize/paper_pose_1", {}, GAP),
-    ("docs/optimize.md", r"can save at most ([\d.]+) %", "optimize/pose_to_pose", {}, GAP),
-    ("docs/collisions.md", r"The motion needs ([\d.]+) J", "optimize/bin_to_shelf", {}, TOTAL),
     (
-        "docs/collisions.md",
+        "docs/reference/optimize.md",
+        r"can save at most ([\d.]+) %",
+        "optimize/pose_to_pose",
+        {},
+        GAP,
+    ),
+    (
+        "docs/reference/collisions.md",
+        r"The motion needs ([\d.]+) J",
+        "optimize/bin_to_shelf",
+        {},
+        TOTAL,
+    ),
+    (
+        "docs/reference/collisions.md",
         r"it needs ([\d.]+) J",
         "optimize/bin_to_shelf",
         {"collisions": False},
         TOTAL,
     ),
     (
-        "docs/evaluate.md",
+        "docs/reference/evaluate.md",
         r'"nearest": \{"distance": ([\d.]+)',
         "evaluate/paper_motion_1",
         {},
         "nearest/distance",
     ),
-    ("docs/whatif.md", r"base needs ([\d.]+) J", "whatif/lighter_arm", {}, "base/electrical/total"),
+    (
+        "docs/reference/whatif.md",
+        r"base needs ([\d.]+) J",
+        "whatif/lighter_arm",
+        {},
+        "base/electrical/total",
+    ),
     *(
         (
-            "docs/drives.md",
+            "docs/reference/drives.md",
             rf"\| `{name}`.*? \| [\d.]+ \| ([\d.]+) \|",
             "optimize/storage_on_the_bus",
             {"bus": bus},
@@ -58,7 +76,7 @@ SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
     ),
     *(
         (
-            "docs/targets.md",
+            "docs/reference/targets.md",
             rf"\| {row} \| .*? \| {number} \|",
             f"optimize/paper_position_{row}",
             {},
@@ -72,10 +90,22 @@ SAID: list[tuple[str, str, str, dict[str, Any], str]] = [
     ),
 ]
 SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
-    ("docs/paths.md", r"a seam of 0.4 m needs ([\d.]+) J", "optimize/seam_any_turn", {}, TOTAL),
-    ("docs/cycles.md", r"along lines: the cycle needs ([\d.]+) J", "cycle/round_parts", {}, TOTAL),
     (
-        "docs/cycles.md",
+        "docs/reference/tool_paths.md",
+        r"a seam of 0.4 m needs ([\d.]+) J",
+        "optimize/seam_any_turn",
+        {},
+        TOTAL,
+    ),
+    (
+        "docs/explained/cycles.md",
+        r"along lines: the cycle needs ([\d.]+) J",
+        "cycle/round_parts",
+        {},
+        TOTAL,
+    ),
+    (
+        "docs/explained/cycles.md",
         r"a seam of 0.4 m: the cycle needs ([\d.]+) J",
         "cycle/seam_any_turn",
         {},
@@ -85,8 +115,8 @@ SLOW: list[tuple[str, str, str, dict[str, Any], str]] = [
 # pages with a shortened answer, and its request
 SHOWN = {
     "README.md": "optimize/paper_pose_1",
-    "docs/optimize.md": "optimize/pose_to_pose",
-    "docs/targets.md": "optimize/free_orientation",
+    "docs/reference/optimize.md": "optimize/pose_to_pose",
+    "docs/reference/targets.md": "optimize/free_orientation",
 }
 
 
@@ -135,7 +165,7 @@ def test_a_shortened_answer(server: Server, page: str, request_file: str) -> Non
 def test_what_the_limitations_say_of_mechanical_work(server: Server) -> None:
     answer = answer_to(server, "optimize/mechanical_fixed_duration", {})
     counts = answer["candidate_counts"]
-    text = " ".join((ROOT / "docs/limitations.md").read_text().split())
+    text = " ".join((ROOT / "docs/reference/limitations.md").read_text().split())
     assert (
         f"{counts['infeasible']} of 256 take too long, bounds rule out {counts['pruned']}, one is "
         "solved" in text
@@ -149,7 +179,7 @@ def test_the_table_of_the_front(server: Server) -> None:
     answer = answer_to(server, "pareto/branch_switch", {})
     rows = re.findall(
         r"^\| ([\d.]+) \| ([\d.]+) \| `([\w/]+)` .* `(\w+)` \|$",
-        (ROOT / "docs/pareto.md").read_text(),
+        (ROOT / "docs/reference/pareto.md").read_text(),
         re.M,
     )
     assert [(goal, status) for _, _, goal, status in rows] == [

@@ -67,7 +67,7 @@ def test_only_programs_without_imports_from_the_repository_are_run_as_files() ->
     """Run as a file, a program finds no room of the repository: the command must be `python -m
     examples.NAME`.
     """
-    pages = [*(ROOT / "docs").glob("*.md"), ROOT / "README.md", *EXAMPLES.glob("*.py")]
+    pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", *EXAMPLES.glob("*.py")]
     named = {
         name
         for page in pages

@@ -115,16 +115,16 @@ def test_answers(server: Server) -> None:
 
 
 def test_the_page_for_newcomers_shows_what_its_script_prints(server: Server) -> None:
-    page = (ROOT / "docs" / "first_saving.md").read_text()
-    (request,) = re.findall(r"```\n(\{.*?\})\n```", page, re.DOTALL)
+    page = (ROOT / "docs" / "start" / "first_saving.md").read_text()
+    (request,) = re.findall(r"```json [^\n]+\n(\{.*?\})\n```", page, re.DOTALL)
     assert json.loads(request) == json.loads(
         (ROOT / "examples" / "optimize" / "pick_to_place.json").read_text()
     )
-    command = re.findall(r"```\npython3 (\S+) (\S+)\n```", page)
+    (command,) = re.findall(r"```bash\npython3 (\S+) (\S+) \S+\n```", page)
     run = subprocess.run(
-        ["python3", *command[0], server.url], cwd=ROOT, capture_output=True, text=True, check=True
+        ["python3", *command, server.url], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    assert f"```\n{run.stdout}```" in page
+    assert f"```text\n{run.stdout}```" in page
 
 
 def test_long_requests_hold_up_nobody(server: Server) -> None:

@@ -231,7 +231,7 @@ def test_a_wheel_that_would_have_no_studio_is_not_built(clone: Path, tmp_path: P
 
 def deployment_steps() -> str:
     """The commands of the page for one machine, as a script."""
-    page = (ROOT / "docs" / "deployment.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "deployment.md").read_text(encoding="utf-8")
     section = page.split("## On one machine")[1]
     return re.findall(r"^```\n(.*?)^```", section, re.S | re.M)[0]
 

@@ -112,7 +112,7 @@ def opened(
         ),
     )
     page.on("pageerror", lambda error: faults.append(str(error)))
-    own = (url.split("/studio")[0], "data:", "blob:")
+    own = ("/".join(url.split("/")[:3]), "data:", "blob:")
     page.on(
         "request", lambda sent: faults.append(sent.url) if not sent.url.startswith(own) else None
     )

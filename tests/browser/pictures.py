@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/studio.md: `python -m tests.browser.pictures`.
+"""Makes the pictures of docs/reference/studio.md: `python -m tests.browser.pictures`.
 
 They are of a service that it starts, with its own examples and a simulated log.
 """
@@ -15,7 +15,7 @@ from tests.browser.pages import MESHES, SHOWN, ask, go, opened, type_into, until
 from tests.browsers import SOFTWARE, chromium
 from tests.identification_logs import csv_of, recorded, truth_of
 
-DOCS = ROOT / "docs"
+DOCS = ROOT / "docs" / "images"
 SIZE = {"width": 1440, "height": 900}
 SETTLED = 1500
 """Time after which a still picture is drawn in full [ms]."""

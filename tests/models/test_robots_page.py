@@ -1,4 +1,4 @@
-"""The table of robots in docs/robots.md, against the figures."""
+"""The table of robots in docs/reference/robots.md, against the figures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from joulepath.models.registry import load_figures, load_robot, robot_names
 from joulepath.models.trust import worst_letter
 
-PAGE = Path(__file__).parents[2] / "docs" / "robots.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "robots.md"
 
 
 def columns(name: str) -> dict[str, Any]:

@@ -95,7 +95,7 @@ def test_an_unknown_tool_is_told_with_the_known_ones() -> None:
 
 
 def test_the_table_of_the_page_is_that_of_the_figures() -> None:
-    page = Path("docs/robots.md").read_text(encoding="utf-8")
+    page = Path("docs/reference/robots.md").read_text(encoding="utf-8")
     for name in tool_names():
         figures = tool_figures(name)
         mass, tcp = figures["mass"], figures["tcp"]

@@ -60,6 +60,14 @@ class MoveitOptions(Request):
     """Options of `moveit`."""
 
     encoding: Encoding | None = described(ENCODING, None, "json", default=None)
+    prefix: str = described(
+        "Prefix of all joint names, as in the robot's description in ROS.",
+        None,
+        "left_",
+        default="",
+        max_length=64,
+        pattern=r"^[A-Za-z0-9_/.-]*$",
+    )
 
 
 class Ros2Options(MoveitOptions):
@@ -79,7 +87,7 @@ class Ros2Options(MoveitOptions):
         default="joint_trajectory_controller",
         min_length=1,
         max_length=128,
-        pattern=r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*$",
+        pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$",
     )
 
 

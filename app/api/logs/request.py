@@ -31,9 +31,10 @@ class LogSettings(LogFile):
         {"mass": 2.0, "com": [0.0, 0.0, 0.06]},
         default=None,
     )
-    gravity: Vector3 = described(
-        "Acceleration of gravity in the base frame.",
+    gravity: Vector3 | None = described(
+        "Acceleration of gravity in the base frame. Null: [0, 0, -9.81], or the robot's "
+        "`kinematics.gravity`.",
         "m/s²",
         [0.0, 0.0, -9.81],
-        default=[0.0, 0.0, -9.81],
+        default=None,
     )

@@ -127,7 +127,12 @@ class OwnArm(Request):
         "C",
         default="C",
     )
-    acceleration: PositivePerJoint = described("Limits on the acceleration.", "rad/s²", 8.0)
+    acceleration: PositivePerJoint | None = described(
+        "Limits on the acceleration. Null: those of the URDF, which few have (version 1.2).",
+        "rad/s²",
+        8.0,
+        default=None,
+    )
     payload: Annotated[float, Field(ge=0, le=1e4)] = described(
         "Greatest mass of a payload.", "kg", 2.0
     )

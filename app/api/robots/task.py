@@ -71,7 +71,7 @@ def to_description(arm: OwnArm) -> Description:
     return Description(
         urdf=arm.urdf,
         tip=arm.tip,
-        acceleration=_required(arm.acceleration),
+        acceleration=_per_joint(arm.acceleration),
         payload=arm.payload,
         base=arm.base,
         title=arm.title,

@@ -26,6 +26,8 @@ CREATED = "2025-03-14T09:26:53.589793Z"
 STANDING_STILL = [0.0] * 6
 
 POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+TURNED = {"position": [-0.35, 0.4, 0.3], "rotvec": [0.0, 3.14, 0.0]}
+"""The same pose with a rotation vector, as on the teach pendant."""
 OPTIMIZE: dict[str, Any] = {"start": {"q": HOME}, "goal": {"pose": POSE}}
 """A body of POST /optimize."""
 EVALUATE: dict[str, Any] = {"configurations": [HOME, NEAR], "time_per_segment": 1.5}

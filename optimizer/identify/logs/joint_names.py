@@ -77,8 +77,8 @@ def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[
         if match is not None and k < len(first):
             named[int(match[1])] = first[k].strip().strip('"').lower()
     logged = [named[number] for number in sorted(named)]
-    wanted = [joint.lower() for joint in joints]
-    if sorted(logged) != sorted(wanted):
+    wanted = _with_prefix(logged, [joint.lower() for joint in joints])
+    if wanted is None:
         return columns
     order = [logged.index(joint) for joint in wanted]
     groups = {
@@ -87,3 +87,15 @@ def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[
         if len(indices) > 1
     }
     return replace(columns, format="named", groups={**columns.groups, **groups})
+
+
+def _with_prefix(logged: Sequence[str], joints: Sequence[str]) -> list[str] | None:
+    """The names of the joints as they are logged, with the prefix that a driver gives to all of
+    them; None for other names.
+    """
+    ends = [joint for joint in joints if logged and logged[0].endswith(joint)]
+    for prefix in ["", *(logged[0].removesuffix(joint) for joint in ends)]:
+        names = [prefix + joint for joint in joints]
+        if sorted(logged) == sorted(names):
+            return names
+    return None

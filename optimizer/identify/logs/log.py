@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import UPRIGHT, Array
 from joulepath.optimizer.evaluate.recording import Recording
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
@@ -63,7 +63,7 @@ class Log:
     payload: Payload = field(default_factory=Payload)
     payload_known: bool = True
     """Whether the payload was stated or logged."""
-    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    gravity: Array = field(default_factory=UPRIGHT.copy)
     """Gravity (3,) in the base frame [m/s²]."""
     rate: float
     """Rate of the grid [Hz]."""

@@ -18,8 +18,8 @@ class LogOptions:
 
     payload: Payload | None = None
     """Payload of the arm; None for the logged payload, or none if it was not logged."""
-    gravity: Sequence[float] | Array = (0.0, 0.0, -9.81)
-    """Gravity (3,) in the base frame [m/s²]."""
+    gravity: Sequence[float] | Array | None = None
+    """Gravity (3,) in the base frame [m/s²]; None for that of the robot."""
     columns: Mapping[str, str | Sequence[str]] | None = None
     """Names of the columns of each channel; None for a header with known names."""
     units: Literal["rad", "deg"] = "rad"

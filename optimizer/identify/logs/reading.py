@@ -73,7 +73,7 @@ def read_log(
     """Read a log of one arm from a CSV file into SI units on a uniform grid of time.
 
     Speeds and accelerations that the file does not have are derivatives of its other channels,
-    low-passed without delay. Known columns are listed in docs/identification.md.
+    low-passed without delay. Known columns are listed in docs/reference/identification.md.
 
     Args:
         source: path of the file, or its content. Either may be packed with gzip.
@@ -96,11 +96,12 @@ def read_log(
 
 
 def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading:
-    gravity = frozen(options.gravity, (3,), "gravity")
+    gravity = robot.gravity if options.gravity is None else options.gravity
+    gravity = frozen(gravity, (3,), "gravity")
     remarks: list[str] = []
     channels = read_channels(source, robot, options, remarks)
     grid, columns = channels.grid, channels.columns
-    payload, payload_known = _payload(channels, options.payload)
+    payload, payload_known = _payload(channels, options.payload, remarks)
     q = channels.take("q")
     assert q is not None
     logged = {
@@ -203,8 +204,10 @@ def _without_lag(what: str, values: Array, lag: float, time: Array, remarks: lis
     return shifted
 
 
-def _payload(channels: FileChannels, given: Payload | None) -> tuple[Payload, bool]:
-    """Payload of the arm, and whether it is known.
+def _payload(
+    channels: FileChannels, given: Payload | None, remarks: list[str]
+) -> tuple[Payload, bool]:
+    """Payload of the arm, and whether it is known; a missing centre of mass is remarked.
 
     Raises:
         InvalidProblem: the payload changes within the log, or has an impossible mass.
@@ -219,4 +222,10 @@ def _payload(channels: FileChannels, given: Payload | None) -> tuple[Payload, bo
             "payload", "The payload changes within the log: divide it there, or give `payload`."
         )
     mass, *com = logged[0].tolist()
+    if mass > 0 and not com:
+        remarks.append(
+            f"The log has the mass of the payload, {mass:.4g} kg, without its centre of mass "
+            "(payload_cog_0 to payload_cog_2), which is taken to be at the flange: log it, or give "
+            "`payload`."
+        )
     return Payload(mass, np.array(com or [0.0, 0.0, 0.0])), True

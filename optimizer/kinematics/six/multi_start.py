@@ -45,6 +45,8 @@ class MultiStartSettings:
     """
     steps: int = 45
     """Newton steps per start."""
+    fold_steps: int = 800
+    """Newton steps at a fold of high order."""
     hopeless: float = 0.5
     """Pose error above which a start is given up after a third of the steps [m, rad]."""
     solved: float = 1e-11
@@ -135,6 +137,9 @@ class MultiStart:
             )
             found = fresh
         singular = self._smallest(found)
+        if len(found) > MULTI_START.most_branches:
+            found = self._at_fold(found, T)
+            singular = self._smallest(found)
         for k in np.flatnonzero(singular < ISOLATED.singular_value):
             if lies_on_a_curve(self._chain, found[k], T):
                 raise SingularPose("goal", float(singular[k]))
@@ -154,6 +159,23 @@ class MultiStart:
         q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
         smallest = self._smallest(q)
         return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), residual[done]), smallest)])
+
+    def _at_fold(self, found: Array, T: Array) -> Array:
+        """The exact ones of more solutions (n, 6) [rad] than an arm has branches.
+
+        Around a fold of high order, many configurations hold the pose to the tolerance, and
+        Newton's method converges slowly.
+
+        Raises:
+            SingularPose: none is exact.
+        """
+        q, residual = solved(self._chain, found, T, MULTI_START.fold_steps)
+        best = np.argsort(residual)[: MULTI_START.most_branches]
+        exact = best[residual[best] < ISOLATED.probe_tolerance]
+        if not len(exact):
+            raise SingularPose("goal", float(self._smallest(q).min()))
+        q = np.clip(wrapped(q[exact]), -np.pi, np.pi)
+        return np.asarray(q[distinct(q, residual[exact], self._smallest(q))])
 
     def _smallest(self, q: Array) -> Array:
         """Smallest singular values (n,) of the Jacobian at configurations (n, 6) [rad]."""

@@ -108,8 +108,7 @@ def follow(
         OutsideLimits: the guess is outside the limits.
         DeadlineExceeded: the deadline passed before the first search.
     """
-    guess = frozen(guess, (arm.robot.nq,), "guess")
-    arm.check_inside("guess", guess)
+    guess = arm.inside("guess", frozen(guess, (arm.robot.nq,), "guess"))
     if not len(targets):
         raise InvalidProblem("points", "The path needs at least one point.")
     search = _Search(arm)

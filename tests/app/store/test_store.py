@@ -31,7 +31,8 @@ from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.exceptions.stored import StoreUnavailable, UnknownAnswer
 from joulepath.app.settings import Settings
 from joulepath.app.store import answers, database
-from joulepath.app.store.database import OtherVersion, create_database_engine, migrate
+from joulepath.app.store.database import create_database_engine, migrate
+from joulepath.app.store.faults import OtherVersion, fault_of
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import store_answers
 from joulepath.app.store.tables import Answer, Table, new_id, now
@@ -112,6 +113,7 @@ def test_a_database_of_another_version_is_refused_with_what_to_do(url: str) -> N
     with pytest.raises(OtherVersion, match=r"v0013.*move the database away") as caught:
         migrate(engine)
     assert "secret" not in str(caught.value)
+    assert fault_of(caught.value, None) == "other-version"
     engine.dispose()
 
 

@@ -126,10 +126,10 @@ def test_what_makes_no_robot_is_named(field: str, words: str, changes: dict[str,
 def test_what_is_hardly_real_is_remarked() -> None:
     small = change('<mass value="1.5"/>', '<mass value="150"/>')
     _, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, **small))
-    assert "Link 'elbow': its radius of gyration" in warnings[0]
+    assert any("Link 'elbow': its radius of gyration" in each for each in warnings)
     rounded = change('izz="0.015"', 'izz="0.0515"')
     _, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, **rounded))
-    assert "Link 'flange_arm': a principal moment is" in warnings[0]
+    assert any("Link 'flange_arm': a principal moment is" in each for each in warnings)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
-"""How accurate energies are: against a quadrature of 20,000 panels. docs/optimize.md names the
-figures.
+"""How accurate energies are: against a quadrature of 20,000 panels. docs/reference/optimize.md has
+the figures.
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ def test_a_cycle_of_the_optimiser_becomes_a_program() -> None:
 
 
 def test_the_page_shows_what_works() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "exports.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "export.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):

@@ -125,3 +125,20 @@ def test_a_very_short_motion_is_followed() -> None:
     start = spline.control_points[0]
     program = bent(start + 1e-5 * (spline.control_points - start), spline.knots * 1e-3, 5)
     check(program, yaml.safe_load(to_ros2(program).content)["trajectory"])
+
+
+def test_a_prefix_is_that_of_all_joint_names() -> None:
+    program = one_move("ur5e", 0)
+    wanted = [f"left_{name}" for name in program.robot.joint_names]
+    goal = yaml.safe_load(to_ros2(program, Ros2Options(prefix="left_")).content)
+    assert goal["trajectory"]["joint_names"] == wanted
+    assert [each["name"] for each in goal["goal_tolerance"]] == wanted
+    moveit = yaml.safe_load(to_moveit(program, MoveitOptions(prefix="left_")).content)
+    assert moveit["joint_trajectory"]["joint_names"] == wanted
+
+
+def test_a_controller_may_have_the_name_of_its_node_in_full() -> None:
+    program = one_move("ur5e", 0)
+    for name in ("/left/arm_controller", "left/arm_controller"):
+        file = to_ros2(program, Ros2Options(controller=name, encoding="json"))
+        assert json.loads(file.content)["action"] == "/left/arm_controller/follow_joint_trajectory"

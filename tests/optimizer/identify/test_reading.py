@@ -236,7 +236,9 @@ def test_payload_of_the_log_or_the_caller(recording: Recording) -> None:
     lines = [lines[0] + ",payload", *(line + ",2.5" for line in lines[1:])]
     body = "\n".join(lines).encode()
     # the arm carried nothing in truth: its efforts do not fit the mass
-    assert read_log(body, ROBOT, LogOptions(effort="current")).log.payload.mass == 2.5
+    reading = read_log(body, ROBOT, LogOptions(effort="current"))
+    assert reading.log.payload.mass == 2.5
+    assert any("2.5 kg, without its centre of mass" in each for each in reading.report.warnings)
     given = Payload(1.0, np.array([0.0, 0.0, 0.1]))
     assert read_log(body, ROBOT, LogOptions(payload=given, effort="current")).log.payload is given
     lines[-1] = lines[-1].removesuffix("2.5") + "3.5"

@@ -140,12 +140,13 @@ def test_joints_go_by_their_names_in_whatever_order_they_are(recording: Recordin
     # names in the rows, as a JointState has them
     header = ["time", *(f"{word}{k}" for word in words for k in range(6))]
     lines = table(header, recording.time, *parts).decode().splitlines()
-    names = [",".join(f"name{k}" for k in range(6)), *[",".join(joints)] * (len(lines) - 1)]
-    log = read_log(
-        "\n".join(f"{line},{name}" for line, name in zip(lines, names, strict=True)).encode(), ROBOT
-    ).log
-    np.testing.assert_allclose(log.q, straight.q, atol=1e-8)
-    np.testing.assert_allclose(log.v, straight.v, atol=1e-6)
+    for prefix in ("", "left_", "cell/ur5e_"):
+        row = ",".join(prefix + joint for joint in joints)
+        names = [",".join(f"name{k}" for k in range(6)), *[row] * (len(lines) - 1)]
+        whole = "\n".join(f"{line},{name}" for line, name in zip(lines, names, strict=True))
+        log = read_log(whole.encode(), ROBOT).log
+        np.testing.assert_allclose(log.q, straight.q, atol=1e-8)
+        np.testing.assert_allclose(log.v, straight.v, atol=1e-6)
     lost = table(
         ["time", *(f"{joint}_position" for joint in joints[1:])], recording.time, parts[0][:, 1:]
     )

@@ -53,7 +53,7 @@ def solved(robot: Robot, q: Array) -> Solved:
     return Solved(
         branches,
         max(
-            (max(np.linalg.norm(each[:3]), np.linalg.norm(each[3:])) for each in errors),
+            (float(max(np.linalg.norm(each[:3]), np.linalg.norm(each[3:]))) for each in errors),
             default=0.0,
         ),
         min((float(np.abs(wrapped(each - q)).max()) for each in members), default=np.inf),
@@ -64,7 +64,7 @@ def solved(robot: Robot, q: Array) -> Solved:
 def _member(branch: PrincipalSolution, q: Array) -> Array:
     motion = branch.self_motion
     assert motion is not None
-    return motion.at(np.array([motion.parameter(q)]))[0]
+    return np.asarray(motion.at(np.array([motion.parameter(q)]))[0])
 
 
 def inside(robot: Robot, rng: np.random.Generator) -> Array:

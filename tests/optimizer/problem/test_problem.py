@@ -12,9 +12,12 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, tcp_pose
 
 ROTATED = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([0.4, 0.1, 0.5])).homogeneous
@@ -89,7 +92,7 @@ def test_refusals_name_the_field(given: dict[str, Any], field: str) -> None:
 
 @pytest.mark.parametrize(
     ("given", "target"),
-    [({"goal": outside(2, 1e-9)}, "goal"), ({"start": -outside(5, 1e-9)}, "start")],
+    [({"goal": outside(2, 2e-4)}, "goal"), ({"start": -outside(5, 2e-4)}, "start")],
 )
 def test_joint_positions_outside_their_range_name_the_target(
     given: dict[str, Any], target: str
@@ -145,6 +148,15 @@ def test_limits_may_be_the_robots_own_and_the_ends_on_them() -> None:
     at_limit = np.where(np.arange(6) % 2 == 0, ROBOT.limits.q_max, ROBOT.limits.q_min)
     task = problem(goal=at_limit, limits=limits(v_max=ROBOT.limits.v_max * (1 + 1e-10)))
     assert (np.asarray(task.goal) == at_limit).all()
+
+
+def test_positions_at_a_printed_limit_are_at_the_limit() -> None:
+    """Limits of the robot are printed with few digits: 6.28319 for a full turn."""
+    at = outside(2, 9e-5)
+    task = problem(goal=at, start=AnyOf([at, START]))
+    assert np.asarray(task.goal)[2] == ROBOT.limits.q_max[2]
+    (found, *_), unreachable = ends(PreparedProblem.of(task), "start")
+    assert found.q[2] == ROBOT.limits.q_max[2] and not unreachable
 
 
 def test_a_mechanical_objective_wants_an_upper_bound_only() -> None:

@@ -113,7 +113,7 @@ class JointPath:
     t: Annotated[PerSample, Unit("s")]
     """Times of the samples."""
     q: Annotated[PerSampleAndJoint, Unit("rad")]
-    """Joint positions, [sample][joint]."""
+    """Joint positions, `[sample][joint]`."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,103 @@
+"""Files that were built before the service started, as answers: the studio and the pages."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import PurePosixPath
+
+from fastapi import Request
+from fastapi.responses import Response
+
+from joulepath.app.exceptions.transport import NotFound, PagesNotBuilt
+from joulepath.app.http.entity_tag import is_known
+
+INDEX = "index.html"
+_MEDIA_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".json": "application/json",
+    ".ipynb": "application/json",
+    ".csv": "text/csv; charset=utf-8",
+    ".png": "image/png",
+    ".woff2": "font/woff2",
+}
+# other files that pages link to are for reading
+_TEXT = (".conf", ".service", ".sh", ".text", ".yaml")
+_POLICY = (
+    "default-src 'none'; script-src {scripts}; style-src {styles}; font-src 'self'; "
+    "img-src 'self' data: blob:; connect-src 'self'; worker-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+"""Everything from this service, and nothing inline but what was there when the page was built."""
+STYLE = "style.digest"
+"""File of a folder with the digest of a style sheet that a script of the folder adds."""
+_INLINE = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class _File:
+    content: bytes
+    media_type: str
+    tag: str
+    policy: str | None
+    """Content-Security-Policy of a page; None for other files."""
+
+
+def answer(request: Request, folder: str, path: str) -> Response:
+    """The file at a path below `app/static/FOLDER`.
+
+    Raises:
+        PagesNotBuilt: the folder does not exist.
+        NotFound: it has no such file, or none that is for browsers.
+    """
+    found = _files(folder).get(path)
+    if found is None:
+        raise NotFound if _files(folder) else PagesNotBuilt
+    headers = {
+        "ETag": found.tag,
+        # asked for anew each time, so that no page of one version meets a script of another
+        "Cache-Control": "no-cache",
+        "X-Content-Type-Options": "nosniff",
+    }
+    if found.policy is not None:
+        headers["Content-Security-Policy"] = found.policy
+    if is_known(found.tag, request):
+        return Response(status_code=304, headers=headers)
+    return Response(found.content, media_type=found.media_type, headers=headers)
+
+
+@cache
+def _files(folder: str) -> dict[str, _File]:
+    """Every file of a folder by its path; nothing else can be asked for."""
+    root = files("joulepath") / "app" / "static" / folder
+    found, folders = {}, [(PurePosixPath(), root)] if root.is_dir() else []
+    style = root / STYLE
+    styles = f"'self' '{style.read_text(encoding='utf-8')}'" if style.is_file() else "'self'"
+    while folders:
+        path, inside = folders.pop()
+        for entry in inside.iterdir():
+            if entry.is_dir():
+                folders.append((path / entry.name, entry))
+            elif (media_type := _media_type(entry.name)) is not None:
+                found[str(path / entry.name)] = _file(entry.read_bytes(), media_type, styles)
+    return found
+
+
+def _media_type(name: str) -> str | None:
+    suffix = PurePosixPath(name).suffix
+    return "text/plain; charset=utf-8" if suffix in _TEXT else _MEDIA_TYPES.get(suffix)
+
+
+def _file(content: bytes, media_type: str, styles: str) -> _File:
+    tag = f'"{hashlib.sha256(content).hexdigest()[:32]}"'
+    if not media_type.startswith("text/html"):
+        return _File(content, media_type, tag, None)
+    digests = (base64.b64encode(hashlib.sha256(each).digest()) for each in _INLINE.findall(content))
+    scripts = " ".join(["'self'", *(f"'sha256-{each.decode()}'" for each in digests)])
+    return _File(content, media_type, tag, _POLICY.format(scripts=scripts, styles=styles))

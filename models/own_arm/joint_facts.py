@@ -1,0 +1,98 @@
+"""What the joints of a URDF say beside their axes: friction, damping, acceleration and jerk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from joulepath.models.own_arm.description import Drives
+from joulepath.models.own_arm.robot_xml import number
+from joulepath.models.own_arm.rules import RULES
+from joulepath.models.own_arm.urdf_tree import listed, name_of, soft_range
+from joulepath.models.robot import Array
+
+READ = ("link", "joint", "material")
+"""Elements of a URDF that are read; a material has no physical meaning."""
+
+
+@dataclass(frozen=True)
+class JointFacts:
+    """Figures of moving joints, shape (nq,) each; 0 where the URDF has none.
+
+    `acceleration` [rad/s²] and `jerk` [rad/s³] are limits of URDF 1.2, the lesser of `acceleration`
+    and `deceleration`. `coulomb` [N·m] and `viscous` [N·m·s/rad] are `friction` and `damping` of
+    <dynamics>. `soft` are the names of joints whose soft limits are tighter than their range, and
+    `ignored` the other elements of the URDF.
+    """
+
+    acceleration: Array
+    jerk: Array
+    coulomb: Array
+    viscous: Array
+    soft: tuple[str, ...]
+    ignored: tuple[str, ...]
+
+    @staticmethod
+    def of(root: Element, joints: tuple[str, ...]) -> JointFacts:
+        """Facts of the joints with these names. Raises InvalidArm for attributes without a
+        number.
+        """
+        by_name = {name_of(joint): joint for joint in root.findall("joint")}
+        moving = [by_name[name] for name in joints]
+        acceleration, deceleration, jerk = (
+            _column(moving, "limit", part) for part in ("acceleration", "deceleration", "jerk")
+        )
+        both = np.minimum(acceleration, deceleration)
+        return JointFacts(
+            np.where(both > 0, both, np.maximum(acceleration, deceleration)),
+            jerk,
+            _column(moving, "dynamics", "friction"),
+            _column(moving, "dynamics", "damping"),
+            tuple(name_of(joint) for joint in moving if _is_softly_limited(joint)),
+            tuple(sorted({each.tag for each in root if each.tag not in READ})),
+        )
+
+    def warnings(self, given: Drives, joints: tuple[str, ...], ruling: Array) -> list[str]:
+        """Warnings of implausible friction, and of elements without effect.
+
+        Args:
+            given: figures of the drives that replace those of the URDF.
+            joints: names of the joints.
+            ruling: torques (nq,) [N·m] from which missing friction is ruled.
+        """
+        found = list[str]()
+        for attribute, field, own, ruled in (
+            ("friction", "coulomb", self.coulomb, RULES.coulomb * ruling),
+            ("damping", "viscous", self.viscous, RULES.viscous * ruling),
+        ):
+            least, most = RULES.likely_friction
+            doubtful = (own > 0) & ((own < least * ruled) | (own > most * ruled))
+            if getattr(given, field) is None and doubtful.any():
+                names = [name for name, each in zip(joints, doubtful, strict=True) if each]
+                found.append(
+                    f"Joints whose `{attribute}` in the URDF is far from that of usual drives, as "
+                    f"a simulator's placeholder is: {listed(names)}. It is taken as written; give "
+                    f"`drives.{field}` to replace it."
+                )
+        if self.ignored:
+            found.append(f"Elements of the URDF without effect: {listed(self.ignored)}.")
+        return found
+
+
+def _is_softly_limited(joint: Element) -> bool:
+    soft, limit = soft_range(joint), joint.find("limit")
+    where = f"Joint {name_of(joint)!r} has a <limit>"
+    return soft is not None and (
+        soft[0] > number(limit, "lower", where, "0") or soft[1] < number(limit, "upper", where, "0")
+    )
+
+
+def _column(joints: list[Element], part: str, attribute: str) -> Array:
+    """An attribute (nq,) of all joints, 0 where it is missing or not above 0."""
+    values = [
+        number(joint.find(part), attribute, f"Joint {name_of(joint)!r} has a <{part}>", "0")
+        for joint in joints
+    ]
+    return np.maximum(values, 0.0)
