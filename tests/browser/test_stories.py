@@ -18,6 +18,7 @@ from playwright.sync_api import Browser, Page, expect
 from joulepath.app.api.report.bundle import attached_to
 from joulepath.app.api.report.check import checked
 from joulepath.app.api.report.numbers import digits
+from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.registry import load_robot
 from tests.app.live import Server
 from tests.browser.pages import (
@@ -162,9 +163,49 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
         page.locator("[data-format=movej]").click()
         page.get_by_label("Gripper output").select_option("0")
         expect(page.locator("#preview")).to_contain_text("set_standard_digital_out(0, True)")
-        program = page.locator("#preview").inner_text()
+        with page.expect_download() as download:
+            page.locator("#download").click()
+        program = Path(download.value.path()).read_text()
         assert program.count("movej([") == 4, "start, two stops, and back"
         assert "set_target_payload(2," in program
+
+
+def test_a_researcher_brings_an_own_arm(browser: Browser, service: Server, tmp_path: Path) -> None:
+    """From a URDF to a table of samples; targets by sliders and as the arm stands."""
+    urdf = tmp_path / "Two joints.urdf"
+    urdf.write_text(ARM["urdf"])
+    with opened(browser, f"{service.url}/studio") as page:
+        new_cell(page)
+        page.locator("#change-robot").click()
+        page.get_by_role("button", name="Add your own arm").click()
+        page.get_by_role("button", name="Add the arm").click()
+        expect(page.locator(".own-arm")).to_contain_text("Choose the URDF file.")
+        page.get_by_label("URDF file").set_input_files(urdf)
+        page.get_by_label("Largest payload, kg").fill("2")
+        page.get_by_role("button", name="Add the arm").click()
+        until(page, "() => studio.state.request.robot === 'two_joints'")
+        assert state(page, "request.start.q") == [0, 0], "two joints, within their ranges"
+        page.locator("[data-row='/start']").get_by_label("More for Start").click()
+        page.get_by_role("button", name="Joint sliders").click()
+        page.get_by_role("slider", name="elbow").fill("1")
+        page.get_by_role("button", name="Done").click()
+        assert state(page, "request.start.q") == [0, 1]
+        page.locator("[data-row='/goal']").get_by_label("More for Goal").click()
+        page.get_by_role("button", name="Joint sliders").click()
+        page.get_by_role("slider", name="shoulder").fill("0.8")
+        page.get_by_role("button", name="Done").click()
+        optimised(page)
+        goal = state(page, "answered.solution.branch.goal.q")
+        page.locator("#export").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Samples (CSV)").click()
+        rows = list(csv.reader(io.StringIO(Path(download.value.path()).read_text())))
+        assert rows[0][:3] == ["t", "q1", "q2"]
+        assert [float(each) for each in rows[-1][1:3]] == pytest.approx(goal, abs=1e-6)
+        page.get_by_role("button", name="Close").click()
+        go(page, "Library")
+        page.get_by_role("button", name="Delete two_joints").click()
+        expect(page.get_by_role("region", name="Your robots")).not_to_contain_text("two_joints")
 
 
 def test_figures_older_than_the_cell_are_marked(page: Page) -> None:

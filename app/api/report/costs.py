@@ -146,8 +146,8 @@ def advice_note(bundle: Bundle) -> str:
     """How the changes were computed."""
     word = bundle.what
     if waiting(bundle):
-        over = f"All are optimised over {digits(cycle_time(bundle))} s, and "
-        beside = f"compared with the {word} that is: each change is counted once."
+        over = f"All take {digits(cycle_time(bundle))} s. Further changes are compared with the "
+        beside = f"{word} over that time, so that no saving is counted twice."
     else:
         over, beside = "", f"Compared with this {word}, for as many {word}s a year."
     return f"Each change by itself: computed, not estimated. {over}{beside}"

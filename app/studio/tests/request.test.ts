@@ -1,8 +1,16 @@
 import { describe, expect, it } from "vitest";
-import { asKind, duplicated, moved, withObstacle, withoutRow, withStop } from "../src/store/edits";
+import {
+  asKind,
+  duplicated,
+  moved,
+  withObstacle,
+  withoutRow,
+  withRobot,
+  withStop,
+} from "../src/store/edits";
 import { at, located, put } from "../src/store/pointer";
 import { kindOf, lackOf, rowsOf, sixOf, targetAt, withNumber } from "../src/store/request";
-import type { ApiRequest, Pose } from "../src/store/types";
+import type { ApiRequest, Pose, Robot } from "../src/store/types";
 import { MOVE } from "./cells";
 
 const round = withStop(
@@ -101,4 +109,15 @@ it("errors are located at the field that a request has", () => {
 it("obstacles have names of their own", () => {
   const two = withObstacle(withObstacle(MOVE, { shape: "box" }, "box"), { shape: "box" }, "box");
   expect(two.scene?.obstacles?.map(({ name }) => name)).toEqual(["table", "box 1", "box 2"]);
+});
+
+it("another robot takes what fits it", () => {
+  const limits = { position_min: { value: [-1, -3] }, position_max: { value: [2, -1] } };
+  const robot = { name: "two", joints: ["a", "b"], limits } as unknown as Robot;
+  const asked = { robot: "ur5e", start: { q: [1, 2, 3] }, goal: MOVE.goal, figures: "own" };
+  expect(withRobot(asked, robot)).toEqual({
+    robot: "two",
+    start: { q: [0.5, -2] },
+    goal: MOVE.goal,
+  });
 });

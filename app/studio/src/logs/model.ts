@@ -160,10 +160,12 @@ export async function identify(body: Record<string, unknown>): Promise<void> {
 /** Opens an identification by its id, after its end. Throws Problem. */
 export async function openIdentification(id: string): Promise<void> {
   const path = `identifications/${encodeURIComponent(id)}`;
+  const began = performance.now();
   try {
     let found = await get<Identification>(path);
     while (["queued", "running"].includes(found.state)) {
-      busy.value = `Identification: ${found.state} …`;
+      const passed = Math.round((performance.now() - began) / 1000);
+      busy.value = `Identification: ${found.state} for ${passed} s …`;
       await new Promise((resolve) => setTimeout(resolve, PAUSE));
       found = await get<Identification>(path);
     }

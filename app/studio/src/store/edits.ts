@@ -1,7 +1,8 @@
 // Changes of a request that are more than one field: kinds, stops and their order, obstacles.
 import { at, join, put, type Pointer } from "./pointer";
-import { freshName, isObject, listOf, targetOf, type Kind, type Row } from "./request";
-import type { ApiRequest, Obstacle, Pose, Stop } from "./types";
+import { freshName, isObject, listOf, rowsOf, targetAt, targetOf } from "./request";
+import type { Kind, Row } from "./request";
+import type { ApiRequest, Obstacle, Pose, Robot, Stop } from "./types";
 
 // fields that one kind of request has and another one has not
 const OF_MOVES = ["goal", "path", "duration", "dwell", "bound"];
@@ -28,6 +29,23 @@ export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
   const rest = without(request, request.stops ? OF_ROUNDS : ["path"]);
   const move: ApiRequest = goal === undefined ? rest : { ...rest, goal };
   return kind === "path" ? { ...move, path: isObject(request.path) ? request.path : {} } : move;
+}
+
+/**
+ * The request for another robot, without the figures of one arm. Joint positions of another number
+ * of joints become the middle of the robot's own.
+ */
+export function withRobot(request: ApiRequest, robot: Robot): ApiRequest {
+  const [least, most] = ["position_min", "position_max"].map(
+    (name) => robot.limits[name]?.value as number[],
+  );
+  const q = robot.joints.map((_, k) => ((least?.[k] ?? 0) + (most?.[k] ?? 0)) / 2);
+  const own = put(put(request, "/robot", robot.name), "/figures", undefined);
+  return rowsOf(own).reduce((next, row) => {
+    const target = targetAt(own, row);
+    const fits = target.kind !== "joints" || target.q.length === q.length;
+    return fits ? next : put(next, row.pointer, { q });
+  }, own);
 }
 
 const namesOf = (stops: Stop[]) => stops.map((stop, k) => stop?.name ?? `${k + 1}`);

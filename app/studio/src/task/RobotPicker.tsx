@@ -1,10 +1,11 @@
 import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
-import { put } from "../store/pointer";
+import { withRobot } from "../store/edits";
 import { robotName } from "../store/request";
-import { robotList, type RobotSummary } from "../store/service";
-import { edit, request } from "../store/state";
+import { robotList, robotOf, type RobotSummary } from "../store/service";
+import { edit, request, typed } from "../store/state";
+import { trying } from "../store/trouble";
 import { OwnArm } from "./OwnArm";
 
 /** All robots of the service, and the way to add one's own. */
@@ -16,9 +17,11 @@ export function RobotPicker({ onClose }: { onClose: () => void }) {
   const load = () => robotList().then(setRobots, (error: Error) => setWhy(error.message));
   useEffect(() => void load(), []);
   const choose = (name: string) => {
-    // figures were identified on one arm of one type
     if (name !== robotName(request.value))
-      edit(put(put(request.value, "/robot", name), "/figures", undefined));
+      trying(async () => {
+        const robot = await robotOf(name);
+        edit(withRobot(request.value, robot), typed.value);
+      })();
     onClose();
   };
   const shown = (robots ?? []).filter(({ name, title }) =>

@@ -110,7 +110,7 @@ function Progress() {
       <progress max={1} value={share ?? undefined} aria-label="Progress" />
       <p class="hint" role="status" id="progress-text">
         {best
-          ? `Best so far ${figure(best.energy)} J, at least ${figure(best.bound)} J: ${best.bound > 0 ? `at most ${atMost(best.energy / best.bound - 1)} above the least possible` : "no bound yet"}`
+          ? `Best so far ${figure(best.energy)} J, ${best.bound > 0 ? `at least ${figure(best.bound)} J: at most ${atMost(best.energy / best.bound - 1)} above the least possible` : "no bound yet"}`
           : "Searching for a first motion"}
         {` · ${passed.toFixed(1)} s`}
         {left !== null && `, about ${figure(left, 1)} s left`}

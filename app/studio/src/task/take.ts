@@ -3,7 +3,7 @@ import { configurationOf, pictured } from "../picture/pictured";
 import { Chain, poseOfMatrix, sampleAt } from "../store/chain";
 import { withStop } from "../store/edits";
 import { put } from "../store/pointer";
-import { rowsOf, type Row } from "../store/request";
+import { rowsOf, targetAt, type Row } from "../store/request";
 import { edit, request, selected, time } from "../store/state";
 import { dressed, toolNow } from "../store/tools";
 import type { Pose } from "../store/types";
@@ -35,9 +35,13 @@ export function presentTarget(kind: "pose" | "joints"): { q: number[] } | { pose
   return pose && { pose };
 }
 
-/** The joint positions that stand for a row: its own, or one of those that reach it. */
+/**
+ * The joint positions that stand for a row: its own, or one of those that reach it; for an empty
+ * one, those of the arm.
+ */
 export const jointsOf = (row: Row): number[] | null =>
-  configurationOf(row, pictured.value?.start ?? null);
+  configurationOf(row, pictured.value?.start ?? null) ??
+  (targetAt(request.value, row).kind === "empty" ? presentJoints() : null);
 
 /**
  * Puts the pose of the arm in the picture into the target that is chosen; without one, into a new
