@@ -16,6 +16,7 @@ from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import listed, name_of
 from joulepath.models.robot import Array
+from joulepath.models.shape_sizes import SIZES
 from joulepath.models.uploads.limits import Checkpoint
 
 SHAPES = ("collision", "visual")
@@ -165,6 +166,8 @@ def _filled(
         if element.tag == "capsule":
             body.apply_translation(-body.bounds.mean(axis=0))
     else:
+        return None
+    if not np.ptp(body.vertices, axis=0).min() > SIZES.smallest:
         return None
     found = body.mass_properties
     inertia = pin.Inertia(float(found.volume), np.array(found.center_mass), found.inertia)

@@ -103,6 +103,10 @@ class LinkShapes:
             what = f"{where} a <{kind}>"
             if kind == "mesh":
                 return self._around_mesh(element, what)
+            if kind == "box" and not numbers(element, "size", what).any():
+                # a placeholder: the link has other shapes, or the capsule from joint to joint
+                self.unknown.append("box of no size")
+                return None
             if kind == "box":
                 sides = _lengths(element, "size", what, 3) / 2
                 longest = int(np.argmax(sides))

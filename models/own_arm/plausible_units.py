@@ -89,7 +89,7 @@ def _check_possible(body: LinkBody) -> None:
         raise InvalidArm(
             "urdf",
             f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>, or "
-            "give `masses`, or `density` to estimate it from its shape.",
+            "give `masses`, or `density` to estimate it from its shape and its mesh files.",
         )
     lever = float(np.linalg.norm(inertia.lever))
     if (

@@ -69,6 +69,8 @@ def test_masses_of_links_replace_those_of_the_urdf() -> None:
     assert lower.lever == pytest.approx(before.lever)
     of_both = bodies(replace(BARE, masses={"upper_arm": 4.0, "forearm": 1.0}))
     assert [each.mass for each in of_both] == pytest.approx([4.0, 1.0])
+    flat = replace(BARE, urdf=WITHOUT.replace("0.1 0.06 0.2", "0 0 0"), density=1000.0)
+    refused("urdf", "'forearm', with what is fixed to it, has no mass", flat)
     refused("masses", "No moving link has the name 'hand'", replace(PLAIN, masses={"hand": 1.0}))
     no_shape = re.sub(r"<visual>.*?</visual>", "", WITHOUT, flags=re.S)
     refused(
