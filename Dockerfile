@@ -1,8 +1,18 @@
 ARG BASE_IMAGE=debian:bookworm-slim
 
-# Installs the locked dependencies, leaves behind what only builds need, compiles the C library and the kernels.
-FROM ${BASE_IMAGE} AS build
+# Builds the wheel as it is released: with the C library, the studio page and the pages of the documentation.
+FROM ${BASE_IMAGE} AS wheel
 # A package index other than PyPI: --build-arg PIP_INDEX_URL=…
+ARG PIP_INDEX_URL
+RUN apt-get update \
+    && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
+        ca-certificates gcc libc6-dev python3-venv
+COPY . /tmp/joulepath
+RUN python3 -m venv /tmp/pip \
+    && /tmp/pip/bin/pip wheel --no-cache-dir --disable-pip-version-check --no-deps --wheel-dir /tmp /tmp/joulepath
+
+# Installs the locked dependencies and the wheel, leaves behind what only builds need, and compiles the kernels.
+FROM ${BASE_IMAGE} AS build
 ARG PIP_INDEX_URL
 RUN apt-get update \
     && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
@@ -15,29 +25,14 @@ COPY ${LOCK} scripts/slim.py /tmp/
 RUN python3 -m venv venv \
     && pip install --no-cache-dir --no-compile --disable-pip-version-check --require-hashes --no-deps \
         -r /tmp/${LOCK} \
-    && pip uninstall --yes --quiet pip setuptools \
     && python /tmp/slim.py venv
-# The studio page, by a Node that stays in this step.
-COPY requirements-node.lock scripts/build_studio.py /tmp/studio/scripts/
-COPY app/studio /tmp/studio/joulepath/app/studio
-COPY examples/optimize/bin_to_shelf.json /tmp/studio/examples/optimize/
-RUN mv /tmp/studio/scripts/requirements-node.lock /tmp/studio/ \
-    && python3 -m venv /tmp/node && PATH=/tmp/node/bin:$PATH \
-    && python /tmp/studio/scripts/build_studio.py \
-    && rm -rf /tmp/node /tmp/studio/joulepath/app/studio
-COPY LICENSE ./
-COPY joulepath joulepath
-COPY models models
-COPY optimizer optimizer
-COPY app app
-RUN rm -rf app/studio app/static/studio
-COPY examples app/static/examples
-RUN mv /tmp/studio/joulepath/app/static/studio app/static/
-ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
+COPY --from=wheel /tmp/*.whl /tmp/
 # Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
 COPY scripts/import_all.py /tmp/
+ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 RUN mkdir /opt/matplotlib \
-    && python optimizer/native/build.py \
+    && pip install --no-compile --disable-pip-version-check --no-deps --no-index /tmp/*.whl \
+    && pip uninstall --yes --quiet pip setuptools \
     && python /tmp/import_all.py \
     && python -m joulepath.optimizer.dynamics.precompile --portable
 

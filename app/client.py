@@ -175,14 +175,7 @@ class Client:
 
     def jobs(self) -> Iterator[Json]:
         """All jobs, newest first: `GET /jobs`."""
-        after: Any = None
-        while True:
-            query = {} if after is None else {"after": after}
-            page = self._json("GET", "/jobs", params=query)
-            yield from page["jobs"]
-            after = page["next"]
-            if after is None:
-                return
+        return self._listed("jobs")
 
     def job(self, id: str) -> Json:
         """A job and its first requests: `GET /jobs/{id}`."""
@@ -231,9 +224,53 @@ class Client:
         """Delete a job with its answers: `DELETE /jobs/{id}`."""
         self._send("DELETE", f"/jobs/{id}")
 
+    def begin_study(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Begin a study, such as `name="Lift", threshold=28`: `POST /studies`."""
+        return self._post("/studies", request, fields)
+
+    def studies(self) -> Iterator[Json]:
+        """All studies, newest first: `GET /studies`."""
+        return self._listed("studies")
+
+    def study(self, id: str) -> Json:
+        """A study and its history: `GET /studies/{id}`."""
+        return self.get(f"/studies/{id}")
+
+    def study_table(self, id: str) -> str:
+        """The history of a study as CSV: `GET /studies/{id}`."""
+        text: str = self._send("GET", f"/studies/{id}", headers={"Accept": "text/csv"}).text
+        return text
+
+    def add_iteration(self, id: str, step: Mapping[str, Any]) -> Json:
+        """Compute the next iteration of a study: `POST /studies/{id}/iterations`.
+
+        Args:
+            id: id of the study.
+            step: one field, `optimize` or `evaluate`, with a body of that endpoint.
+        """
+        return self._post(f"/studies/{id}/iterations", step, {})
+
+    def suggestions(self, id: str) -> Json:
+        """Changes of a study's best motion that need less energy: `GET /studies/{id}/suggest`."""
+        return self.get(f"/studies/{id}/suggest")
+
+    def delete_study(self, id: str) -> None:
+        """Delete a study with its iterations: `DELETE /studies/{id}`."""
+        self._send("DELETE", f"/studies/{id}")
+
     def get(self, path: str, **query: Any) -> Json:
         """The JSON at any path of the service, such as that in the field `answer`."""
         return self._json("GET", path, params=query)
+
+    def _listed(self, name: str) -> Iterator[Json]:
+        """The entries of all pages of a list."""
+        after: Any = None
+        while True:
+            page = self._json("GET", f"/{name}", params={} if after is None else {"after": after})
+            yield from page[name]
+            after = page["next"]
+            if after is None:
+                return
 
     def _post(self, path: str, request: Mapping[str, Any] | None, fields: Json) -> Json:
         return self._json("POST", path, json={**(request or {}), **fields})

@@ -1,7 +1,7 @@
-"""All benchmarks in one run of about twenty minutes on two cores; writes benchmarks/RESULTS.md with
-a plot.
+"""All benchmarks in one run of about twenty minutes on two cores; prints a report.
 
     make bench                                all sections
+    make bench BENCH_ARGS=--write             the same, and writes benchmarks/RESULTS.md with a plot
     make bench BENCH_ARGS="--fraction 0.1"    a tenth of the tasks, to test the benchmarks
     make bench BENCH_ARGS="--only quality"    some sections; the others keep their last results
     make bench BENCH_ARGS=--list              what there is, also apart from the sections
@@ -105,7 +105,7 @@ def stored(name: str) -> dict[str, Any] | None:
 
 
 def main() -> int:
-    """Runs the sections and writes the report."""
+    """Runs the sections and prints the report."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -116,7 +116,7 @@ def main() -> int:
         "--only", nargs="+", choices=SECTIONS, default=list(SECTIONS), help="sections (all)"
     )
     parser.add_argument(
-        "--output", type=Path, default=report.RESULTS, help="file for the report (%(default)s)"
+        "--write", action="store_true", help="write the report with its plot into benchmarks/"
     )
     parser.add_argument(
         "--foreign", type=Path, help="file of planning problems of others; without it, none are run"
@@ -139,10 +139,12 @@ def main() -> int:
         else foreign(given.foreign.resolve(), given.fraction)
     )
     took = time.perf_counter() - began
-    report.write(given.output, machine, results, took, whole=len(given.only) == len(SECTIONS))
+    path = report.RESULTS if given.write else FOLDER / report.RESULTS.name
+    report.write(path, machine, results, took, whole=len(given.only) == len(SECTIONS))
     broken = [name for name in given.only if results[name] is None]
+    print(path.read_text(encoding="utf-8"))
     print(
-        f"{given.output} written after {took:.0f} s"
+        f"{path} written after {took:.0f} s"
         + (f"; without results: {', '.join(broken)}" if broken else "")
     )
     return 1 if broken else 0

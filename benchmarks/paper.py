@@ -1,8 +1,7 @@
-"""Comparison of the founding paper's three tables with this model; written into
-docs/explained/paper.md between its markers.
+"""Comparison of the founding paper's three tables with this model.
 
-    python -m benchmarks.paper            # writes the page
-    python -m benchmarks.paper --print    # prints what it would write
+    python -m benchmarks.paper            # prints the tables
+    python -m benchmarks.paper --write    # and writes them into docs/explained/paper.md
 
 `tests/reference/README.md` names the paper. Its joint convention is not Universal Robots'; see
 `to_ur`.
@@ -10,7 +9,7 @@ docs/explained/paper.md between its markers.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -32,7 +31,7 @@ from joulepath.optimizer.problem.arm import Arm
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "explained" / "paper.md"
-BEGIN, END = "<!-- made by python -m benchmarks.paper -->", "<!-- end of what it made -->"
+BEGIN, END = "<!-- made by python -m benchmarks.paper --write -->", "<!-- end of what it made -->"
 REFERENCE = ROOT / "tests" / "reference"
 
 SECONDS = 1.5
@@ -325,8 +324,18 @@ def page(text: str, tables: str) -> str:
     return f"{head}{BEGIN}\n{tables}\n{END}{tail}"
 
 
+def main() -> None:
+    """Prints the tables, and writes them into the page if asked to."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--write", action="store_true", help="write them into the page, too")
+    write = parser.parse_args().write
+    tables = made()
+    print(tables)
+    if write:
+        PAGE.write_text(page(PAGE.read_text(), tables))
+
+
 if __name__ == "__main__":
-    if "--print" in sys.argv[1:]:
-        print(made())
-    else:
-        PAGE.write_text(page(PAGE.read_text(), made()))
+    main()

@@ -15,6 +15,7 @@ from joulepath.optimizer.deadline import Clock, Deadline, DeadlineShares
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.presentation.chart import Chart
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.progress import (
@@ -148,6 +149,7 @@ def compare(
     methods: Sequence[MethodName] = tuple(METHODS),
     clock: Clock = time.perf_counter,
     tell: Tell = no_listener,
+    progress: bool = True,
 ) -> Comparison:
     """Solve one problem by several methods, one after another.
 
@@ -158,6 +160,8 @@ def compare(
         methods: distinct names of methods.
         clock: function that returns the time [s].
         tell: receives the progress, with the methods as candidates and the best motion so far.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         The outcome of every method, in the order of `methods`.
@@ -171,15 +175,17 @@ def compare(
             "methods", f"methods must name some of {', '.join(METHODS)}, each once."
         )
     shares = DeadlineShares(Deadline.after(problem.deadline, clock), len(methods))
-    tell, found = only_news(tell), dict[MethodName, Compared]()
-    tell(CandidatesFound(len(methods)))
-    for k, method in enumerate(each for each in METHODS if each in methods):
-        share = shares.next()
-        if shares.used_up:
-            found[method] = Compared(method, None, DeadlineExceeded([]))
-            continue
-        found[method] = _solved(replace(problem, method=method, deadline=share), clock)
-        _tell_outcome(tell, k, found[method], problem.objective)
+    found = dict[MethodName, Compared]()
+    with progress_bar("Comparing methods", tell, progress) as tell:
+        tell = only_news(tell)
+        tell(CandidatesFound(len(methods)))
+        for k, method in enumerate(each for each in METHODS if each in methods):
+            share = shares.next()
+            if shares.used_up:
+                found[method] = Compared(method, None, DeadlineExceeded([]))
+                continue
+            found[method] = _solved(replace(problem, method=method, deadline=share), clock)
+            _tell_outcome(tell, k, found[method], problem.objective)
     first = found[methods[0]]
     if all(each.solution is None for each in found.values()):
         assert first.error is not None
@@ -189,7 +195,7 @@ def compare(
 
 def _solved(problem: Problem, clock: Clock) -> Compared:
     try:
-        return Compared(problem.method, optimize(problem, clock), None)
+        return Compared(problem.method, optimize(problem, clock, progress=False), None)
     except JoulepathError as error:
         return Compared(problem.method, None, error)
 

@@ -8,6 +8,7 @@ from joulepath.models.registry import load_robot
 from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.dynamics.kernel import kernel_for
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import Tell, no_listener, only_news
@@ -17,7 +18,10 @@ from joulepath.optimizer.solve.methods import METHODS
 
 
 def optimize(
-    problem: Problem, clock: Clock = time.perf_counter, tell: Tell = no_listener
+    problem: Problem,
+    clock: Clock = time.perf_counter,
+    tell: Tell = no_listener,
+    progress: bool = True,
 ) -> Solution:
     """Find the motion of least energy between a problem's targets, certified against every limit.
 
@@ -25,6 +29,8 @@ def optimize(
         problem: arm, targets, and what is asked of the motion. Its `deadline` bounds the wall time.
         clock: function that returns the time [s].
         tell: gets the progress while the search runs: candidates, and the best motion so far.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         The motion with its energy, a proven lower bound on the energy of any motion, and its
@@ -43,7 +49,7 @@ def optimize(
         DeadlineExceeded: the deadline passed before any motion was certified.
         InvalidProblem: the payload is beyond the robot's rating, or an end outside the tool's cone.
     """
-    with one_thread():
+    with one_thread(), progress_bar("Optimising", tell, progress) as tell:
         return Run(problem, clock=clock, tell=only_news(tell)).solution()
 
 
@@ -55,6 +61,7 @@ def warm_up(robot_name: str) -> None:
     for method, solver in METHODS.items():
         # a method that takes seconds would delay the first requests
         if solver.most_solved is None:
-            optimize(
-                Problem(arm=Arm(robot=robot), start=middle + 0.1, goal=middle + 0.4, method=method)
+            problem = Problem(
+                arm=Arm(robot=robot), start=middle + 0.1, goal=middle + 0.4, method=method
             )
+            optimize(problem, progress=False)

@@ -107,6 +107,6 @@ def _solved_by(executor: Executor, problems: Iterable[Problem]) -> Iterator[Opti
 
 def _solved(index: int, problem: Problem) -> Optimized:
     try:
-        return Optimized(index, optimize(problem), None)
+        return Optimized(index, optimize(problem, progress=False), None)
     except JoulepathError as error:
         return Optimized(index, None, error)

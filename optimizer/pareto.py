@@ -27,6 +27,7 @@ from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import (
     CandidatesFound,
@@ -68,7 +69,11 @@ PARETO = ParetoSettings()
 
 
 def pareto(
-    problem: Problem, points: int = 12, clock: Clock = time.perf_counter, tell: Tell = no_listener
+    problem: Problem,
+    points: int = 12,
+    clock: Clock = time.perf_counter,
+    tell: Tell = no_listener,
+    progress: bool = True,
 ) -> Front:
     """Find the front of energy over duration, from the fastest motion to the motion of least
     energy.
@@ -78,8 +83,8 @@ def pareto(
             `duration_max`. Its `deadline` holds for the whole front.
         points: largest number of motions, 2 to 100.
         clock: function that returns the time [s].
-        tell: receives the progress, with the durations as candidates and the motion of least
-            energy.
+        tell: receives the progress: durations as candidates, and the motion of least energy.
+        progress: whether a bar may show the progress, as of `optimize`.
 
     Returns:
         The motions of the front, fastest first.
@@ -94,7 +99,7 @@ def pareto(
         raise InvalidProblem(
             "duration", "A front runs over durations: leave duration out or give a range."
         )
-    with one_thread():
+    with one_thread(), progress_bar("Finding the front", tell, progress) as tell:
         return _Search(problem, points, clock, only_news(tell)).front()
 
 
@@ -126,9 +131,8 @@ class _Search:
             else self.keep(found)
         )
         if (answer := self.least.answer) is not None:
-            self.tell(
-                Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q)
-            )
+            best = Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q)
+            self.tell(best)
         while (
             len(self.nodes) < self.n
             and self.left() > 0
@@ -334,16 +338,13 @@ class _Search:
                 points.append(node.answer)
                 least = node.energy
         if not points:
-            raise DeadlineExceeded(
-                [candidate.report() for candidate in self.fastest_run.state.candidates]
-            )
+            reports = [each.report() for each in self.fastest_run.state.candidates]
+            raise DeadlineExceeded(reports)
+        solves = self.solves + self.fastest_run.state.solves
         return Front(
             status="optimal" if complete else "feasible",
             shortest=shortest,
             points=points,
             dropped=[each for each in dropped if math.isfinite(each.duration)],
-            solver=FrontSolver(
-                wall_time=self.clock() - self.began,
-                nlp_solves=self.solves + self.fastest_run.state.solves,
-            ),
+            solver=FrontSolver(wall_time=self.clock() - self.began, nlp_solves=solves),
         )

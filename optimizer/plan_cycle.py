@@ -43,6 +43,7 @@ from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from joulepath.optimizer.feasible_answer import least_certified
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.progress import Improved, Tell, no_listener, only_improved, only_news
 
@@ -60,7 +61,10 @@ PLAN_CYCLE = PlanCycleSettings()
 
 
 def plan_cycle(
-    cycle: Cycle, clock: Clock = time.perf_counter, tell: Tell = no_listener
+    cycle: Cycle,
+    clock: Clock = time.perf_counter,
+    tell: Tell = no_listener,
+    progress: bool = True,
 ) -> CycleSolution:
     """Find the cycle of least energy, every move of it certified against every limit.
 
@@ -72,6 +76,8 @@ def plan_cycle(
         cycle: stops and settings of the cycle. Its `deadline` bounds the wall time.
         clock: function that returns the time [s].
         tell: gets the progress: moves as candidates, and the best cycle so far.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         The moves in order, their energy, a lower bound, and other ways to go round.
@@ -84,7 +90,7 @@ def plan_cycle(
         DeadlineExceeded: the deadline passed before any cycle was certified.
         JoulepathError: a stop or a move fails for another reason of `optimize`; it names the stop.
     """
-    with one_thread():
+    with one_thread(), progress_bar("Planning the cycle", tell, progress) as tell:
         began, tell = clock(), only_news(tell)
         cycle = _divided(cycle, clock)
         found = with_free_orientations(cycle, lambda other: _valued(other, clock, tell), clock)

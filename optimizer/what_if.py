@@ -96,7 +96,8 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
     failure: JoulepathError | None = None
     try:
         time_left = deadline.left - WHAT_IF.kept_share * problem.deadline
-        found = optimize(replace(problem, deadline=max(time_left, WHAT_IF.least_time)), clock)
+        left = replace(problem, deadline=max(time_left, WHAT_IF.least_time))
+        found = optimize(left, clock, progress=False)
     except JoulepathError as error:
         failure = error
     same, objective = energy.of(problem.objective), problem.objective

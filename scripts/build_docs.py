@@ -35,6 +35,12 @@ DIGEST = "sources.txt"  # beside the site: the digest of what it was built from
 STYLE = "style.digest"  # beside the site: what its Content-Security-Policy allows
 CONTRIBUTING = ROOT / "CONTRIBUTING.md"
 """A page of the site that has its place elsewhere."""
+LICENCES = """
+from importlib.metadata import files
+wanted = ("licenses/LICENSE.md", ".icons/lucide/LICENSE")
+print(*(each.read_text() for each in files("zensical") if str(each).endswith(wanted)), sep="\\n\\n")
+"""
+"""Program that prints the licences of the theme and of its icons, which the site carries."""
 FILES = Path("files")
 """Folder of the site for files of the repository that pages link to."""
 _LINK = re.compile(r"(\]\()([^)\s#]+)([^)\s]*\))")
@@ -70,7 +76,6 @@ def build(site: Path = SITE) -> None:
         done = subprocess.run(
             command,
             cwd=stage,
-            env=os.environ | {"PYTHONPATH": ""},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             encoding="utf-8",
@@ -81,6 +86,8 @@ def build(site: Path = SITE) -> None:
             raise BuildFailed(f"The pages cannot be built: {_plain(done.stdout)}")
         for unused in ("404.html", "sitemap.xml", "objects.inv"):
             (new / unused).unlink(missing_ok=True)
+        licences = subprocess.check_output([python, "-c", LICENCES], encoding="utf-8")
+        (new / "licences.txt").write_text(licences, encoding="utf-8")
         (new / STYLE).write_text(_style_of_search(new), encoding="utf-8")
         (new / DIGEST).write_text(digest(), encoding="utf-8")
         shutil.rmtree(site, ignore_errors=True)
@@ -105,10 +112,15 @@ def has_tools() -> bool:
 def digest() -> str:
     """The digest of everything that the site is built from. Raises OSError."""
     found = hashlib.sha256()
-    for path in sorted({*_pages(), *_linked(), *_documented(), CONFIG, LOCK}):
+    for path in sorted(sources()):
         found.update(f"{path.relative_to(ROOT)}\0".encode())
         found.update(path.read_bytes())
     return found.hexdigest()
+
+
+def sources() -> set[Path]:
+    """Every file that the site is built from. Raises OSError."""
+    return {*_pages(), *_linked(), *_documented(), CONFIG, LOCK}
 
 
 def _stage(folder: Path) -> None:

@@ -18,9 +18,11 @@ ONLY_INSIDE = ("joulepath.app.store.migrations.env",)
 
 
 def main() -> None:
-    """Runs the command, in the folder of the package."""
+    """Runs the command, for the package of the working folder or else of the environment."""
     sys.path.insert(0, str(Path.cwd()))
-    for module in pkgutil.walk_packages(["joulepath"], "joulepath."):
+    import joulepath
+
+    for module in pkgutil.walk_packages(joulepath.__path__, "joulepath."):
         if not module.name.endswith("__main__") and module.name not in ONLY_INSIDE:
             importlib.import_module(module.name)
     for name in LATE:

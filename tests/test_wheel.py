@@ -132,7 +132,13 @@ def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
     assert LIBRARY.is_file()
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
+        licences = {
+            folder: archive.read(f"joulepath/app/static/{folder}/licences.txt").decode()
+            for folder in ("studio", "help")
+        }
     assert held == present
+    assert "three\n" in licences["studio"] and "uplot\n" in licences["studio"]
+    assert "Zensical" in licences["help"] and "ISC License" in licences["help"]
     assert "joulepath/py.typed" in held
     assert "joulepath/models/ur5e/figures.yaml" in held
     assert any(name.startswith("joulepath/app/store/migrations/versions/v0001") for name in held)

@@ -7,9 +7,10 @@ from importlib.resources import files
 
 from fastapi import APIRouter, Request
 from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
-from fastapi.responses import HTMLResponse, Response
+from fastapi.responses import HTMLResponse, JSONResponse, Response
 
 from joulepath.app.exceptions.transport import NotFound
+from joulepath.app.http.openapi_pages import short_document
 
 router = APIRouter(include_in_schema=False)
 
@@ -33,8 +34,6 @@ _HEADERS = {
 _SWAGGER = {
     # without this it fetches a badge from validator.swagger.io
     "validatorUrl": None,
-    # 300 schemas below the operations: each operation has its own, and `/help` lists all fields
-    "defaultModelsExpandDepth": -1,
     # colouring an answer of a megabyte takes seconds
     "syntaxHighlight": False,
     "displayRequestDuration": True,
@@ -47,7 +46,7 @@ async def swagger(request: Request) -> HTMLResponse:
     """Swagger UI."""
     root = request.scope.get("root_path", "")
     page = get_swagger_ui_html(
-        openapi_url=f"{root}/openapi.json",
+        openapi_url=f"{root}/docs/openapi.json",
         title=request.app.title,
         swagger_js_url=f"{root}/docs/swagger-ui-bundle.js",
         swagger_css_url=f"{root}/docs/swagger-ui.css",
@@ -71,6 +70,12 @@ async def redoc(request: Request) -> HTMLResponse:
     )
     page.headers.update(_HEADERS)
     return page
+
+
+@router.get("/docs/openapi.json")
+def document(request: Request) -> JSONResponse:
+    """The short document, which Swagger UI opens at once; the complete one takes it seconds."""
+    return JSONResponse(short_document(request.app.openapi()))
 
 
 @router.get("/docs/{name}")

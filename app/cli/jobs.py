@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 import orjson
 
-from joulepath.app.cli.answer import FILE, OUTPUT, Refused, content_of, refused, write
+from joulepath.app.cli.answer import FILE, OUTPUT, write
 from joulepath.app.cli.exit_codes import PROBLEM
+from joulepath.app.cli.service import SERVICE, answered, connect, json_of
 from joulepath.app.cli.table import table
 
 if TYPE_CHECKING:
@@ -32,29 +32,16 @@ Examples:
   joulepath jobs send examples/jobs/moves.json --wait
   joulepath jobs results 9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60 --format csv --output table.csv""",
 )
-@click.option(
-    "--url",
-    envvar="JOULEPATH_URL",
-    default="http://127.0.0.1:8000",
-    help="Address of the service. Default: JOULEPATH_URL, or http://127.0.0.1:8000.",
-)
-@click.option(
-    "--key", envvar="JOULEPATH_API_KEY", help="API key of the service. Default: JOULEPATH_API_KEY."
-)
+@SERVICE
 @click.pass_context
 def jobs(context: click.Context, url: str, key: str | None) -> None:
     """Lists the jobs of a service; sends, shows and ends them.
 
     These commands need a service that runs, and the extra `client` of the package.
     """
-    from joulepath.app.client import Client
-
-    try:
-        context.obj = context.with_resource(Client(url, key))
-    except ModuleNotFoundError as error:
-        raise click.UsageError(str(error)) from None
+    connect(context, url, key)
     if context.invoked_subcommand is None:
-        with _answered():
+        with answered():
             rows = [_row(job) for job in context.obj.jobs()]
         write(table([HEAD, *rows]).encode(), None)
 
@@ -72,13 +59,10 @@ def send(client: Client, file: str, wait: bool) -> int:
 
     With `--wait`, the exit code is 1 if a request failed.
     """
-    try:
-        body = orjson.loads(content_of(file))
-    except orjson.JSONDecodeError:
-        body = None
-    if not isinstance(body, dict) or "requests" not in body:
+    body = json_of(file)
+    if "requests" not in body:
         raise click.UsageError("FILE must hold the JSON of POST /jobs: an object with `requests`.")
-    with _answered():
+    with answered():
         job = client.send_job(**body)
     write(job["id"].encode(), None)
     return _waited(client, job["id"]) if wait else 0
@@ -106,7 +90,7 @@ Example:
 @click.pass_obj
 def show(client: Client, id: str, output: Path | None) -> None:
     """Writes the job ID and its first requests as JSON."""
-    with _answered():
+    with answered():
         job = client.job(id)
     write(orjson.dumps(job), output)
 
@@ -129,7 +113,7 @@ Example:
 @click.pass_obj
 def results(client: Client, id: str, output: Path | None, wanted: Literal["jsonl", "csv"]) -> None:
     """Writes what the requests of the job ID have come to."""
-    with _answered():
+    with answered():
         content = (
             client.job_table(id).encode()
             if wanted == "csv"
@@ -144,7 +128,7 @@ def _changing(name: str, words: str) -> Callable[[Client, str], None]:
     @_ID
     @click.pass_obj
     def change(client: Client, id: str) -> None:
-        with _answered():
+        with answered():
             job: dict[str, Any] = getattr(client, f"{name}_job")(id)
         write(table([HEAD, _row(job)]).encode(), None)
 
@@ -168,7 +152,7 @@ Example:
 @click.pass_obj
 def delete(client: Client, id: str) -> None:
     """Deletes the job ID with its answers."""
-    with _answered():
+    with answered():
         client.delete_job(id)
 
 
@@ -176,7 +160,7 @@ def _waited(client: Client, id: str) -> int:
     """The exit code of a job that has ended; its progress on a terminal."""
     from joulepath.app.cli.terminal import fraction
 
-    with _answered(), fraction("Waiting for the job") as tell:
+    with answered(), fraction("Waiting for the job") as tell:
         job = client.wait_for_job(id, PERIOD, lambda job: tell(job["progress"]))
     click.echo(table([HEAD, _row(job)]), err=True)
     return PROBLEM if job["counts"]["failed"] else 0
@@ -192,18 +176,3 @@ def _row(job: dict[str, Any]) -> tuple[str, ...]:
         *(str(counts[state]) for state in ("done", "failed", "waiting")),
         job["created"],
     )
-
-
-@contextmanager
-def _answered() -> Iterator[None]:
-    """Raises Refused for the problem that the service answers with, or if none answers."""
-    from joulepath.app.client import ServiceUnreachable
-    from joulepath.optimizer.exceptions import DeclaredError
-
-    try:
-        yield
-    except ServiceUnreachable as error:
-        problem = {"type": "about:blank", "title": "Service unreachable", "detail": str(error)}
-        raise Refused(orjson.dumps(problem), PROBLEM) from None
-    except DeclaredError as error:
-        raise refused(error) from None

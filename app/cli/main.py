@@ -26,6 +26,7 @@ from joulepath.app.cli.replay import replay
 from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
 from joulepath.app.cli.serve import serve
+from joulepath.app.cli.studies import studies
 from joulepath.app.cli.tools import tools
 from joulepath.app.cli.whatif import whatif
 
@@ -73,6 +74,7 @@ for command in (
     excitation,
     identify,
     jobs,
+    studies,
     report,
     check,
     robots,

@@ -126,7 +126,7 @@ def report(
         log = read_log_file(fields, Path(file), request_id)
         task = Equipped(task, (partial(log_given, log),))
     with terminal.progress("Writing the report"):
-        result = result_of(task, request.deadline, request_id)
+        result = result_of(task, request.with_advice, request_id)
     write(result.document, output)
 
 

@@ -71,7 +71,12 @@ def search(
     timed: _Timed = request
     with terminal.progress("Loading the compiled kernel of the robot"):
         compile_kernel_of(robot_in(request))
-    with terminal.progress(f"Optimising for at most {timed.deadline:g} s"):
+    # imported late: `joulepath --help` needs none of them
+    from joulepath.app.engine.listening import listening
+    from joulepath.optimizer.presentation.progress_bar import progress_bar
+
+    title = f"Optimising for at most {timed.deadline:g} s"
+    with progress_bar(title, delay=0.0) as tell, listening(tell):
         result = result_of(task(request, request_id), timed.deadline, request_id)
     if result.kept_as is not None:
         result = result.not_kept()

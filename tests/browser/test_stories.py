@@ -246,6 +246,37 @@ def test_each_mistake_leads_to_a_sentence_at_its_field(
     page.locator("#undo").click()
 
 
+def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) -> None:
+    """A sentence at the button; what was typed is answered when the service is there again."""
+    url = f"{service.url}/studio"
+    with opened(browser, url, tolerated="status of (4|504)|ERR_INTERNET_DISCONNECTED") as page:
+        until(page, SHOWN)
+        page.context.set_offline(True)
+        type_into(page, "/payload/mass", "1.6")
+        page.locator("#optimise").click()
+        expect(page.locator("#problem")).to_contain_text("Your work is saved here")
+        expect(page.locator("#run-state")).to_contain_text("The service does not answer")
+        expect(page.locator("#saved")).to_have_text("Saved in this browser")
+        page.context.set_offline(False)
+        optimised(page)
+        assert state(page, "answered.asked.payload.mass") == 1.6
+        expect(page.locator("#problem")).to_have_count(0)
+
+
+def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
+    """What was typed stays, with a sentence, and the request keeps the last number."""
+    fill_json(page, FIRST)
+    show_json(page, False)
+    cell = page.locator("[data-pointer='/payload/mass']")
+    type_into(page, "/payload/mass", "two")
+    expect(cell).to_have_value("two")
+    expect(cell).to_have_attribute("aria-invalid", "true")
+    assert state(page, "request.payload.mass") == FIRST["payload"]["mass"]
+    type_into(page, "/payload/mass", "-1")
+    page.locator("#optimise").click()
+    expect(page.locator("#form")).to_contain_text("greater than or equal to 0")
+
+
 def test_an_engineer_takes_a_table_of_moves_overnight(
     browser: Browser, service: Server, tmp_path: Path
 ) -> None:
@@ -345,6 +376,13 @@ def test_an_engineer_compares_a_log_with_what_was_predicted(
         measured = float(whole.nth(2).inner_text().replace(",", ""))
         page_of_log = report(page, "html")
         assert "<h1>monday.csv</h1>" in page_of_log.decode()
+        expect(page.locator("#logs")).not_to_contain_text("This log is of")
+        go(page, "Cell")
+        page.locator("#change-robot").click()
+        page.get_by_label("Search robots").fill("ur10e")
+        page.get_by_role("button", name="Universal Robots UR10e").click()
+        go(page, "Logs")
+        expect(page.locator("#logs")).to_contain_text("This log is of a ur5e")
         drawn = attached_to(page_of_log).answer["total"]["measured"]["electrical"]
         assert measured == pytest.approx(drawn, rel=0.01)
         assert checked(page_of_log, True, "test").agrees

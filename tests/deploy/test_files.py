@@ -8,6 +8,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ import yaml
 
 from joulepath.app.cli.cluster_worker import cluster_worker
 from joulepath.app.settings import Settings
+from scripts.build_docs import sources
 from tests.app.live import ROOT
 
 DEPLOY = ROOT / "deploy"
@@ -131,31 +134,26 @@ def test_compose_keeps_the_cluster_apart(compose: dict[str, Any]) -> None:
 
 
 def test_the_image_is_made_of_what_its_context_has(compose: dict[str, Any]) -> None:
-    """What `.dockerignore` leaves out cannot be copied."""
-    sent = {
+    """What `.dockerignore` leaves out can neither be copied, nor be in the wheel or on a page."""
+    sent = [
         line[1:]
         for line in (ROOT / ".dockerignore").read_text().splitlines()
         if line.startswith("!")
-    }
+    ]
     lines = re.findall(r"^COPY (?!--from)(.*) \S+$", (ROOT / "Dockerfile").read_text(), re.M)
+    copied = {name for line in lines for name in line.split()} - {".", "${LOCK}"}
     locks = {
-        "requirements.lock",
-        *(
-            each["build"]["args"]["LOCK"]
-            for each in compose["services"].values()
-            if "build" in each
-        ),
+        each["build"]["args"]["LOCK"] for each in compose["services"].values() if "build" in each
     }
-    sources = {
-        lock if name == "${LOCK}" else name
-        for line in lines
-        for name in line.split()
-        for lock in locks
-    }
-    assert len(sources) > 8
-    for name in sources:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    built = {"pyproject.toml", project["project"]["readme"], *project["project"]["license-files"]}
+    built |= set(project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"])
+    built |= {name.readlink().name for name in (ROOT / "joulepath").iterdir() if name.is_symlink()}
+    pages = {str(path.relative_to(ROOT)) for path in sources() if path.is_relative_to(ROOT)}
+    assert len(pages) > 60
+    for name in copied | locks | built | pages | {"joulepath"}:
         assert (ROOT / name).exists(), name
-        assert any(name == each or name.startswith(f"{each}/") for each in sent), (
+        assert any(fnmatch(name, each) or name.startswith(f"{each}/") for each in sent), (
             f"{name} is left out of the context"
         )
 

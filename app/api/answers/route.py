@@ -27,7 +27,7 @@ from joulepath.app.schemas.examples.values import ANSWER_ID
 from joulepath.app.store import answers
 from joulepath.app.store.tables import Answer
 
-router = APIRouter(prefix="/answers", tags=["answers"])
+router = APIRouter(prefix="/answers", tags=["results"])
 
 AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_ID])]
 

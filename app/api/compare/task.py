@@ -131,7 +131,7 @@ class CompareTask:
         Raises the error of the first method if none finds a motion.
         """
         problem = to_problem(self.request.by(self.request.methods[0]), deadline)
-        found = compare(problem, self.request.methods, tell=listener())
+        found = compare(problem, self.request.methods, tell=listener(), progress=False)
         answer = CompareAnswer(
             request=self.request_id,
             robot=self.request.robot,

@@ -84,7 +84,7 @@ class CycleTask:
         """The answer of `POST /cycle`, within about `deadline` seconds."""
         motions = to_known_motions(self.motions)
         with knowing(motions):
-            found = plan_cycle(to_cycle(self.request, deadline), tell=listener())
+            found = plan_cycle(to_cycle(self.request, deadline), tell=listener(), progress=False)
         return replace(self._result(found), motions=to_kept(motions))
 
     def _result(self, found: CycleSolution) -> TaskResult:

@@ -21,7 +21,7 @@ from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.export import FORMATS
 from joulepath.optimizer.export.formats import FormatName
 
-router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
+router = APIRouter(tags=["results"], route_class=LargeBodyRoute)
 
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9._-]")
 _FORMAT = Path(

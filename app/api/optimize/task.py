@@ -81,7 +81,9 @@ class OptimizeTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
-        solution = certified(optimize(to_problem(self.request, deadline), tell=listener()))
+        solution = certified(
+            optimize(to_problem(self.request, deadline), tell=listener(), progress=False)
+        )
         answer = OptimizeAnswer.of(
             self.request, self.request_id, solution, arm_fields(self.request)
         )

@@ -141,7 +141,7 @@ class ParetoTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /pareto`, within about `deadline` seconds."""
         asked, collector = self.request, AnswerCollector()
-        front = pareto(to_problem(asked, deadline), asked.points, tell=listener())
+        front = pareto(to_problem(asked, deadline), asked.points, tell=listener(), progress=False)
         arm = arm_fields(asked)
         points = list[ParetoPoint]()
         for motion in front.points:

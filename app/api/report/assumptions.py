@@ -13,6 +13,7 @@ from joulepath.models.trust import figures_by_letter, worst_letter
 
 Json = dict[str, Any]
 YOURS = "Y"
+ASSUMED = "E"
 NOT_COUNTED = "–"
 _LETTERS = {
     "A": "the maker's files",
@@ -48,6 +49,7 @@ def assumptions(
     robot: Robot,
     masses: Sequence[float],
     payload_from: str = "yours",
+    period: float | None = None,
 ) -> tuple[Assumption, ...]:
     """Figures of the robot by letter, of the tool, given numbers, and missing numbers.
 
@@ -57,8 +59,9 @@ def assumptions(
         robot: the robot.
         masses: what the flange carries in the motions [kg].
         payload_from: who says so.
+        period: time from one start to the next [s]; None: one directly after the other.
     """
-    priced = () if costs is None else _of_costs(costs)
+    priced = () if costs is None else _of_costs(costs, period)
     return (*_of_robot(request, robot), *_of_request(request, masses, payload_from), *priced)
 
 
@@ -85,9 +88,10 @@ def _of_request(request: Json, masses: Sequence[float], payload_from: str) -> It
     yield Assumption(YOURS, words, payload_from)
 
 
-def _of_costs(costs: Json) -> Iterator[Assumption]:
+def _of_costs(costs: Json, period: float | None) -> Iterator[Assumption]:
     if costs.get("cycles_per_shift") is None:
-        yield Assumption(YOURS, "One directly after the other, for 8 h a shift", "assumed")
+        often = "Back to back" if period is None else f"One every {period:g} s"
+        yield Assumption(ASSUMED, f"{often}, for 8 h a shift", "assumed")
     for name, words in _SOURCES.items():
         given = costs.get(name)
         if given is not None:

@@ -149,7 +149,7 @@ def advice_note(bundle: Bundle) -> str:
         over = f"All are optimised over {digits(cycle_time(bundle))} s, and "
         beside = f"compared with the {word} that is: each change is counted once."
     else:
-        over, beside = "", f"compared with this {word}, for as many {word}s a year."
+        over, beside = "", f"Compared with this {word}, for as many {word}s a year."
     return f"Each change by itself: computed, not estimated. {over}{beside}"
 
 

@@ -14,7 +14,7 @@ from joulepath.app.api.report.programs import program_of_motion
 from joulepath.app.api.report.report import Report, Rival, Table
 from joulepath.app.api.report.rivals import (
     EQUAL,
-    left_to_gain,
+    above_least,
     limits_used,
     nearest_rival,
     parts_of,
@@ -96,7 +96,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     )
     left = [row for row in bundle.moves if row["answer"] is None]
     others = f" {len(left):,} of {len(bundle.moves):,} moves have no answer." if left else ""
-    least = left_to_gain("No way to make them", total, answer["energy"]["lower_bound"])
+    least = above_least("No way to make them", total, answer["energy"]["lower_bound"])
     return first + claim, least + others
 
 

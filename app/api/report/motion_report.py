@@ -21,7 +21,7 @@ from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
 from joulepath.app.api.report.report import Report, Rival
 from joulepath.app.api.report.rivals import (
     EQUAL,
-    left_to_gain,
+    above_least,
     limits_used,
     nearest_rival,
     parts_of,
@@ -61,7 +61,13 @@ def motion_report(bundle: Bundle, program: Program) -> Report:
         proven_title="Proven",
         proven=unbroken(_proven(answer)),
         check=bundle.how_to_check(answer.get("id")),
-        assumptions=assumptions(bundle.request, bundle.costs, program.robot, masses),
+        assumptions=assumptions(
+            bundle.request,
+            bundle.costs,
+            program.robot,
+            masses,
+            period=bundle.period if waiting(bundle) else None,
+        ),
         assumptions_note=unbroken(interval_note(answer["energy"]["electrical"].get("interval"))),
         changes=advice_table(bundle, money),
         changes_note=unbroken(advice_note(bundle)),
@@ -89,7 +95,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     waits = length > answer["duration"] and objective == "electrical"
     wait = f", with the wait until {digits(length)} s" if waits else ""
     if held := waiting(bundle):
-        wait = f" and, with the wait until {digits(length)} s, *{digits(total + held)} J*"
+        wait = f" and, with the wait until {digits(length)} s, *{digits(total + held)} J a cycle*"
     first = (
         f"One {word}{stops} needs *{digits(total)} J{kind}* in {digits(answer['duration'])} s{wait}"
     )
@@ -102,11 +108,18 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     elif best["saving"] < EQUAL:
         claim = f", as much as the nearest usual way that keeps every limit, {_words(best)}."
     else:
+        less = percent(_of_all(best["saving"], total, held))
         claim = (
-            f": *{percent(best['saving'])} less* than the nearest usual way that keeps every "
-            f"limit, {_words(best)}.{_yearly(bundle, best['saving'])}"
+            f": *{less} less* than the nearest usual way that keeps every limit, {_words(best)}."
+            f"{_yearly(bundle, best['saving'])}"
         )
-    return first + claim, left_to_gain(f"No {word} of any kind", total, bound)
+    return first + claim, above_least(f"No {word} of any kind", total, bound)
+
+
+def _of_all(saving: float, total: float, held: float) -> float:
+    """The saving of a motion of `total` [J] as a share of motion and wait, `held` [J] for both."""
+    saved_joules = total * saving / (1 - saving)
+    return saved_joules / (total + held + saved_joules)
 
 
 def _yearly(bundle: Bundle, saving: float) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from joulepath.app.api.advice.request import AnsweredRequest
+from joulepath.app.api.advice.request import AdviceName, AnsweredRequest
 from joulepath.app.schemas.common import NO_CONTROLS, Request, described
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import JOB_ID, LOG_ID
@@ -140,6 +140,12 @@ class ReportRequest(AnsweredRequest):
         body = self.task or self.evaluate
         given = None if body is None else body.deadline
         return JOB_DEADLINE if given is None else given
+
+    @property
+    def with_advice(self) -> float:
+        """Wall time of the request with that of all changes [s]."""
+        changes = len(get_args(AdviceName)) if self.advice and self.task is not None else 0
+        return (1 + changes) * self.deadline
 
     @model_validator(mode="after")
     def _one_of_all(self) -> Self:

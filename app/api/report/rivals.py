@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from joulepath.app.api.report.numbers import digits, down, percent, up
+from joulepath.app.api.report.numbers import digits, down, percent
 from joulepath.app.api.report.report import Part
 
 _PARTS = {
@@ -66,13 +66,13 @@ def saved(saving: float) -> str:
     return f"saves {percent(saving)}" if saving >= 0 else f"needs {percent(-saving)} less"
 
 
-def left_to_gain(subject: str, total: float, bound: float) -> str:
+def above_least(subject: str, total: float, bound: float) -> str:
     """What a proven lower bound says, in a sentence."""
     if bound <= 0:
         return "How little could be needed at least is not known here."
     return (
-        f"{subject} needs less than {down(bound)} J: at most {up(total - bound)} J, "
-        f"{percent(max(total - bound, 0.0) / total, 'up')} of it, are left to gain."
+        f"{subject} needs less than {down(bound)} J, so this is at most "
+        f"{percent(max(total / bound - 1, 0.0), 'up')} above the least possible."
     )
 
 

@@ -17,7 +17,7 @@ from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.optimizer.evaluate.errors import NotCertified
 
-router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
+router = APIRouter(tags=["results"], route_class=LargeBodyRoute)
 
 _FILE: dict[int | str, dict[str, Any]] = {
     200: {

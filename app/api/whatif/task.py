@@ -196,7 +196,7 @@ class _Optimized(_Work):
         first = _located(lambda: to_problem(asked, share), "optimize")
         # all of them before the first run, so that an invalid change is rejected at once
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
-        best = certified(_located(lambda: optimize(first), "optimize"))
+        best = certified(_located(lambda: optimize(first, progress=False), "optimize"))
         base = WhatifBase.of(best, self._kept(asked, best), best.status, holds=True)
         rows = [self._row(asked, k, best, problem) for k, problem in enumerate(problems)]
         return self.result_of(asked.robot, asked.objective, base, rows)

@@ -1,4 +1,5 @@
 import { expect, it } from "vitest";
+import { ofCycle } from "../src/answer/Baselines";
 import { waits, wordsOf, type Change } from "../src/answer/advice";
 import type { Answered } from "../src/store/state";
 import type { ApiRequest } from "../src/store/types";
@@ -17,6 +18,13 @@ it("every change says its joules", () => {
   expect(wordsOf({ ...change, name: "brakes", share: 0.0533 })).toMatch(
     /stands: 607 J, 5.3 % less/,
   );
+});
+
+it("a saving is one of the cycle where the motion waits", () => {
+  expect(ofCycle(0.07, 74.4, 0)).toBeCloseTo(0.07);
+  // 80 J against 74.4 J, and 209 J of waiting for both
+  expect(ofCycle(0.07, 74.4, 209)).toBeCloseTo(5.6 / 289, 3);
+  expect(ofCycle(-0.1, 110, 90)).toBeCloseTo(-10 / 190);
 });
 
 it("a motion waits that is shorter than its cycle and has no time of its own", () => {

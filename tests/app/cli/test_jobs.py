@@ -6,32 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
-from starlette.testclient import TestClient
 
-import joulepath.app.client
-from joulepath.app.client import Client
 from tests.app.cli.console import Here
 from tests.app.job_clients import evaluation, optimization
-from tests.app.live import LOCAL
 
 UNKNOWN = "9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60"
-
-
-@pytest.fixture
-def service(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The commands reach the service in this process."""
-
-    class Here(Client):
-        def __init__(self, url: str, key: str | None = None) -> None:
-            assert url == LOCAL
-            super().__init__(url, key, http=client)
-
-        def close(self) -> None:
-            """Leaves the shared client open."""
-
-    monkeypatch.setattr(joulepath.app.client, "Client", Here)
-    monkeypatch.setattr("joulepath.app.cli.jobs.PERIOD", 0.05)
-    monkeypatch.setenv("JOULEPATH_URL", LOCAL)
 
 
 def sent(here: Here, *requests: object, waits: bool = True) -> tuple[int, str]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from itertools import groupby
 from typing import Any
 
 import jsonschema_rs
@@ -154,3 +156,56 @@ def test_every_deadline_is_the_services() -> None:
 
 def test_version_is_the_projects(document: dict[str, Any]) -> None:
     assert document["info"]["version"] == __version__
+
+
+@pytest.fixture(scope="module")
+def short(client: TestClient) -> dict[str, Any]:
+    """The document that the page `/docs` opens."""
+    content: dict[str, Any] = client.get("/docs/openapi.json").json()
+    return content
+
+
+def test_tags_are_in_the_order_of_the_work(short: dict[str, Any]) -> None:
+    tags = [tag["name"] for tag in short["tags"]]
+    used = [own["tags"] for each in short["paths"].values() for own in each.values()]
+    assert tags[:3] == ["robots", "motion", "results"]
+    assert [tag for tag, _ in groupby(tag for (tag,) in used)] == tags
+
+
+def test_every_operation_has_its_page(client: TestClient, document: dict[str, Any]) -> None:
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            assert len(operation["summary"]) <= 60
+            page = client.get(f"/{operation['externalDocs']['url']}")
+            assert page.status_code == 200 and "<h1" in page.text
+
+
+def test_the_short_document_has_every_operation_and_field(
+    document: dict[str, Any], short: dict[str, Any]
+) -> None:
+    assert short["openapi"].startswith("3.0")
+    assert len(json.dumps(short)) < 0.6 * len(json.dumps(document))
+    for path, operations in document["paths"].items():
+        assert short["paths"][path].keys() == operations.keys()
+        for method, own in operations.items():
+            content = own.get("requestBody", {}).get("content", {})
+            for media_type, body in content.items():
+                shown = short["paths"][path][method]["requestBody"]["content"][media_type]
+                name = body["schema"].get("$ref", "").rpartition("/")[2]
+                fields = document["components"]["schemas"].get(name, {}).get("properties", {})
+                assert fields.keys() == shown["schema"].get("properties", {}).keys()
+                assert len(shown.get("examples", ())) == min(len(body.get("examples", ())), 2)
+
+
+def test_the_short_document_has_no_words_of_later_versions(short: dict[str, Any]) -> None:
+    found, open_ = set[str](), [short["paths"]]
+    while open_:
+        part = open_.pop()
+        if isinstance(part, dict):
+            part = {key: own for key, own in part.items() if key not in ("example", "value")}
+            found |= part.keys()
+            assert not isinstance(part.get("type"), list) and part.get("type") != "null"
+            limits = (part.get("exclusiveMinimum"), part.get("exclusiveMaximum"))
+            assert all(limit in (None, True) for limit in limits), part
+        open_ += part.values() if isinstance(part, dict) else part if isinstance(part, list) else []
+    assert found.isdisjoint({"$ref", "$defs", "const", "prefixItems", "propertyNames"})

@@ -117,7 +117,7 @@ def test_changes_that_need_less_are_computed_and_checked(client: TestClient) -> 
     assert bundle.advised is not None
     total = bundle.answer["energy"]["electrical"]["total"] + bundle.advised["waiting"]
     assert bundle.advised["waiting"] > 0
-    assert f"with the wait until 6.00\u00a0s, <b>{digits(total)}\u00a0J</b>" in text
+    assert f"with the wait until 6.00\u00a0s, <b>{digits(total)}\u00a0J a cycle</b>" in text
     changes = bundle.advised["advice"]
     assert [each["name"] for each in changes] == ["whole_cycle", "brakes"]
     assert text.count("CHF a year</td>") == len(changes)

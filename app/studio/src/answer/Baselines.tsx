@@ -5,6 +5,7 @@ import { answered, stale, type Answered } from "../store/state";
 import type { Baseline } from "../store/types";
 import { figure, percent } from "../store/units";
 import { baselineName, energyOf, nounOf } from "../store/facts";
+import { advised } from "./advice";
 
 const FEW = 1; // of those that break a limit, which are shown at once
 
@@ -38,7 +39,7 @@ export function Baselines() {
             <td />
             <th scope="col">time</th>
             <th scope="col">J a {nounOf(shown)}</th>
-            <th scope="col">saves</th>
+            <th scope="col">{advised.value?.waiting ? "saves of a cycle" : "saves"}</th>
           </tr>
         </thead>
         <tbody>
@@ -87,8 +88,17 @@ function Own({ shown }: { shown: Answered }) {
   );
 }
 
-function Saving({ of: { saving, saving_interval: interval } }: { of: Baseline }) {
-  if (saving === null) return <>–</>;
+/** A saving as a share of the cycle: where one waits, both wait from then on. */
+export function ofCycle(saving: number, total: number, waiting: number): number {
+  const saved = (total * saving) / (1 - saving);
+  return saved / (total + waiting + saved);
+}
+
+function Saving({ of: { saving: own, saving_interval: known } }: { of: Baseline }) {
+  if (own === null) return <>–</>;
+  const waiting = advised.value?.waiting ?? 0;
+  const saving = ofCycle(own, energyOf(answered.value!), waiting);
+  const interval = waiting ? null : known;
   const likely = interval
     ? `likely ${percent(interval.p5)} to ${percent(interval.p95)}`
     : undefined;

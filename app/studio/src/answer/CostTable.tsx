@@ -1,7 +1,7 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Section } from "../ui/Section";
-import { costsOf, type Economics, type Sourced } from "../store/economics";
+import { costsOf, DEFAULT_ECONOMICS, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
 import { figure, fixed, parseNumber } from "../store/units";
 import { adviceFailed, advised, waits } from "./advice";
@@ -167,12 +167,20 @@ function Assumptions() {
         sourceOf(given.carbon),
         (value) => value !== null && set({ carbon: yours(value) }),
       )}
-      {row("Shift", "h", given.shift, "", (value) => value !== null && set({ shift: value }))}
+      {row(
+        "Shift",
+        "h",
+        given.shift,
+        given.shift === DEFAULT_ECONOMICS.shift ? "assumed" : "yours",
+        (value) => value !== null && set({ shift: value }),
+      )}
       {row(
         "Shifts a year",
         "shifts",
         given.shiftsPerYear,
-        "two on 230 days",
+        given.shiftsPerYear === DEFAULT_ECONOMICS.shiftsPerYear
+          ? "assumed: two on 230 days"
+          : "yours",
         (value) => value !== null && set({ shiftsPerYear: value }),
       )}
       {row(

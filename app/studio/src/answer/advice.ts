@@ -7,7 +7,7 @@ import type { ApiRequest } from "../store/types";
 import { figure, percent } from "../store/units";
 
 const PAUSE = 400; // after the last change of the cycle time [ms]
-const MOST = 20; // time that a round may have taken for its changes to be computed unasked [s]
+const MOST = 30; // time that a round may have taken for its changes to be computed unasked [s]
 
 /** A changed task, as `POST /advice` answers. Energies in J. */
 export interface Change {

@@ -54,6 +54,10 @@ function Studies() {
       (error) => tell(error),
     );
   }, []);
+  const drop = async (id: string) => {
+    await remove(`studies/${id}`);
+    setAll((before) => before.filter((each) => each.id !== id));
+  };
   const open = async ({ id, name }: Study) =>
     setOpened({ name, rows: (await get<{ history: Iteration[] }>(`studies/${id}`)).history });
   const title = ({ number, kind, energy }: Iteration) =>
@@ -92,6 +96,12 @@ function Studies() {
                   {study.iterations} iterations · {when(study.created)}
                 </small>
               </button>
+              <Button
+                kind="quiet"
+                icon="trash"
+                label={`Delete ${study.name}`}
+                onClick={trying(() => drop(study.id))}
+              />
             </li>
           ))}
         </ul>

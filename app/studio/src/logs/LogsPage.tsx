@@ -41,6 +41,11 @@ export function LogsPage() {
     if (openedLog.value?.id === id) openedLog.value = null;
     await loadLogs();
   };
+  const forget = async (id: string) => {
+    await remove(`jobs/${id}`);
+    if (openedIdentification.value?.found.id === id) openedIdentification.value = null;
+    await loadLogs();
+  };
   return (
     <main class="page with-list" id="logs">
       <aside class="side" aria-label="Logs">
@@ -127,6 +132,12 @@ export function LogsPage() {
                   {each.state} · {when(each.created)}
                 </small>
               </button>
+              <Button
+                kind="quiet"
+                icon="trash"
+                label={`Delete the identification of ${when(each.created)}`}
+                onClick={trying(() => forget(each.id))}
+              />
             </li>
           ))}
         </ul>

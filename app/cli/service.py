@@ -1,0 +1,62 @@
+"""Common parts of the commands that need a service: its address, its problems, bodies for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+import orjson
+
+from joulepath.app.cli.answer import Refused, content_of, refused
+from joulepath.app.cli.exit_codes import PROBLEM
+
+_URL = click.option(
+    "--url",
+    envvar="JOULEPATH_URL",
+    default="http://127.0.0.1:8000",
+    help="Address of the service. Default: JOULEPATH_URL, or http://127.0.0.1:8000.",
+)
+_KEY = click.option(
+    "--key", envvar="JOULEPATH_API_KEY", help="API key of the service. Default: JOULEPATH_API_KEY."
+)
+
+
+def SERVICE(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of a group of commands: address and key of the service."""
+    return _URL(_KEY(command))
+
+
+def connect(context: click.Context, url: str, key: str | None) -> None:
+    """Gives the commands of a group a client of the service, until they end."""
+    from joulepath.app.client import Client
+
+    try:
+        context.obj = context.with_resource(Client(url, key))
+    except ModuleNotFoundError as error:
+        raise click.UsageError(str(error)) from None
+
+
+@contextmanager
+def answered() -> Iterator[None]:
+    """Raises Refused for the problem that the service answers with, or if none answers."""
+    from joulepath.app.client import ServiceUnreachable
+    from joulepath.optimizer.exceptions import DeclaredError
+
+    try:
+        yield
+    except ServiceUnreachable as error:
+        problem = {"type": "about:blank", "title": "Service unreachable", "detail": str(error)}
+        raise Refused(orjson.dumps(problem), PROBLEM) from None
+    except DeclaredError as error:
+        raise refused(error) from None
+
+
+def json_of(file: str) -> dict[str, Any]:
+    """The object in a file, or in standard input for `-`; empty if there is none."""
+    try:
+        body = orjson.loads(content_of(file))
+    except orjson.JSONDecodeError:
+        return {}
+    return body if isinstance(body, dict) else {}

@@ -1,0 +1,135 @@
+"""The studio page in Chromium: first picture, size, frames per second, findings of axe. The exit
+code is 1 if the first picture is too late, the page too large, or axe has a serious finding.
+
+    python -m benchmarks.studio --count 10
+
+Each visit has an empty cache, and the service and the browser are warm. The first picture is there
+when the arm has been drawn; the first answer, when the energy of the example is. Without a graphics
+card, WebGL is drawn by the processor (SwiftShader), and no frame rate is required.
+"""
+
+from __future__ import annotations
+
+import gzip
+import sys
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser, Page
+
+from benchmarks.command import parser, write_json
+from benchmarks.machine import described
+from benchmarks.service import ROOT
+from benchmarks.statistics import Spread
+from tests.app.live import serving
+from tests.browser.pages import MESHES, SHOWN, findings, go, opened, until
+from tests.browsers import SOFTWARE, chromium
+
+PICTURE = 1.2
+"""Latest first picture [s]."""
+SIZE = 1.2e6
+"""Largest size of the page, compressed, without meshes [byte]."""
+PLAYED = 5.0
+"""Time over which frames are counted [s]."""
+BUILT = ROOT / "app" / "static" / "studio"
+LOOKS = (("light", 1440), ("dark", 1440), ("light", 390))
+TIMES = """(() => {
+    const seen = (window.seen = {});
+    const look = () => {
+        const now = window.studio;
+        if (now?.view?.arms.length && now.view.frames) seen.picture ??= performance.now();
+        if (now?.state.answered) seen.answer ??= performance.now();
+        if (!seen.picture || !seen.answer) requestAnimationFrame(look);
+    };
+    look();
+})()"""
+"""Notes the instants of the first picture and the first answer [ms]."""
+FRAMES = """(time) => new Promise((resolve) => {
+    const first = studio.view.frames;
+    document.querySelector("#play").click();
+    setTimeout(() => resolve((studio.view.frames - first) / time), 1000 * time);
+})"""
+RENDERER = """() => {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    const told = gl?.getExtension("WEBGL_debug_renderer_info");
+    return told ? gl.getParameter(told.UNMASKED_RENDERER_WEBGL) : "none";
+}"""
+
+
+def visits(browser: Browser, url: str, count: int) -> dict[str, Spread]:
+    """Instants of the first picture and the first answer of visits [s]."""
+    found: dict[str, list[float]] = {"picture": [], "answer": []}
+    for _ in range(count):
+        context = browser.new_context(viewport={"width": 1440, "height": 900})
+        context.add_init_script(TIMES)
+        page = context.new_page()
+        page.goto(url)
+        until(page, "() => Boolean(window.seen?.picture && seen.answer)")
+        for name, value in page.evaluate("() => seen").items():
+            found[name].append(value / 1000)
+        context.close()
+    return {name: Spread.of(values) for name, values in found.items()}
+
+
+def frames(page: Page) -> float:
+    """Frames per second while the motion is played."""
+    until(page, SHOWN)
+    until(page, MESHES)
+    return float(page.evaluate(FRAMES, PLAYED))
+
+
+def compressed(folder: Path) -> int:
+    """Size of the built page [byte], each file compressed by gzip unless it is a font."""
+    files = [each for each in folder.iterdir() if each.suffix != ".txt"]
+    return sum(
+        each.stat().st_size if each.suffix == ".woff2" else len(gzip.compress(each.read_bytes()))
+        for each in files
+    )
+
+
+def serious(browser: Browser, url: str) -> list[str]:
+    """Serious findings of axe on all pages, in light and dark and on a phone."""
+    found = list[str]()
+    for scheme, width in LOOKS:
+        size = {"width": width, "height": 900}
+        with opened(browser, url, color_scheme=scheme, viewport=size) as page:
+            until(page, SHOWN)
+            for name in ("Cell", "Jobs", "Logs", "Library"):
+                go(page, name)
+                page.wait_for_timeout(300)
+                found += [f"{scheme}, {width} px, {name}: {each}" for each in findings(page)]
+    return found
+
+
+def main() -> None:
+    """Measure, print and judge."""
+    options = parser(__doc__)
+    options.add_argument("--count", type=int, default=10, help="visits (%(default)s)")
+    args = options.parse_args()
+    with serving(workers=1) as service, chromium(*SOFTWARE) as browser:
+        url = f"{service.url}/studio"
+        visits(browser, url, 1)
+        times = visits(browser, url, args.count)
+        with opened(browser, url, viewport={"width": 1440, "height": 900}) as page:
+            renderer, rate = page.evaluate(RENDERER), frames(page)
+        findings_of_axe = serious(browser, url)
+    size = compressed(BUILT)
+    results: dict[str, Any] = {
+        "machine": described(),
+        **{name: vars(spread) for name, spread in times.items()},
+        "size": size,
+        "renderer": renderer,
+        "frames": rate,
+        "serious": findings_of_axe,
+    }
+    for name, spread in times.items():
+        print(f"first {name}: median {spread.p50:.2f} s, worst {spread.maximum:.2f} s")
+    print(f"size, compressed, without meshes: {size / 1e6:.3f} MB")
+    print(f"{rate:.1f} frames a second, drawn by {renderer}")
+    print(f"axe: {len(findings_of_axe)} serious findings", *findings_of_axe, sep="\n  ")
+    write_json(args.json, results)
+    sys.exit(times["picture"].p50 > PICTURE or size > SIZE or bool(findings_of_axe))
+
+
+if __name__ == "__main__":
+    main()
