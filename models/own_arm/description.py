@@ -137,6 +137,9 @@ class Description:
     [rad] or [m] of fixed joints; "others" holds all joints that are not between base and tip, at
     zero or the limit nearest to it. `source` is the origin of the URDF, `trust` its trust letter.
     `srdf` is the text of an SRDF with disabled collision checks. `meshes` has mesh files by path.
+    `masses` [kg] by link replace those of the URDF, and one number is the mass of all moving links;
+    links without a mass are estimated by `density` [kg/m³] (default: aluminium), with either field.
+    `mend_inertias` replaces impossible inertias by the nearest possible ones.
     """
 
     urdf: str
@@ -158,3 +161,6 @@ class Description:
     srdf: str | None = None
     meshes: Mapping[str, bytes] | None = None
     default_motion: Motion | None = None
+    masses: Mapping[str, float] | float | None = None
+    density: float | None = None
+    mend_inertias: bool = False

@@ -95,8 +95,8 @@ def own_figures(
 
 
 def _chain_warnings(chain: Chain) -> list[str]:
-    """Warnings of a tilted base and of rounded angles."""
-    warnings, gravity = list[str](), _gravity(chain)
+    """Warnings of estimated masses, of a tilted base and of rounded angles."""
+    warnings, gravity = chain.estimate.warnings(), _gravity(chain)
     if gravity is not None:
         warnings.append(
             "The base is tilted against the root link of the URDF, which is taken to be upright: "
@@ -181,16 +181,28 @@ def _inertials(
     of_all = "Of the moving links, with what is fixed to them."
     in_link = "In the link frame: z along the joint."
     about = "ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, in the link frame."
+    of_volume = bool(chain.estimate.links)
     return {
-        "mass": stated(description, [body.mass for body in bodies], "kg", of_all),
-        "center_of_mass": stated(
-            description, [body.lever.tolist() for body in bodies], "m", in_link
+        "mass": _of(description, of_volume, [body.mass for body in bodies], "kg", of_all),
+        "center_of_mass": _of(
+            description, of_volume, [body.lever.tolist() for body in bodies], "m", in_link
         ),
         "inertia_frame_rpy": stated(
             description, [[0.0] * 3] * chain.nq, "rad", "Axes of the link frame."
         ),
-        "inertia": stated(description, tensors, "kg·m²", about),
+        "inertia": _of(
+            description, of_volume or bool(chain.estimate.mended), tensors, "kg·m²", about
+        ),
     }
+
+
+def _of(
+    description: Description, is_estimated: bool, value: Any, unit: str, note: str
+) -> dict[str, Any]:
+    """A figure of the URDF, or one that is estimated in part."""
+    if is_estimated:
+        return assumed(value, unit, f"{note} Estimated in part: see the warnings.")
+    return stated(description, value, unit, note)
 
 
 _ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))

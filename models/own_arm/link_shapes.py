@@ -17,9 +17,9 @@ import pinocchio as pin
 from joulepath.models.own_arm.capsule_around import capsule_around
 from joulepath.models.own_arm.description import PLAUSIBLE, CapsuleRow, Description, InvalidArm
 from joulepath.models.own_arm.mesh_files import corners
-from joulepath.models.own_arm.robot_xml import numbers
+from joulepath.models.own_arm.robot_xml import ZERO, numbers
 from joulepath.models.own_arm.upright import UprightChain
-from joulepath.models.own_arm.urdf_chain import ORIGIN, Chain
+from joulepath.models.own_arm.urdf_chain import Chain
 from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
 from joulepath.models.uploads.limits import LIMITS, Checkpoint
@@ -103,6 +103,10 @@ class LinkShapes:
             what = f"{where} a <{kind}>"
             if kind == "mesh":
                 return self._around_mesh(element, what)
+            if kind == "box" and not numbers(element, "size", what).any():
+                # a placeholder: the link has other shapes, or the capsule from joint to joint
+                self.unknown.append("box of no size")
+                return None
             if kind == "box":
                 sides = _lengths(element, "size", what, 3) / 2
                 longest = int(np.argmax(sides))
@@ -190,5 +194,5 @@ def _placed(T: pin.SE3, around: Around) -> list[float]:
 
 
 def _origin(element: Element | None, where: str) -> pin.SE3:
-    xyz, rpy = (numbers(element, part, f"{where} an <origin>", ORIGIN) for part in ("xyz", "rpy"))
+    xyz, rpy = (numbers(element, part, f"{where} an <origin>", ZERO) for part in ("xyz", "rpy"))
     return pin.SE3(pin.rpy.rpyToMatrix(*rpy), xyz)

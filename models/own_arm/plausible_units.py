@@ -87,7 +87,9 @@ def _check_possible(body: LinkBody) -> None:
     link, inertia = body.link, body.inertia
     if not inertia.mass > 0:
         raise InvalidArm(
-            "urdf", f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>."
+            "urdf",
+            f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>, or "
+            "give `masses`, or `density` to estimate it from its shape and its mesh files.",
         )
     lever = float(np.linalg.norm(inertia.lever))
     if (
@@ -109,7 +111,8 @@ def _check_possible(body: LinkBody) -> None:
         raise InvalidArm(
             "urdf",
             f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² "
-            f"is more than the sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
+            f"is more than the sum of the others, {moments[0] + moments[1]:.3g} kg·m². Correct "
+            "it, or set `mend_inertias`.",
         )
 
 

@@ -11,6 +11,11 @@ from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint, UnreadableFile
 from joulepath.models.uploads.xml_tree import xml_tree
 
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+"""Attributes of an <inertia>."""
+ZERO = "0 0 0"
+"""An <origin> that is left out."""
+
 
 def robot_element(text: str, field: str, checkpoint: Checkpoint) -> Element:
     """The root element of a URDF or SRDF; `field` is "urdf" or "srdf". Raises InvalidArm."""

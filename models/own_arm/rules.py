@@ -26,6 +26,8 @@ class DefaultRules:
     """Copper loss times tau_max [W/(N·m)]."""
     idle_power: float = 6.0
     """Idle power of the electronics per joint [W]."""
+    density: float = 2700.0
+    """Density of links without a mass [kg/m³]: that of aluminium."""
     jerk: float = 20.0
     """Jerk limit over the acceleration limit [1/s]."""
     torque_constant: float = 10.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -12,8 +12,10 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, Problems
+from joulepath.models.own_arm.estimated_masses import Estimate, add_inertials, nearest_possible
 from joulepath.models.own_arm.joint_facts import JointFacts
-from joulepath.models.own_arm.robot_xml import number, numbers
+from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
+from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
     CONTINUOUS,
@@ -32,8 +34,6 @@ from joulepath.models.own_arm.urdf_tree import (
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 
-TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-ORIGIN = "0 0 0"
 ROS_BASE = "base_link"
 TURNING = ("revolute", "continuous")
 FIXED = "fixed"
@@ -49,8 +49,8 @@ class Chain:
     pose of the tip in the frame of the last joint, `T_base_base_link` (4, 4) the pose of the link
     `base_link` in the base; None if it is the base or not fixed to it. Limits (nq,) are position
     [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of the URDF
-    links fixed to the base and to every moving link. `facts` are further figures of the joints.
-    `rounded` [rad] is the largest change of a
+    links fixed to the base and to every moving link. `facts` are further figures of the joints,
+    `estimate` the estimated masses. `rounded` [rad] is the largest change of a
     rounded angle to the quarter turn that it stands for, `coarse` has the names of the joints with
     angles rounded too far for this.
     """
@@ -69,6 +69,7 @@ class Chain:
     tau_max: Array
     root: Element
     facts: JointFacts
+    estimate: Estimate
     rounded: float
     coarse: tuple[str, ...]
 
@@ -117,12 +118,27 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
     with problems.noted():
         _check_rest(tree, moving, held)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
-    for element in root.findall("link"):
+    carried = [element for element in root.findall("link") if tree.carrier(name_of(element), names)]
+    for element in carried:
         with problems.noted():
-            if tree.carrier(name_of(element), names):
-                _check_inertial(element)
+            _check_inertial(element)
     problems.raise_any()
-    return _merged(root, tree, moving, held, base, description.tip)
+    estimate = add_inertials(root, [*map(name_of, carried)], description, checkpoint)
+    chain = _merged(root, tree, moving, held, base, description.tip)
+    mended = _mended(chain) if description.mend_inertias else ()
+    return replace(chain, estimate=replace(estimate, mended=mended))
+
+
+def _mended(chain: Chain) -> tuple[str, ...]:
+    """Makes the inertias of all moving links possible; the names of those that were not."""
+    changed = list[str]()
+    for k, link in enumerate(chain.links, start=1):
+        body = chain.model.inertias[k]
+        inertia = nearest_possible(body.inertia)
+        if np.abs(inertia - body.inertia).max() > RULES.rounded * np.abs(body.inertia).max():
+            chain.model.inertias[k] = pin.Inertia(body.mass, body.lever, inertia)
+            changed.append(link)
+    return tuple(changed)
 
 
 def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:
@@ -245,6 +261,7 @@ def _merged(
         tau_max,
         root,
         JointFacts.of(root, tuple(names)),
+        Estimate(),
         rounded,
         tuple(name for name in names if is_coarse(tree.joints[name])),
     )
@@ -284,4 +301,4 @@ def _check_inertial(link: Element) -> None:
             for attribute in attributes:
                 number(inertial.find(part), attribute, f"{what} a <{part}>")
         for part in ("xyz", "rpy"):
-            numbers(inertial.find("origin"), part, f"{what} an <origin>", ORIGIN)
+            numbers(inertial.find("origin"), part, f"{what} an <origin>", ZERO)

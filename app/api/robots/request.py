@@ -172,6 +172,28 @@ class OwnArm(Request):
         {"finger_joint": 0.02},
         default=None,
     )
+    masses: Positive | dict[Named, Positive] | None = described(
+        "Mass of all moving links, or masses by the name of a link, which replace those of the "
+        "URDF. Links without a mass are then estimated from the volumes of their shapes. Null: "
+        "every moving link has a mass in the URDF, or `density` is given.",
+        "kg",
+        28.0,
+        default=None,
+    )
+    density: Positive | None = described(
+        "Density of links without a mass, which are then estimated from the volumes of their "
+        "shapes. Null: 2700, and only with `masses`.",
+        "kg/m³",
+        2700.0,
+        default=None,
+    )
+    mend_inertias: bool = described(
+        "Whether inertias that no body can have are replaced by the nearest possible ones. "
+        "Otherwise they are refused.",
+        None,
+        True,
+        default=False,
+    )
     drives: OwnDrives = described(
         "Motors and gears.", None, {"rotor_inertia": 0.4}, default=OwnDrives()
     )

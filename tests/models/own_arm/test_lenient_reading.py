@@ -11,7 +11,7 @@ import pytest
 from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.mesh_files import corners
-from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, robot
+from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, SHAPE, robot
 from tests.optimizer.kinematics.six_joints import flange
 
 FINGERS = """
@@ -104,6 +104,15 @@ def test_all_problems_of_the_figures_are_in_one_answer() -> None:
 @pytest.mark.parametrize("description", [PLAIN, RICH_ARM, replace(GRIPPING, locked="others")])
 def test_a_plain_description_has_no_problem(description: Description) -> None:
     assert own_figures("mine", description)[0]["kinematics"]
+
+
+def test_a_box_of_no_size_is_no_shape() -> None:
+    """A placeholder of some files. The link has the capsule of a link without shapes."""
+    none = PLAIN.urdf.replace(f"<geometry>{SHAPE}</geometry>", "<geometry/>")
+    empty = PLAIN.urdf.replace(SHAPE, '<box size="0 0 0"/>')
+    figures, warnings = own_figures("mine", replace(PLAIN, urdf=empty))
+    assert figures == own_figures("mine", replace(PLAIN, urdf=none))[0]
+    assert "Shapes that are not read count as nothing: box of no size." in warnings
 
 
 def test_a_mesh_of_a_package_is_found_by_the_end_of_its_path() -> None:
