@@ -132,7 +132,9 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     # FastAPI drops null values in examples of routes, so they are added here.
     for path, by_media_type in BODY_EXAMPLES.items():
         for media_type, examples in by_media_type.items():
-            operation = document["paths"][path].get("post") or document["paths"][path]["put"]
+            operation = next(
+                own for own in document["paths"][path].values() if "requestBody" in own
+            )
             operation["requestBody"]["content"][media_type]["examples"] = examples
     for path, example in shown().items():
         if "answer" not in example:

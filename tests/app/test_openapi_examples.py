@@ -19,7 +19,7 @@ from joulepath.app.schemas.common import KEY_HEADER
 from joulepath.app.schemas.examples.figures import FIGURES, FIGURES_ID
 from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
 from tests.app.live import LOCAL
-from tests.app.requests import HOME, NEAR
+from tests.app.requests import HOME, NEAR, move
 
 # the document is served before the workers run
 DOCUMENT: dict[str, Any] = json.loads(
@@ -133,6 +133,12 @@ def robot(client: TestClient) -> str:
 
 
 @pytest.fixture(scope="module")
+def kept(client: TestClient) -> str:
+    """The id of a stored answer."""
+    return str(client.post("/optimize", json=move()).json()["id"])
+
+
+@pytest.fixture(scope="module")
 def log(client: TestClient) -> str:
     """The id of a stored log."""
     (_, _, body) = next(LOGS.bodies())
@@ -144,11 +150,17 @@ def log(client: TestClient) -> str:
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES]
 )
-def test_body_is_answered(name: str, client: TestClient, study: str, robot: str, log: str) -> None:
+def test_body_is_answered(
+    name: str, client: TestClient, study: str, kept: str, robot: str, log: str
+) -> None:
     operation, media_type, example = BODIES[name]
     content, url = (
         example["value"],
-        operation.path.format(id=study, name=robot, format=name.split()[-1]),
+        operation.path.format(
+            id=kept if operation.path.startswith("/answers") else study,
+            name=robot,
+            format=name.split()[-1],
+        ),
     )
     if media_type == "text/csv":
         # the settings of a CSV file are query parameters, which the example's summary names

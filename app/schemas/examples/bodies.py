@@ -19,5 +19,8 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},
     "/figures": {JSON: FIGURES_EXAMPLES},
+    "/answers/{id}": {
+        JSON: {"name": {"summary": "Give it a name", "value": {"name": "Night cell"}}},
+    },
     "/studies/{id}/iterations": {JSON: ITERATION_EXAMPLES},
 }
