@@ -138,6 +138,8 @@ def _answers() -> None:
         sa.Column("status", sa.String(16), nullable=True),
         sa.Column("size", sa.Integer(), nullable=False),
         sa.Column("body", sa.LargeBinary(), nullable=False),
+        sa.Column("name", sa.String(200), nullable=True),
+        sa.Column("is_part", sa.Boolean(), server_default=sa.false(), nullable=False),
         sa.ForeignKeyConstraint(
             ["study_id"], ["studies.id"], name="fk_answers_study_id", ondelete="CASCADE"
         ),
