@@ -296,7 +296,7 @@ def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) 
         type_into(page, "/payload/mass", "1.6")
         page.locator("#optimise").click()
         expect(page.locator("#problem")).to_contain_text("Your work is saved here")
-        expect(page.locator("#run-state")).to_contain_text("The service does not answer")
+        expect(page.locator("#problem")).to_contain_text("The service does not answer")
         expect(page.locator("#saved")).to_have_text("Saved in this browser")
         page.context.set_offline(False)
         optimised(page)
@@ -305,7 +305,7 @@ def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) 
 
 
 def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
-    """What was typed stays, with a sentence, and the request keeps the last number."""
+    """What was typed stays, with a sentence, and nothing is computed until it is a number."""
     fill_json(page, FIRST)
     show_json(page, False)
     cell = page.locator("[data-pointer='/payload/mass']")
@@ -313,6 +313,8 @@ def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
     expect(cell).to_have_value("two")
     expect(cell).to_have_attribute("aria-invalid", "true")
     assert state(page, "request.payload.mass") == FIRST["payload"]["mass"]
+    expect(page.locator("#optimise")).to_be_disabled()
+    expect(page.locator("#run-state")).to_contain_text("Enter a number")
     type_into(page, "/payload/mass", "-1")
     page.locator("#optimise").click()
     expect(page.locator("#form")).to_contain_text("greater than or equal to 0")

@@ -14,8 +14,6 @@ export class Problem extends Error {
 
 /** The dialog that asks for an API key: called with the key, or null. */
 export const keyAsked = signal<((key: string | null) => void) | null>(null);
-/** Whether the last request found no service. */
-export const offline = signal(false);
 
 export const get = async <T>(path: string, signal?: AbortSignal): Promise<T> =>
   (await send(path, { signal })).json() as Promise<T>;
@@ -54,13 +52,11 @@ export async function send(path: string, options: RequestInit): Promise<Response
     response = await fetch(path.replace(/^\//, ""), { ...options, headers });
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    offline.value = true;
     throw new Problem({
       title: "The service does not answer",
       detail: "The service cannot be reached: is it running? Your work is saved here.",
     });
   }
-  offline.value = false;
   if (response.ok) return response;
   if (response.status === 401 && (await askForKey())) return send(path, options);
   throw new Problem(await problemOf(response));

@@ -85,6 +85,8 @@ export const selected = signal<Pointer | null>(null);
 export const asJson = signal(false);
 /** Whether the JSON editor holds a text that is no request. */
 export const jsonBroken = signal(false);
+/** Labels of the cells that hold no number, by their pointers. */
+export const unread = signal<Record<Pointer, string>>({});
 
 export const time = signal(0);
 export const playing = signal(false);

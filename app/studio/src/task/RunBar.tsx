@@ -1,23 +1,30 @@
 import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Note } from "../ui/Note";
-import { offline } from "../store/client";
 import { cancel, optimise } from "../store/run";
 import { lackOf } from "../store/request";
-import { answered, changes, jsonBroken, page, request, run, trouble } from "../store/state";
+import { answered, changes, jsonBroken, page, request, run, trouble, unread } from "../store/state";
 import { tell } from "../store/trouble";
 import { atMost, figure } from "../store/units";
 
+/** Why the request cannot be sent, or null. */
+function obstacle(): string | null {
+  if (jsonBroken.value) return "The JSON is no request.";
+  const [cell] = Object.values(unread.value);
+  if (cell !== undefined) return `Enter a number: ${cell}.`;
+  return lackOf(request.value)?.text ?? null;
+}
+
 /** Sends the request, if nothing is missing. */
 export function send(): void {
-  if (run.value || jsonBroken.value || lackOf(request.value)) return;
+  if (run.value || obstacle() !== null) return;
   const asked = request.value;
   optimise(asked).catch((error) => tell(error, asked));
 }
 
 /** The button that computes, and how far it is. */
 export function RunBar() {
-  const lack = lackOf(request.value);
+  const why = obstacle();
   const fresh = answered.value && !changes.value.length;
   return (
     <div class="run-bar">
@@ -30,13 +37,13 @@ export function RunBar() {
             type="button"
             id="optimise"
             class={`button big${fresh ? "" : " primary"}`}
-            disabled={Boolean(lack) || jsonBroken.value}
+            disabled={why !== null}
             onClick={send}
           >
             {changes.value.length ? "Optimise again" : "Optimise"} <kbd>Ctrl ↵</kbd>
           </button>
           <p class="hint" role="status" id="run-state">
-            {jsonBroken.value ? "The JSON is no request." : (lack?.text ?? stateText())}
+            {why ?? stateText()}
           </p>
         </>
       )}
@@ -45,7 +52,6 @@ export function RunBar() {
 }
 
 function stateText(): string {
-  if (offline.value) return "The service does not answer. Your work is saved here.";
   const count = changes.value.length;
   if (count) return `${count} ${count === 1 ? "change" : "changes"} since the last answer`;
   const took = answered.value?.took;

@@ -1,5 +1,5 @@
-import { useState } from "preact/hooks";
-import { changes, trouble, typed, write } from "../store/state";
+import { useEffect, useState } from "preact/hooks";
+import { changes, trouble, typed, unread, write } from "../store/state";
 import type { Pointer } from "../store/pointer";
 import { shown, typedValue, UNITS, type UnitName } from "../store/units";
 
@@ -21,11 +21,20 @@ interface Props {
 export function NumberCell({ label, pointer, value, unit, onValue, onPaste, withUnit, id }: Props) {
   const [wrong, setWrong] = useState<string | null>(null);
   const { sign } = UNITS[unit];
+  const isWrong = wrong !== null;
+  useEffect(() => {
+    if (!isWrong) return;
+    unread.value = { ...unread.value, [pointer]: label };
+    return () => {
+      const { [pointer]: _, ...others } = unread.value;
+      unread.value = others;
+    };
+  }, [isWrong, pointer, label]);
   const own = typed.value[pointer];
   const same = own !== undefined && isSame(typedValue(own, unit), value);
   const text = wrong ?? (same ? own : shown(value, unit));
   const change = changes.value.find((each) => each.pointer === pointer);
-  const bad = wrong !== null || trouble.value?.fields.some((each) => each.pointer === pointer);
+  const bad = isWrong || trouble.value?.fields.some((each) => each.pointer === pointer);
   const commit = (next: string) => {
     const number = typedValue(next, unit);
     if (number === null) {
@@ -66,7 +75,7 @@ export function NumberCell({ label, pointer, value, unit, onValue, onPaste, with
         }}
       />
       {withUnit && sign && <small>{sign}</small>}
-      {wrong !== null && (
+      {isWrong && (
         <small class="error" role="alert">
           No number
         </small>
