@@ -113,7 +113,7 @@ def test_what_is_below_the_limits_is_read() -> None:
     deep = LIMITS.xml_depth - 1
     text = URDF.replace("<robot", f"<robot {many}", 1)
     text = text.replace("</robot>", "<a>" * deep + "</a>" * deep + "<!---->" * 1000 + "</robot>")
-    assert own_figures("mine", changed(urdf=text)) == own_figures("mine", PLAIN)
+    assert_read_alike(text)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,15 @@ def test_what_is_below_the_limits_is_read() -> None:
     ],
 )
 def test_what_public_urdfs_contain_is_no_fault(made: Callable[[str], str]) -> None:
-    assert own_figures("mine", changed(urdf=made(URDF))) == own_figures("mine", PLAIN)
+    assert_read_alike(made(URDF))
+
+
+def assert_read_alike(urdf: str) -> None:
+    """A URDF gives the figures of the plain one; only elements that count for nothing are named."""
+    document, remarks = own_figures("mine", changed(urdf=urdf))
+    plain, others = own_figures("mine", PLAIN)
+    assert document == plain
+    assert [each for each in remarks if "without effect" not in each] == others
 
 
 def glb(document: dict[str, Any], data: bytes) -> bytes:
