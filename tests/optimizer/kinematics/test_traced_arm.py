@@ -266,7 +266,9 @@ def test_an_answer_over_curves_that_may_be_missing_is_not_optimal(from_pose: boo
     )
     found = optimize(problem)
     assert found.certificate.valid and found.status == "feasible" and not found.complete
-    assert 0 <= found.lower_bound <= found.energy.electrical.total
+    # the bus gives energy back, so that the bound of any two configurations may be negative
+    assert found.lower_bound <= found.energy.electrical.total
+    assert from_pose or found.lower_bound >= 0
     to_joints = optimize(replace(problem, goal=goal)) if not from_pose else None
     # With a free configuration of the goal pose, the energy is at most that of the given one.
     assert (
