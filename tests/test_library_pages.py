@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from joulepath.app.cli.main import joulepath
 
 ROOT = Path(__file__).parents[1]
@@ -38,6 +40,7 @@ def test_the_library_page(tmp_path: Path) -> None:
     assert re.fullmatch(r"\d+% friction", second)
 
 
+@pytest.mark.long
 def test_the_command_line_page(tmp_path: Path) -> None:
     found = blocks("command_line.md", "")
     assert len(found) == 4

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from joulepath.models.registry import load_robot
 from tests.app.cli.console import Here, run
 from tests.app.requests import move
@@ -25,6 +27,7 @@ def test_a_report_is_written_and_checked(tmp_path: Path) -> None:
     assert changed.returncode == 1 and b"DIFFERS  page" in changed.stdout
 
 
+@pytest.mark.long
 def test_a_log_as_csv_is_reported_on_and_checked(tmp_path: Path) -> None:
     log, settings, pdf = (tmp_path / name for name in ("run.csv", "settings.json", "run.html"))
     robot = load_robot("ur5e")
