@@ -78,7 +78,7 @@ def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, servic
         page.locator("#change-robot").click()
         page.get_by_label("Search robots").fill("ur10e")
         page.get_by_role("button", name="Universal Robots UR10e").click()
-        assert state(page, "request.robot") == "ur10e"
+        until(page, "() => studio.state.request.robot === 'ur10e'")
         paste(page, PENDANT["goal"])
         goal = state(page, "request.goal.pose")
         assert goal == {"position": [-0.35, -0.42, 0.35], "rotvec": [2.221, -2.221, 0]}

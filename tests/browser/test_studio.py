@@ -335,6 +335,7 @@ def test_behind_the_path_of_a_proxy(browser: Browser, service: Server) -> None:
     page.goto(f"{front}/studio")
     until(page, SHOWN)
     until(page, MESHES)
+    context.unroute_all(behavior="ignoreErrors")
     context.close()
 
 
