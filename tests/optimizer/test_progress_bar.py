@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import pty
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +11,7 @@ import pytest
 
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.progress import Event, no_listener
+from tests.terminal import on_terminal
 
 ROOT = Path(__file__).parents[2]
 SEARCH = """
@@ -25,40 +24,41 @@ with progress_bar("Searching", delay={delay}) as tell:
     time.sleep({lasts})
 print("done")
 """  # noqa: E501
+TWO_SEARCHES = """
+import threading, time
+from joulepath.optimizer.presentation.progress_bar import progress_bar
+def search():
+    with progress_bar("Searching", delay={delay}):
+        time.sleep({lasts})
+threads = [threading.Thread(target=search) for _ in range(2)]
+for each in threads:
+    each.start()
+for each in threads:
+    each.join()
+print("done")
+"""
 
 
-def shown(delay: float, lasts: float, **environment: str) -> str:
-    """What a terminal shows of a search."""
-    ours, theirs = pty.openpty()
-    script = SEARCH.format(delay=delay, lasts=lasts)
-    with subprocess.Popen(
-        [sys.executable, "-c", script],
-        env=os.environ | {"PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "120"} | environment,
-        stdin=subprocess.DEVNULL,
-        stdout=theirs,
-        stderr=theirs,
-    ) as process:
-        os.close(theirs)
-        text = b""
-        try:
-            while part := os.read(ours, 65536):
-                text += part
-        except OSError:  # the terminal is closed
-            pass
-        finally:
-            os.close(ours)
-        assert process.wait() == 0
-    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text.decode())
+def shown(delay: float, lasts: float, script: str = SEARCH) -> str:
+    """What a terminal shows of searches."""
+    own = os.environ | {"PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "120"}
+    command = [sys.executable, "-c", script.format(delay=delay, lasts=lasts)]
+    return on_terminal(command, own)
 
 
 def test_a_terminal_shows_energy_and_gap_and_no_trace_is_left() -> None:
     text = shown(delay=0.0, lasts=0.6)
     assert "Searching: 60 J, gap 16.7%" in text
-    assert text.endswith("done\r\n")
+    assert text.endswith("done\n")
 
 
 def test_a_short_search_shows_nothing() -> None:
-    assert shown(delay=60.0, lasts=0.0) == "done\r\n"
+    assert shown(delay=60.0, lasts=0.0) == "done\n"
+
+
+def test_two_searches_at_once_leave_no_trace() -> None:
+    text = shown(delay=0.0, lasts=0.6, script=TWO_SEARCHES)
+    assert "Traceback" not in text and text.endswith("done\n")
 
 
 def test_a_pipe_gets_nothing() -> None:

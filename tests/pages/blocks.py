@@ -9,22 +9,20 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import re
 import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.terminal import on_terminal
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 SERVICE = "http://127.0.0.1:8000"
 """Address of the service in the pages."""
-PATIENCE = 300.0
-"""Most that a block may take on a busy machine [s]."""
 _FENCE = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
-_ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 _PYTHON = """
 import json, sys
 names = {"__name__": "__main__"}
@@ -87,7 +85,8 @@ def run(page: Path, folder: Path, service: str = SERVICE) -> None:
             if block.title:
                 (folder / block.title).write_text(code, encoding="utf-8")
             elif block.runs and block.language == "bash":
-                printed = _in_bash(code, folder, environment)
+                shell = ["bash", "-e", "-o", "pipefail", "-c", code]
+                printed = on_terminal(shell, environment, folder)
             elif block.runs:
                 printed = _in_python(code, python)
             elif block.language == "text":
@@ -126,31 +125,6 @@ def _environment(folder: Path, service: str) -> dict[str, str]:
         "TERM": "dumb",
         "COLUMNS": "200",
     }
-
-
-def _in_bash(code: str, folder: Path, environment: dict[str, str]) -> str:
-    """What a terminal shows of a script, which must succeed."""
-    ours, theirs = pty.openpty()
-    with subprocess.Popen(
-        ["bash", "-e", "-o", "pipefail", "-c", code],
-        cwd=folder,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=theirs,
-        stderr=theirs,
-    ) as script:
-        os.close(theirs)
-        shown = b""
-        try:
-            while part := os.read(ours, 65536):
-                shown += part
-        except OSError:  # the terminal is closed
-            pass
-        finally:
-            os.close(ours)
-        text = _ESCAPE.sub("", shown.decode()).replace("\r\n", "\n")
-        assert script.wait(PATIENCE) == 0, f"{code}\n{text}"
-    return text
 
 
 def _in_python(code: str, python: subprocess.Popen[str]) -> str:

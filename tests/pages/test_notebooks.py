@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.pages.blocks import PATIENCE, ROOT
+from tests.pages.blocks import ROOT
 
+PATIENCE = 300.0
+"""Most that a cell may take on a busy machine [s]."""
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 
 
