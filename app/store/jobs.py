@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TypeVarTuple
@@ -29,6 +29,8 @@ from joulepath.app.store.paging import position_after, position_of
 from joulepath.app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
 
 Ts = TypeVarTuple("Ts")
+_AT_A_TIME = 50
+"""Requests that are read at once with their answers, of up to 1 MB each."""
 
 
 @dataclass(frozen=True)
@@ -173,11 +175,14 @@ def results(
     return [(request, bodies.get(request.answer_id or "")) for request in found]
 
 
-def whole(session: Session, job_id: str) -> list[tuple[JobRequest, bytes | None]]:
-    """All requests of a job with their bodies and those of their answers, in order."""
+def whole(session: Session, job_id: str) -> Iterator[tuple[JobRequest, bytes | None]]:
+    """All requests of a job with their bodies and those of their answers, in order, some at a time:
+    together they may be larger than the memory.
+    """
     query = select(JobRequest, Answer.body).outerjoin(Answer, Answer.id == JobRequest.answer_id)
     query = query.where(JobRequest.job_id == job_id).order_by(JobRequest.number)
-    return [(request, body) for request, body in session.execute(query)]
+    rows = session.execute(query.execution_options(yield_per=_AT_A_TIME))
+    return ((request, body) for request, body in rows)
 
 
 def cancel(session: Session, job_id: str, client: Client) -> None:

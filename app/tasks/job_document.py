@@ -11,27 +11,39 @@ from joulepath.app.store import jobs
 
 JOBS = "/jobs"
 """Begin of the path of a job."""
+MOST_BYTES = 64_000_000
+"""Largest document [byte]. The service holds it twice, and a worker parsed, some 500 MB: with
+answers to short motions, of 50 kB each, these are 1,300 requests."""
 
 
 def job_document(session: Session, job_id: str, most: int) -> bytes:
     """The job as JSON: `name`, and `rows` with `index`, `kind`, `state`, `request`, `answer` and
     `problem`.
 
-    Raises UnknownJob, or InvalidRequest for more than `most` requests.
+    Raises UnknownJob, or InvalidRequest for more than `most` requests or `MOST_BYTES`.
     """
     job = jobs.view(session, job_id).job
     if job.total > most:
-        msg = f"A report may have {most:,} requests: GET /jobs/{{id}}/results has all as a table."
-        raise InvalidRequest([{"loc": ["body", "job"], "msg": msg}])
-    rows = [
-        {
-            "index": row.number,
-            "kind": row.kind,
-            "state": row.state,
-            "problem": row.problem,
-            "request": orjson.Fragment(unpacked(row.body)),
-            "answer": None if body is None else orjson.Fragment(unpacked(body)),
-        }
-        for row, body in jobs.whole(session, job_id)
-    ]
+        raise _too_large(f"{most:,} requests")
+    rows, left = [], MOST_BYTES
+    for row, body in jobs.whole(session, job_id):
+        request, answer = unpacked(row.body), None if body is None else unpacked(body)
+        left -= len(request) + len(answer or b"")
+        if left < 0:
+            raise _too_large(f"{MOST_BYTES / 1e6:.0f} MB of requests and answers")
+        rows.append(
+            {
+                "index": row.number,
+                "kind": row.kind,
+                "state": row.state,
+                "problem": row.problem,
+                "request": orjson.Fragment(request),
+                "answer": None if answer is None else orjson.Fragment(answer),
+            }
+        )
     return orjson.dumps({"name": job.name, "rows": rows})
+
+
+def _too_large(limit: str) -> InvalidRequest:
+    msg = f"A report may have {limit}: GET /jobs/{{id}}/results has all as a table."
+    return InvalidRequest([{"loc": ["body", "job"], "msg": msg}])

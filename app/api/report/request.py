@@ -82,7 +82,8 @@ class ReportRequest(AnsweredRequest):
     `evaluate`. With the numbers for costs."""
 
     job: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
-        f"Id of a job with motions or cycles of one robot, of at most {MOST_ROWS:,} requests.",
+        f"Id of a job with motions or cycles of one robot, of at most {MOST_ROWS:,} requests, and "
+        "64 MB of requests and answers.",
         None,
         JOB_ID,
         default=None,

@@ -11,6 +11,7 @@ from joulepath.app.api.report.bundle import Bundle, attached_to, in_html
 from joulepath.app.api.report.check import checked
 from joulepath.app.api.report.log_report import measured
 from joulepath.app.api.report.numbers import digits, percent
+from joulepath.app.tasks import job_document
 from joulepath.models.registry import load_robot
 from tests.app import job_clients as jobs
 from tests.app.job_clients import evaluation, optimization
@@ -93,6 +94,18 @@ def test_savings_of_a_job_are_those_of_its_moves(page: bytes) -> None:
     assert ours, "some of these moves have a way within the limits"
     saving = 1 - ours / theirs
     assert (f"<b>{percent(saving)} less</b> than" in text) == (saving >= 0.0005)
+
+
+def test_a_job_too_large_for_the_memory_is_refused(
+    client: TestClient, job: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job_document, "MOST_BYTES", 10_000)
+    answer = client.post("/report", json={"job": job})
+    assert answer.status_code == 422, answer.text
+    (error,) = answer.json()["errors"]
+    assert error["loc"] == ["body", "job"] and "GET /jobs/{id}/results" in error["msg"]
+    table = client.get(f"/jobs/{job}/results", headers={"Accept": "text/csv"})
+    assert table.status_code == 200 and len(table.text.splitlines()) == 6
 
 
 def test_a_job_is_checked_row_by_row(page: bytes) -> None:
