@@ -2,16 +2,43 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 import numpy as np
 
 from joulepath.optimizer.exceptions import InvalidProblem
 
+E = TypeVar("E", bound=Exception)
+
 
 def location(error: InvalidProblem, where: str) -> list[str | int]:
     """Path of the invalid field in the request; `where` is the part of the request."""
     return [where, *(int(part) if part.isdigit() else part for part in error.field.split("."))]
+
+
+def moved(error: E, field: str, own: Collection[str] | None = None) -> E | InvalidProblem:
+    """An error of a request that is a `field` of the body; others than InvalidProblem as they are.
+
+    Args:
+        error: error of the request.
+        field: path of the request in the body.
+        own: fields that the request has, by default all. An error in another is one of `field`.
+    """
+    if not isinstance(error, InvalidProblem):
+        return error
+    has = own is None or error.field.partition(".")[0] in own
+    return InvalidProblem(f"{field}.{error.field}" if has else field, str(error))
+
+
+@contextmanager
+def inside(field: str, own: Collection[str] | None = None) -> Iterator[None]:
+    """Raise what the body raises, InvalidProblem by `moved`."""
+    try:
+        yield
+    except InvalidProblem as error:
+        raise moved(error, field, own) from None
 
 
 def fields(source: object, *names: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from joulepath.app.api.advice.request import AnsweredRequest
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.optimize.task import OptimizeTask
+from joulepath.app.convert.fields import inside
 from joulepath.app.convert.given_answer import paths_of_moves
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.request import OptimizeRequest
@@ -35,7 +36,8 @@ def answered(asked: AnsweredRequest, request_id: str, deadline: float) -> tuple[
     task = asked.task
     assert task is not None
     if asked.answer is None:
-        return documents_of(result_of(task, request_id, deadline))
+        with inside("cycle" if isinstance(task, CycleRequest) else "optimize"):
+            return documents_of(result_of(task, request_id, deadline))
     answer = kept_answers([asked.answer])[0]
     if not _fits(answer, task):
         raise InvalidProblem(

@@ -18,6 +18,7 @@ from joulepath.app.api.report.build import report_of
 from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.job_rows import row_of, summed
 from joulepath.app.api.report.request import ReportRequest
+from joulepath.app.convert.fields import inside
 from joulepath.app.convert.recorded import stored_log
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult, json_document
@@ -70,10 +71,12 @@ class ReportTask:
         limit = min(end.left, asked.deadline)
         if asked.evaluate is not None:
             log = stored_log(asked.evaluate.log or "")
+            with inside("evaluate"):
+                answer = evaluation_of(asked.evaluate, self.request_id, limit)
             content = {"settings": log.settings, "body": base64.b64encode(log.body).decode()}
             return {
                 "request": as_asked(asked.evaluate),
-                "answer": evaluation_of(asked.evaluate, self.request_id, limit),
+                "answer": answer,
                 "moves": [],
                 "log": content if len(log.body) <= _MOST_ATTACHED else None,
             }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Annotated, Self, TypeVar
 
@@ -21,6 +21,7 @@ from joulepath.app.api.whatif.answer import (
 )
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.fields import inside, moved
 from joulepath.app.convert.given_motion import to_motion
 from joulepath.app.convert.recorded import as_logged
 from joulepath.app.convert.request import to_problem
@@ -41,7 +42,6 @@ from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.exceptions import (
     DeadlineExceeded,
-    InvalidProblem,
     OutsideLimits,
 )
 from joulepath.optimizer.optimize import optimize
@@ -53,7 +53,6 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.what_if import what_if
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
-T = TypeVar("T")
 MOST_CHANGES = 16
 
 
@@ -193,10 +192,12 @@ class _Optimized(_Work):
         asked = self.request.optimize
         assert asked is not None
         share = min(asked.deadline, self.shares.next())
-        first = _located(lambda: to_problem(asked, share), "optimize")
+        with inside("optimize"):
+            first = to_problem(asked, share)
         # all of them before the first run, so that an invalid change is rejected at once
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
-        best = certified(_located(lambda: optimize(first, progress=False), "optimize"))
+        with inside("optimize"):
+            best = certified(optimize(first, progress=False))
         base = WhatifBase.of(best, self._kept(asked, best), best.status, holds=True)
         rows = [self._row(asked, k, best, problem) for k, problem in enumerate(problems)]
         return self.result_of(asked.robot, asked.objective, base, rows)
@@ -205,8 +206,8 @@ class _Optimized(_Work):
         change = self.request.changes[k]
         try:
             left = min(asked.deadline, time_left(self.deadline))
-            changed = _changed(asked, change)
-            return _located(lambda: to_problem(changed, left), f"changes.{k}.arm", change)
+            with _inside_change(k, change):
+                return to_problem(_changed(asked, change), left)
         except OutsideLimits as error:
             return error
 
@@ -237,7 +238,9 @@ class _Optimized(_Work):
         )
         if found.reoptimised is None:
             assert found.error is not None
-            return self.failed(change, _moved(found.error, f"changes.{k}.arm", change), same)
+            return self.failed(
+                change, moved(found.error, f"changes.{k}.arm", change.arm.model_fields_set), same
+            )
         best = certified(found.reoptimised)
         path = self._kept(_changed(asked, change), best)
         better = Reoptimised.of(base, best.energy, best.duration, answer=path, status=best.status)
@@ -262,17 +265,20 @@ class _Evaluated(_Work):
         assert self.request.evaluate is not None
         given = self.request.evaluate
         with until(self.deadline):
-            asked = _located(lambda: as_logged(given), "evaluate")
-            arm = _located(lambda: to_arm(asked), "evaluate")
+            with inside("evaluate"):
+                asked = as_logged(given)
+                arm = to_arm(asked)
             arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
-        found = _located(lambda: self._evaluate(arm, asked), "evaluate")
+        with inside("evaluate"):
+            found = self._evaluate(arm, asked)
         base = WhatifBase.of(found.total, self._kept(asked, found), None, _holds(found))
         rows = [self._row(asked, k, found, arm) for k, arm in enumerate(arms)]
         return self.result_of(asked.robot, None, base, rows)
 
     def _arm(self, asked: EvaluateRequest, k: int) -> Arm:
         change = self.request.changes[k]
-        return _located(lambda: to_arm(_changed(asked, change)), f"changes.{k}.arm", change)
+        with _inside_change(k, change):
+            return to_arm(_changed(asked, change))
 
     def _evaluate(self, arm: Arm, asked: EvaluateRequest) -> Evaluation:
         deadline = min(asked.deadline or math.inf, self.shares.next())
@@ -283,7 +289,8 @@ class _Evaluated(_Work):
         if self.shares.used_up:
             return self.failed(change, DeadlineExceeded([]))
         try:
-            found = _located(lambda: self._evaluate(arm, asked), f"changes.{k}.arm", change)
+            with _inside_change(k, change):
+                found = self._evaluate(arm, asked)
         except DeadlineExceeded as error:
             return self.failed(change, error)
         total, path = found.total, self._kept(_changed(asked, change), found)
@@ -302,25 +309,9 @@ class _Evaluated(_Work):
         return self.collector.add(EvaluateAnswer.of(self.request_id, Evaluated(asked, found)))
 
 
-def _located(work: Callable[[], T], where: str, change: Change | None = None) -> T:
-    """What `work` returns. Raises what it raises; an InvalidProblem with its field path changed by
-    `_moved`."""
-    try:
-        return work()
-    except InvalidProblem as error:
-        raise _moved(error, where, change) from None
-
-
-def _moved(error: Exception, where: str, change: Change | None = None) -> Exception:
-    """The error with its field path prefixed by `where`.
-
-    If the change does not set that field, the path is `where` alone. Other errors are returned
-    unchanged.
-    """
-    if not isinstance(error, InvalidProblem):
-        return error
-    is_set = change is None or error.field.partition(".")[0] in change.arm.model_fields_set
-    return InvalidProblem(f"{where}.{error.field}" if is_set else where, str(error))
+def _inside_change(k: int, change: Change) -> AbstractContextManager[None]:
+    """A context whose InvalidProblem names the field of change `k`."""
+    return inside(f"changes.{k}.arm", change.arm.model_fields_set)
 
 
 def _changed(asked: R, change: Change) -> R:

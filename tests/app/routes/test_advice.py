@@ -141,3 +141,10 @@ def test_advice_on_a_kept_answer_is_of_that_answer(client: TestClient) -> None:
 @pytest.mark.parametrize("body", [{}, {"optimize": move(), "cycle": CYCLE}])
 def test_other_bodies_are_refused(recorded: TestClient, body: Json) -> None:
     assert recorded.post("/advice", json=body).status_code == 422
+
+
+@pytest.mark.parametrize("path", ["/advice", "/report"])
+def test_an_error_of_the_motion_names_its_field(client: TestClient, path: str) -> None:
+    answer = client.post(path, json={"optimize": move(limits={"velocity": [1.0]})})
+    (error,) = answer.json()["errors"]
+    assert error["loc"][:3] == ["body", "optimize", "limits"], error
