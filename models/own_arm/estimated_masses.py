@@ -87,6 +87,8 @@ def add_inertials(
                 "masses",
                 f"Link {name!r} has neither an <inertial> nor a shape: give it one in the URDF.",
             )
+    if not estimated:
+        _refuse_without_effect(description, known)
     scale = _scale(given, known, sum(body.mass for body in estimated.values()))
     for name, body in estimated.items():
         _write(elements[name], pin.Inertia(scale * body.mass, body.lever, scale * body.inertia))
@@ -94,9 +96,18 @@ def add_inertials(
     return Estimate(tuple(estimated), total)
 
 
+def _refuse_without_effect(description: Description, known: float) -> None:
+    """Refuses a total mass or a density where no mass is estimated, `known` [kg] being all."""
+    has = f"Every link with a shape has an <inertial>, {known:.4g} kg in all"
+    if description.density is not None:
+        raise InvalidArm("density", f"{has}: leave the density out.")
+    if not isinstance(description.masses, Mapping):
+        raise InvalidArm("masses", f"{has}: leave the total out, or give masses by link.")
+
+
 def _scale(given: Any, known: float, estimated: float) -> float:
-    """Factor on estimated masses [kg] that makes the total of all links the stated one."""
-    if given is None or isinstance(given, Mapping) or not estimated:
+    """Factor on masses estimated [kg] that makes the total of all links the stated one."""
+    if given is None or isinstance(given, Mapping):
         return 1.0
     if not known < given:
         raise InvalidArm(

@@ -61,6 +61,13 @@ def test_a_total_mass_is_met_by_the_sum_of_all_links() -> None:
     refused("masses", "a total must be above this", replace(half, masses=1.5))
 
 
+def test_what_has_no_effect_is_refused() -> None:
+    told = "Every link with a shape has an <inertial>, 5 kg in all"
+    refused("masses", told, replace(PLAIN, masses=99.0))
+    refused("density", told, replace(PLAIN, density=1000.0))
+    refused("density", told, replace(PLAIN, masses={"forearm": 2.0}, density=1000.0))
+
+
 def test_masses_of_links_replace_those_of_the_urdf() -> None:
     given = replace(PLAIN, masses={"forearm": 5.0})
     (upper, lower), (_, before) = bodies(given), bodies(PLAIN)
