@@ -20,7 +20,7 @@ from joulepath.models.shape_sizes import SIZES
 from joulepath.models.uploads.limits import Checkpoint
 
 SHAPES = ("collision", "visual")
-"""Shapes of a link that its volume is taken of: the first kind that it has."""
+"""Kinds of shapes, preferred first: the volume of a link is that of the first kind it has."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ _POLICY = (
 )
 """Everything from this service, and nothing inline but what was there when the page was built."""
 STYLE = "style.digest"
-"""File of a folder with the digest of a style sheet that a script of the folder adds."""
+"""Name of the file with the digest of the style sheet that a script adds to pages of a folder."""
 _INLINE = re.compile(rb"<script>(.*?)</script>", re.DOTALL)
 
 
