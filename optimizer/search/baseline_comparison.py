@@ -91,17 +91,15 @@ def _table(state: SearchState, best: Candidate) -> tuple[list[Baseline], Candida
     assert best.energy is not None
     prepared, problem = state.prepared, state.problem
     candidates = state.candidates
-    beside = (np.array([each.q_start for each in candidates]) == best.q_start).all(axis=1)
-    q_goals = np.array([each.q_goal for each in candidates])[beside]
+    # concatenation takes half the time of an array of arrays
+    q_start = np.concatenate([each.q_start for each in candidates]).reshape(len(candidates), -1)
+    beside = np.flatnonzero((q_start == best.q_start).all(axis=1)).tolist()
+    q_goals = np.array([candidates[row].q_goal for row in beside])
     oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way
     table = baselines(problem, best.q_start, q_goals, best.duration, best.energy, *oracle)
     q_nearest = nearest(problem, best.q_start, q_goals)
-    at = (
-        each
-        for each in candidates
-        if (each.q_start == best.q_start).all() and (each.q_goal == q_nearest).all()
-    )
-    return table, next(at)
+    row = beside[int((q_goals == q_nearest).all(axis=1).argmax())]
+    return table, candidates[row]
 
 
 def accept_baseline(state: SearchState, candidate: Candidate, better: list[BaselineName]) -> None:

@@ -13,6 +13,7 @@ from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
     required_inverse_kinematics,
 )
+from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.six.simple_arm import SimpleArm
 from tests.optimizer.kinematics.axis_patterns import (
     RELATIONS,
@@ -54,7 +55,12 @@ def test_no_pose_of_any_pattern_is_refused(count: int) -> None:
             kinematics = uncached(robot)
             assert kinematics is not None
             found = kinematics.solve(T, windings=False)
-            assert max(np.abs(flange(robot, each.q) - T).max() for each in found) < ACCURACY
+            errors = [np.abs(flange(robot, each.q) - T).max() for each in found]
+            assert min(errors) < ACCURACY
+            for each, error in zip(found, errors, strict=True):
+                # where branches meet, a configuration may keep a small error, as `Reach` says
+                at_edge = each.smallest_singular_value < REACH.singular
+                assert error < (REACH.residual if at_edge else ACCURACY)
         except (SingularPose, NoConfigurationFound) as error:
             refused.append((pattern, str(error)))
     assert not refused
