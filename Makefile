@@ -141,7 +141,8 @@ LOCK = $(VENV)/bin/uv pip compile --universal --generate-hashes --no-emit-index-
 # LOCK_ARGS=--upgrade takes the newest versions; without it, versions stay as far as pyproject.toml lets them.
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml --output-file requirements.lock
-	$(LOCK) pyproject.toml --group dev --constraints requirements.lock --output-file requirements-dev.lock
+	$(LOCK) pyproject.toml --group dev --extra ros2 --constraints requirements.lock \
+		--output-file requirements-dev.lock
 	$(LOCK) pyproject.toml --group benchmarks --constraints requirements-dev.lock \
 		--output-file requirements-benchmarks.lock
 	$(LOCK) pyproject.toml --extra cluster --constraints requirements-dev.lock \

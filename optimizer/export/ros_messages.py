@@ -67,7 +67,7 @@ def to_ros2(program: Program, options: Ros2Options | None = None) -> WrittenFile
     """
     options = options or Ros2Options()
     points = quintic_points(program, "ros2")
-    trajectory = _trajectory(program, points, options.prefix)
+    trajectory = joint_trajectory(program, points, options.prefix)
     controller = options.controller.lstrip("/")
     action, topic = f"/{controller}/follow_joint_trajectory", f"/{controller}/joint_trajectory"
     if options.message == "goal":
@@ -109,7 +109,7 @@ def to_moveit(program: Program, options: MoveitOptions | None = None) -> Written
     """
     options, points = options or MoveitOptions(), quintic_points(program, "moveit")
     message = {
-        "joint_trajectory": _trajectory(program, points, options.prefix),
+        "joint_trajectory": joint_trajectory(program, points, options.prefix),
         "multi_dof_joint_trajectory": {"joint_names": []},
     }
     kind = "moveit_msgs/msg/RobotTrajectory"
@@ -117,7 +117,14 @@ def to_moveit(program: Program, options: MoveitOptions | None = None) -> Written
     return _file(program, points, options.encoding, kind, use, message, message)
 
 
-def _trajectory(program: Program, points: QuinticPoints, prefix: str) -> dict[str, Any]:
+def joint_trajectory(program: Program, points: QuinticPoints, prefix: str) -> dict[str, Any]:
+    """The fields of trajectory_msgs/msg/JointTrajectory without its header.
+
+    Args:
+        program: the motion.
+        points: its points.
+        prefix: prefix of all joint names.
+    """
     rows = zip(
         points.nanoseconds, points.q.tolist(), points.v.tolist(), points.a.tolist(), strict=True
     )

@@ -81,10 +81,12 @@ class OptimizeTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
+        answer = self.answer(deadline)
+        return TaskResult.of_kept_json(answer, answer.figures)
+
+    def answer(self, deadline: float) -> OptimizeAnswer:
+        """The answer within about `deadline` seconds, not kept yet."""
         solution = certified(
             optimize(to_problem(self.request, deadline), tell=listener(), progress=False)
         )
-        answer = OptimizeAnswer.of(
-            self.request, self.request_id, solution, arm_fields(self.request)
-        )
-        return TaskResult.of_kept_json(answer, answer.figures)
+        return OptimizeAnswer.of(self.request, self.request_id, solution, arm_fields(self.request))

@@ -1,0 +1,1 @@
+"""A ROS 2 node that plans motions of least energy."""

@@ -1,0 +1,140 @@
+"""Between the fields of ROS messages and those of `POST /optimize`; needs no installation of ROS."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from joulepath.app.exceptions.base import FieldError, InvalidRequest
+
+Json = dict[str, Any]
+BASE_FRAMES = ("base", "base_link")
+"""Frames of poses in requests."""
+
+
+@dataclass(frozen=True)
+class JointNames:
+    """The robot's joints as the ROS system names them.
+
+    Attributes:
+        joints: names in the robot's model, from base to tip.
+        prefix: what all of them begin with in ROS, such as `left_`.
+    """
+
+    joints: tuple[str, ...]
+    prefix: str = ""
+
+    @property
+    def in_ros(self) -> list[str]:
+        """The names with the prefix, from base to tip."""
+        return [self.prefix + joint for joint in self.joints]
+
+    def positions(self, topic: str, names: Sequence[str], values: Sequence[float]) -> list[float]:
+        """The positions [rad] in a JointState, from base to tip; its other joints are left out.
+
+        Args:
+            topic: topic of the message, for errors.
+            names: its `name`, in any order.
+            values: its `position` [rad].
+
+        Raises:
+            InvalidRequest: a joint of the robot is missing or occurs twice, the two fields differ
+                in length, or a position is not finite.
+        """
+        if len(names) != len(values):
+            raise refusal(
+                (topic, "position"),
+                f"The message has {len(names)} names and {len(values)} positions: give each joint "
+                "in `name` one value in `position`.",
+            )
+        missing = [name for name in self.in_ros if name not in names]
+        if missing:
+            raise refusal((topic, "name"), self._missing(missing[0], names))
+        twice = next((name for name in self.in_ros if list(names).count(name) > 1), None)
+        if twice is not None:
+            raise refusal((topic, "name"), f"The joint {twice} occurs twice: name it once.")
+        found = [float(values[list(names).index(name)]) for name in self.in_ros]
+        for name, value in zip(self.in_ros, found, strict=True):
+            if not math.isfinite(value):
+                raise refusal(
+                    (topic, "position"),
+                    f"The position of {name} is {value}: give a finite number in rad.",
+                )
+        return found
+
+    def _missing(self, joint: str, names: Sequence[str]) -> str:
+        bare = joint.removeprefix(self.prefix)
+        prefixes = sorted({name.removesuffix(bare) for name in names if name.endswith(bare)})
+        remedy = (
+            f"set the parameter `prefix` to {' or '.join(repr(each) for each in prefixes)}"
+            if prefixes
+            else "name all joints of the robot, or choose another `robot`"
+        )
+        return f"The joint {joint} is missing; the message has {', '.join(names) or 'none'}: {remedy}."
+
+
+def pose_target(
+    topic: str, frame_id: str, position: Sequence[float], quaternion: Sequence[float], prefix: str, base_frame: str
+) -> Json:
+    """The target of a PoseStamped, which is the pose of the TCP.
+
+    Args:
+        topic: topic of the message, for errors.
+        frame_id: frame of its header; empty for the base frame.
+        position: x, y, z [m].
+        quaternion: x, y, z, w.
+        prefix: prefix of the robot's frames.
+        base_frame: frame of the robot's base in ROS: `base_link` of its description.
+
+    Raises:
+        InvalidRequest: the frame is none at the base.
+    """
+    frames = {prefix + frame: frame for frame in BASE_FRAMES}
+    frames |= {base_frame: "base_link", "": "base_link"}
+    if frame_id not in frames:
+        known = ", ".join(sorted(frame for frame in frames if frame))
+        raise refusal(
+            (topic, "header", "frame_id"),
+            f"The frame {frame_id!r} is none of the robot's base: transform the pose into one of "
+            f"{known}, or set the parameter `base_frame`.",
+        )
+    return {
+        "pose": {
+            "position": list(position),
+            "quaternion": list(quaternion),
+            "frame": frames[frame_id],
+        }
+    }
+
+
+def summary_of(answer: Json) -> Json:
+    """What a caller needs to know about a plan, from the answer of `POST /optimize`."""
+    objective, energy = answer["objective"], answer["energy"]
+    return {
+        "state": "planned",
+        "robot": answer["robot"],
+        "status": answer["status"],
+        "objective": objective,
+        "energy": energy[objective]["total"],
+        "duration": answer["duration"],
+        "lower_bound": energy["lower_bound"],
+        "optimality_gap": energy["optimality_gap"],
+        "certificate": answer["certificate"],
+        "branch": answer["branch"]["goal"]["label"],
+        "baselines": [
+            {name: each[name] for name in ("name", objective, "duration", "saving")}
+            for each in answer["baselines"]
+        ],
+        "alternatives": [
+            {name: each[name] for name in ("goal", "q_goal", "energy", "duration", "status")}
+            for each in answer["candidates"]
+        ],
+        "warnings": answer["warnings"],
+    }
+
+
+def refusal(field: Sequence[str], message: str) -> InvalidRequest:
+    """The error for a field of a message, whose path begins with the topic."""
+    return InvalidRequest([FieldError(loc=list(field), msg=message)], message)
