@@ -25,6 +25,7 @@ from joulepath.app.cli.pareto import pareto
 from joulepath.app.cli.replay import replay
 from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
+from joulepath.app.cli.ros2 import ros2
 from joulepath.app.cli.serve import serve
 from joulepath.app.cli.studies import studies
 from joulepath.app.cli.tools import tools
@@ -80,6 +81,7 @@ for command in (
     robots,
     tools,
     keys,
+    ros2,
     cluster_worker,
 ):
     joulepath.add_command(command)

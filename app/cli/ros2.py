@@ -24,7 +24,10 @@ def ros2(arguments: tuple[str, ...]) -> None:
     from joulepath.optimizer.exceptions import DeclaredError
     from joulepath.optimizer.presentation.extras import required
 
-    required("rclpy", "joulepath ros2", "joulepath[ros2]")
+    try:
+        required("rclpy", "joulepath ros2", "joulepath[ros2]")
+    except ModuleNotFoundError as error:
+        raise click.ClickException(str(error)) from None
     from joulepath.app.ros2.node import main
 
     try:

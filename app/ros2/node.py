@@ -8,11 +8,9 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import rclpy
-import yaml
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -31,6 +29,7 @@ from joulepath.app.ros2.parameters import Parameters
 from joulepath.app.ros2.planner import LocalPlanner, Plan, Planner, RemotePlanner
 from joulepath.optimizer.deadline import Stopped
 from joulepath.optimizer.exceptions import DeclaredError
+from joulepath.optimizer.optimize import warm_up
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Late subscribers get the last message, too: that of `robot_description` likewise."""
@@ -38,11 +37,17 @@ THREADS = 3
 """Threads of the executor: `~/plan` waits in one, the other callbacks go on."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Work:
-    """A goal that is planned, or was."""
+    """A plan to a goal.
 
-    goal: Json
+    Attributes:
+        goal: returns the goal as `POST /optimize` has it; raises InvalidRequest.
+        stamp: stamp of the message with the goal.
+        stopped: set once the plan is of no use any more.
+    """
+
+    goal: Callable[[], Json]
     stamp: Json
     stopped: threading.Event = field(default_factory=threading.Event)
 
@@ -56,19 +61,21 @@ class PlanningNode(Node):
     the problem, as JSON.
     """
 
-    def __init__(self, **options: Any) -> None:
-        """Declare the parameters, and begin to load the robot.
+    def __init__(self, planner: Planner | None = None, **options: Any) -> None:
+        """Declare the parameters, and load the robot.
 
         Args:
+            planner: computes the plans; None for that of the parameters.
             options: options of `rclpy.node.Node`.
 
         Raises:
             DeclaredError: a parameter is wrong, or the robot is unknown.
         """
         super().__init__("joulepath", **options)
-        self._parameters = Parameters.declared(self)
-        self._planner: Planner | None = None
-        self._start: JointState | None = None
+        self._parameters = own = Parameters.declared(self)
+        self._planner = planner
+        self.joint_state: JointState | None = None
+        """The last message on `joint_states`; None before the first."""
         self._work: _Work | None = None
         self._pool = ThreadPoolExecutor(1)
         self._trajectories = self.create_publisher(JointTrajectory, "~/trajectory", LATCHED)
@@ -82,7 +89,16 @@ class PlanningNode(Node):
         # waits for the plan: the other callbacks must go on
         alone = MutuallyExclusiveCallbackGroup()
         self.create_service(Trigger, "~/plan", self._on_plan, callback_group=alone)
-        self._load()
+        if planner is None and own.robot and not own.url:
+            self._planner = LocalPlanner(own.robot, own.prefix)
+            self._pool.submit(warm_up, own.robot)
+        elif planner is None and not own.robot:
+            self.create_subscription(String, "robot_description", self._on_description, LATCHED)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the robot's joints without the prefix; empty while no robot is known."""
+        return () if self._planner is None else self._planner.joints
 
     def close(self) -> None:
         """End the plan that is computed, and the node."""
@@ -91,64 +107,42 @@ class PlanningNode(Node):
         self._pool.shutdown()
         self.destroy_node()
 
-    def _load(self) -> None:
-        """The planner of the named robot, or a subscription to its description."""
-        own = self._parameters
-        if own.url:
-            client = Client(own.url, own.api_key or None)
-            self._planner = RemotePlanner(client, own.robot, own.prefix)
-        elif own.robot:
-            self._planner = LocalPlanner(own.robot, own.prefix)
-        else:
-            self.create_subscription(String, "robot_description", self._on_description, LATCHED)
-            return
-        self.get_logger().info(f"Ready to plan for {own.robot}")
-
     def _on_description(self, message: String) -> None:
         own = self._parameters
         try:
             self._planner = LocalPlanner.of_description(own.description(message.data), own.prefix)
         except DeclaredError as error:
+            self.get_logger().error(str(error))
             self._tell(_refused(error))
-            return
-        self.get_logger().info("Ready to plan for the robot in robot_description")
 
     def _on_state(self, message: JointState) -> None:
-        self._start = message
+        self.joint_state = message
 
     def _on_pose(self, message: PoseStamped) -> None:
         pose, own = message.pose, self._parameters
         position, turn = pose.position, pose.orientation
-        self._take(
-            message,
-            lambda: pose_target(
-                "goal_pose",
-                message.header.frame_id,
-                (position.x, position.y, position.z),
-                (turn.x, turn.y, turn.z, turn.w),
-                own.prefix,
-                own.base_frame,
-            ),
+        goal = partial(
+            pose_target,
+            "goal_pose",
+            message.header.frame_id,
+            (position.x, position.y, position.z),
+            (turn.x, turn.y, turn.z, turn.w),
+            own.prefix,
+            own.base_frame,
         )
+        self._begin(_Work(goal, _stamp(message.header.stamp)))
 
     def _on_joints(self, message: JointState) -> None:
-        self._take(message, lambda: {"q": self._positions("goal_joints", message)})
+        def goal() -> Json:
+            return {"q": self._positions("goal_joints", message)}
 
-    def _take(self, message: Any, target: Callable[[], Json]) -> None:
-        """Plan to the goal of a message."""
-        stamp = message.header.stamp
-        try:
-            goal = target()
-        except DeclaredError as error:
-            self._tell(_refused(error) | {"goal_stamp": _stamp(stamp)})
-            return
-        self._begin(goal, _stamp(stamp))
+        self._begin(_Work(goal, _stamp(message.header.stamp)))
 
-    def _begin(self, goal: Json, stamp: Json) -> Future[Json]:
+    def _begin(self, work: _Work) -> Future[Json]:
         """Plan in the other thread; an earlier plan ends."""
         if self._work is not None:
             self._work.stopped.set()
-        self._work = work = _Work(goal, stamp)
+        self._work = work
         return self._pool.submit(self._plan, work)
 
     def _on_plan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -159,7 +153,7 @@ class PlanningNode(Node):
             )
             summary = _refused(error)
         else:
-            summary = self._begin(self._work.goal, self._work.stamp).result()
+            summary = self._begin(_Work(self._work.goal, self._work.stamp)).result()
         response.success = summary["state"] == "planned"
         response.message = json.dumps(summary)
         return response
@@ -191,24 +185,30 @@ class PlanningNode(Node):
     def _planned(self, work: _Work) -> Plan:
         if work.stopped.is_set():
             raise Stopped
+        own = self._parameters
+        if self._planner is None and own.url:
+            # a service may start later than the node
+            self._planner = RemotePlanner(Client(own.url, own.api_key or None), own.robot, own.prefix)
         if self._planner is None:
             raise refusal(
                 ("robot_description",),
                 "No robot is known yet: publish its URDF on robot_description, or set the "
                 "parameter `robot`.",
             )
-        if self._start is None:
+        if self.joint_state is None:
             raise refusal(
                 ("joint_states",),
                 "No joint state has arrived: publish it on joint_states, or remap this topic.",
             )
-        start = {"q": self._positions("joint_states", self._start)}
-        body = self._parameters.request() | {"start": start, "goal": work.goal}
-        return self._planner.plan(body, work.stopped.is_set)
+        ends = {
+            "start": {"q": self._positions("joint_states", self.joint_state)},
+            "goal": work.goal(),
+        }
+        return self._planner.plan(own.request() | ends, work.stopped.is_set)
 
     def _positions(self, topic: str, message: JointState) -> list[float]:
-        joints = () if self._planner is None else self._planner.joints
-        names = JointNames(joints, self._parameters.prefix)
+        """The positions [rad] of the robot's joints; raises InvalidRequest."""
+        names = JointNames(self.joints, self._parameters.prefix)
         return names.positions(topic, message.name, message.position)
 
     def _tell(self, summary: Json) -> None:
