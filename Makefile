@@ -20,6 +20,7 @@ STUDIO := app/static/studio
 STUDIO_SOURCES := $(shell find app/studio -type f -not -path '*/node_modules/*' -not -path '*/.node/*') \
 	examples/optimize/bin_to_shelf.json
 HELP := app/static/help
+ROS2 := build/ros2
 HELP_SOURCES := $(shell find docs examples -type f -not -name '*.pyc') zensical.toml requirements-docs.lock CONTRIBUTING.md \
 	joulepath/__init__.pyi scripts/build_docs.py
 NATIVE := optimizer/native/libjoulepath.so.1
@@ -42,7 +43,7 @@ serve: $(VENV)/.runtime $(VENV)/.package kernels
 
 # what the tests need, side by side; bytecode, since they start many processes, even where those may write none
 ready: $(VENV)/.runtime $(NATIVE)
-	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels
+	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels $(ROS2)/.ready
 	@$(PY) -m compileall -q app optimizer models
 
 # The linters come first: they find in a minute what the tests find later.
@@ -121,6 +122,15 @@ $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
 	@$(INSTALL) $<
 	@touch $@
 
+# The node of ROS 2 is tested in an environment of its own, on top of the other one: a package of rclpy's starts every
+# Python of its environment a second time, with other library paths.
+$(ROS2)/.ready: requirements-ros2.lock $(VENV)/.dev
+	@$(PY) -m venv --clear --without-pip $(ROS2)
+	@$(PY) -c "import sysconfig; print('import site; site.addsitedir(%r)' % sysconfig.get_path('purelib'))" \
+		> "$$($(ROS2)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/below.pth"
+	@$(ROS2)/bin/python scripts/install.py $<
+	@touch $@
+
 # The other planners that the benchmarks compare with, on top of the runtime.
 $(VENV)/.benchmarks: requirements-benchmarks.lock $(VENV)/.runtime
 	@$(INSTALL) $<
@@ -141,8 +151,9 @@ LOCK = $(VENV)/bin/uv pip compile --universal --generate-hashes --no-emit-index-
 # LOCK_ARGS=--upgrade takes the newest versions; without it, versions stay as far as pyproject.toml lets them.
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml --output-file requirements.lock
-	$(LOCK) pyproject.toml --group dev --extra ros2 --constraints requirements.lock \
-		--output-file requirements-dev.lock
+	$(LOCK) pyproject.toml --group dev --constraints requirements.lock --output-file requirements-dev.lock
+	$(LOCK) pyproject.toml --extra ros2 --constraints requirements-dev.lock \
+		--output-file requirements-ros2.lock
 	$(LOCK) pyproject.toml --group benchmarks --constraints requirements-dev.lock \
 		--output-file requirements-benchmarks.lock
 	$(LOCK) pyproject.toml --extra cluster --constraints requirements-dev.lock \

@@ -7,6 +7,7 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -25,11 +26,11 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Skips the long folders where long tests are deselected; None leaves the decision to
-    pytest."""
-    return (
-        True if collection_path in LONG_FOLDERS and config.option.markexpr == "not long" else None
-    )
+    """Skips the long folders where long tests are deselected, and the tests that need rclpy where
+    it is not installed: `test_ros2.py` runs them. None leaves the decision to pytest."""
+    is_long = collection_path in LONG_FOLDERS and config.option.markexpr == "not long"
+    needs_ros = collection_path == TESTS / "ros2" and find_spec("rclpy") is None
+    return True if is_long or needs_ros else None
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -1,4 +1,4 @@
-"""Between the fields of ROS messages and those of `POST /optimize`; needs no installation of ROS."""
+"""Fields of ROS messages as those of `POST /optimize`, without an installation of ROS."""
 
 from __future__ import annotations
 
@@ -72,11 +72,18 @@ class JointNames:
             if prefixes
             else "name all joints of the robot, or choose another `robot`"
         )
-        return f"The joint {joint} is missing; the message has {', '.join(names) or 'none'}: {remedy}."
+        return (
+            f"The joint {joint} is missing; the message has {', '.join(names) or 'none'}: {remedy}."
+        )
 
 
 def pose_target(
-    topic: str, frame_id: str, position: Sequence[float], quaternion: Sequence[float], prefix: str, base_frame: str
+    topic: str,
+    frame_id: str,
+    position: Sequence[float],
+    quaternion: Sequence[float],
+    prefix: str,
+    base_frame: str,
 ) -> Json:
     """The target of a PoseStamped, which is the pose of the TCP.
 

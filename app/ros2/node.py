@@ -188,7 +188,9 @@ class PlanningNode(Node):
         own = self._parameters
         if self._planner is None and own.url:
             # a service may start later than the node
-            self._planner = RemotePlanner(Client(own.url, own.api_key or None), own.robot, own.prefix)
+            self._planner = RemotePlanner(
+                Client(own.url, own.api_key or None), own.robot, own.prefix
+            )
         if self._planner is None:
             raise refusal(
                 ("robot_description",),

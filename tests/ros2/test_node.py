@@ -26,6 +26,8 @@ UR5E = joulepath.load_robot("ur5e")
 JOINTS = list(UR5E.joint_names)
 START = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 GOAL = [0.8, -1.2, 1.3, -1.7, -1.57, 0.3]
+# s: of a goal
+STAMP = 7
 # relative: the same computation on the same machine
 SAME_ENERGY = 1e-9
 # rad
@@ -72,7 +74,9 @@ def test_a_plan_fits_a_joint_trajectory_controller(ur5e: System) -> None:
     # a controller refuses a trajectory that does not end at rest
     assert list(last.velocities) == [0.0] * 6
     assert np.allclose(last.positions, GOAL, rtol=0, atol=REACHED)
-    times = [each.time_from_start.sec + each.time_from_start.nanosec * 1e-9 for each in trajectory.points]
+    times = [
+        each.time_from_start.sec + each.time_from_start.nanosec * 1e-9 for each in trajectory.points
+    ]
     assert np.diff(times).min() > 0 and times[-1] == pytest.approx(summary["duration"], abs=1e-8)
 
 
@@ -80,15 +84,15 @@ def test_the_summary_has_the_figures_of_the_library(ur5e: System) -> None:
     ur5e.stand(left(JOINTS), START)
     summary = ur5e.go_to(left(JOINTS), GOAL)
     ours = joulepath.optimize(
-        joulepath.Problem(
-            start=np.array(START), goal=np.array(GOAL), arm=joulepath.Arm(robot=UR5E)
-        )
+        joulepath.Problem(start=np.array(START), goal=np.array(GOAL), arm=joulepath.Arm(robot=UR5E))
     )
     energy = ours.energy.electrical.total
     assert summary["energy"] == pytest.approx(energy, rel=SAME_ENERGY)
     assert summary["lower_bound"] <= summary["energy"]
     assert max(summary["certificate"]["worst_ratio"].values()) <= 1.0
-    assert min(each["energy"] for each in summary["alternatives"] if each["energy"]) == pytest.approx(energy, rel=SAME_ENERGY)
+    assert min(
+        each["energy"] for each in summary["alternatives"] if each["energy"]
+    ) == pytest.approx(energy, rel=SAME_ENERGY)
     assert ur5e.plan()[1] == summary
 
 
@@ -101,7 +105,9 @@ def test_a_pose_is_reached_in_the_frame_of_its_header(ur5e: System, frame: str, 
     message = stamped(half @ pose, frame)
     count = len(ur5e.trajectories)
     summary = ur5e.ask(lambda: ur5e.poses.publish(message))
-    assert summary["state"] == "planned" and summary["goal_stamp"]["sec"] == message.header.stamp.sec
+    assert (
+        summary["state"] == "planned" and summary["goal_stamp"]["sec"] == message.header.stamp.sec
+    )
     ur5e.until(lambda: len(ur5e.trajectories) > count)
     reached = flange(UR5E, np.array(ur5e.trajectories[-1].points[-1].positions))
     assert np.abs(reached - pose).max() < REACHED
@@ -110,7 +116,7 @@ def test_a_pose_is_reached_in_the_frame_of_its_header(ur5e: System, frame: str, 
 def stamped(T: Array, frame: str) -> PoseStamped:
     """The message of a pose (4, 4)."""
     message, pose = PoseStamped(), as_pose(T)
-    message.header.frame_id, message.header.stamp.sec = frame, 7
+    message.header.frame_id, message.header.stamp.sec = frame, STAMP
     place, turn = message.pose.position, message.pose.orientation
     place.x, place.y, place.z = pose["position"]
     turn.x, turn.y, turn.z, turn.w = pose["quaternion"]
@@ -237,7 +243,10 @@ def test_further_fields_come_from_a_file(tmp_path: Any) -> None:
         summary = own.go_to(JOINTS, GOAL)
         assert summary.get("duration") == 3.0, summary
     file.write_text("goal: {q: [0, 0, 0, 0, 0, 0]}\n")
-    with pytest.raises(InvalidRequest, match="comes from messages"), system(robot="ur5e", request_file=str(file)):
+    with (
+        pytest.raises(InvalidRequest, match="comes from messages"),
+        system(robot="ur5e", request_file=str(file)),
+    ):
         pass
 
 
