@@ -39,6 +39,7 @@ from .optimizer.export.errors import FormatUnsuitable
 from .optimizer.export.export import ExportedFile, export
 from .optimizer.export.franka import FrankaOptions
 from .optimizer.export.krl import KrlOptions
+from .optimizer.export.mcap_recording import McapOptions
 from .optimizer.export.program import Move, Program, Rest
 from .optimizer.export.rapid import RapidOptions
 from .optimizer.export.ros_messages import MoveitOptions, Ros2Options
@@ -218,6 +219,7 @@ __all__ = [
     "LogReading",
     "LogReport",
     "LogTooLarge",
+    "McapOptions",
     "MechanicalEnergy",
     "Mesh",
     "MethodNotApplicable",

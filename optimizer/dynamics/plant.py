@@ -235,10 +235,11 @@ class Plant:
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
         """Samples of a spline motion every `period` [s]; the last sample lies on the end."""
-        duration = spline.duration
-        t = np.append(
-            np.arange(int(np.ceil(duration / period - REPORT.smallest_step))) * period, duration
-        )
+        steps = np.arange(int(np.ceil(spline.duration / period - REPORT.smallest_step)))
+        return self.samples(spline, np.append(steps * period, spline.duration))
+
+    def samples(self, spline: Spline, t: Array) -> Trajectory:
+        """Samples of a spline motion at times t (k,) [s]."""
         q, v, a = sample(spline, t)
         tau = self.torques(q, v, a)
         flow = power_flow(tau, v, a, self.arm.drives, self.friction)

@@ -20,6 +20,7 @@ from joulepath.optimizer.export.formats import FormatName
 from joulepath.optimizer.export.franka import FrankaOptions, to_franka
 from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.krl import KrlOptions, to_krl
+from joulepath.optimizer.export.mcap_recording import McapOptions, to_mcap
 from joulepath.optimizer.export.npz_arrays import to_npz
 from joulepath.optimizer.export.program import Move, Program, program_of_cycle
 from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
@@ -37,6 +38,7 @@ ExportOptions = (
     | RapidOptions
     | KrlOptions
     | TableOptions
+    | McapOptions
 )
 
 
@@ -88,6 +90,9 @@ FORMATS: dict[FormatName, Format] = {
         None,
     ),
     "npz": Format("Arrays for NumPy: samples and splines.", to_npz, TableOptions),
+    "mcap": Format(
+        "A recording of ROS 2 for Foxglove, PlotJuggler and `ros2 bag play`.", to_mcap, McapOptions
+    ),
 }
 """The formats by name."""
 

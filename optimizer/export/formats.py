@@ -4,5 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-FormatName = Literal["urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz"]
+FormatName = Literal[
+    "urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz", "mcap"
+]
 FORMAT_NAMES: tuple[FormatName, ...] = get_args(FormatName)

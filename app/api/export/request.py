@@ -14,6 +14,7 @@ from joulepath.optimizer.export.formats import FormatName
 from joulepath.optimizer.export.ros_messages import Encoding
 
 Period = Annotated[float, Field(ge=1e-4, le=1.0)]
+PREFIX = r"^[A-Za-z0-9_/.-]*$"
 ENCODING = "`yaml` or `json`. Null: `json` if the header `Accept` asks for it, else `yaml`."
 
 
@@ -21,6 +22,19 @@ class TableOptions(Request):
     """Options of `csv` and `npz`."""
 
     period: Period = described("Time between two rows.", "s", 0.004, default=0.008)
+
+
+class McapOptions(TableOptions):
+    """Options of `mcap`."""
+
+    prefix: str = described(
+        "Prefix of all names of joints and links.",
+        None,
+        "left_",
+        default="",
+        max_length=64,
+        pattern=PREFIX,
+    )
 
 
 class UrscriptOptions(Request):
@@ -66,7 +80,7 @@ class MoveitOptions(Request):
         "left_",
         default="",
         max_length=64,
-        pattern=r"^[A-Za-z0-9_/.-]*$",
+        pattern=PREFIX,
     )
 
 
@@ -196,6 +210,7 @@ class ExportRequest(AnswerRequest):
     krl: KrlOptions | None = described(
         "Options of `krl`.", None, {"tolerance": 0.002}, default=None
     )
+    mcap: McapOptions | None = described("Options of `mcap`.", None, {"period": 0.02}, default=None)
 
 
 def option_field(format: FormatName) -> str | None:

@@ -24,6 +24,7 @@ const TITLES: Record<string, [title: string, about: string]> = {
   csv: ["Table, CSV", "Time, joints, speeds: for a spreadsheet."],
   json: ["Splines, JSON", "The curves themselves, for own code."],
   npz: ["Arrays, NPZ", "The samples for numpy."],
+  mcap: ["Recording, MCAP", "For Foxglove, PlotJuggler and ros2 bag play."],
 };
 const MAKERS: Record<string, [RegExp, string]> = {
   urscript: [/^Universal Robots/, "Universal Robots"],
@@ -33,7 +34,7 @@ const MAKERS: Record<string, [RegExp, string]> = {
 };
 
 /** Formats of which a text can be looked at. */
-export const isText = (name: string) => name !== "npz";
+export const isText = (name: string) => !["npz", "mcap"].includes(name);
 
 /** All formats of the service, for a robot. Throws Problem. */
 export async function formatsFor(robot: Robot): Promise<Format[]> {
