@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -38,7 +38,7 @@ DEFAULTS: dict[str, type] = {
     **dict.fromkeys(("int8", "uint8", "int32", "uint32"), int),
 }
 """Values of fields that are not given, by their type."""
-VERSION = 9
+VERSION: Literal[9] = 9
 """Version of the format of recordings; ROS 2 reads it from Jazzy on."""
 
 
@@ -75,8 +75,8 @@ def to_mcap(program: Program, options: McapOptions | None = None) -> WrittenFile
             for t, topic, kind, fields in _messages(program, options):
                 if topic not in topics:
                     topics[topic] = bag.add_connection(topic, kind, typestore=types)
-                content = types.serialize_cdr(_message(types, kind, fields), kind)
-                bag.write(topics[topic], round(t * NANOSECONDS), content)
+                message = types.serialize_cdr(_message(types, kind, fields), kind)
+                bag.write(topics[topic], round(t * NANOSECONDS), message)
         (file,) = place.glob("*.mcap")
         content = file.read_bytes()
     notes = ("/power is recorded while the arm moves, not while it rests",)
@@ -166,7 +166,7 @@ def stamp(t: float) -> Fields:
 def _message(types: Any, kind: str, fields: Fields) -> Any:
     """The message of a type with the given fields; the others are zero or empty."""
     _, known = types.fielddefs[kind]
-    values = {name: _value(types, *of, fields.get(name)) for name, of in known}
+    values = {name: _value(types, node, of, fields.get(name)) for name, (node, of) in known}
     return types.types[kind](**values)
 
 
