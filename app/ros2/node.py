@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -13,16 +12,17 @@ from typing import Any
 import rclpy
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.task import Future as RosFuture
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from joulepath.app.client import Client
+from joulepath.app.engine.result import json_document
 from joulepath.app.http.problems import problem_of
 from joulepath.app.ros2.messages import JointNames, Json, pose_target, refusal, summary_of
 from joulepath.app.ros2.parameters import Parameters
@@ -33,8 +33,6 @@ from joulepath.optimizer.optimize import warm_up
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Late subscribers get the last message, too: that of `robot_description` likewise."""
-THREADS = 3
-"""Threads of the executor: `~/plan` waits in one, the other callbacks go on."""
 
 
 @dataclass(frozen=True)
@@ -86,9 +84,7 @@ class PlanningNode(Node):
         self.create_subscription(PoseStamped, "~/goal_pose", self._on_pose, 10)
         self.create_subscription(JointState, "~/goal_joints", self._on_joints, 10)
         self.create_service(Trigger, "~/cancel", self._on_cancel)
-        # waits for the plan: the other callbacks must go on
-        alone = MutuallyExclusiveCallbackGroup()
-        self.create_service(Trigger, "~/plan", self._on_plan, callback_group=alone)
+        self.create_service(Trigger, "~/plan", self._on_plan)
         if planner is None and own.robot and not own.url:
             self._planner = LocalPlanner(own.robot, own.prefix)
             self._pool.submit(warm_up, own.robot)
@@ -138,14 +134,22 @@ class PlanningNode(Node):
 
         self._begin(_Work(goal, _stamp(message.header.stamp)))
 
-    def _begin(self, work: _Work) -> Future[Json]:
+    def _begin(self, work: _Work) -> RosFuture[Json]:
         """Plan in the other thread; an earlier plan ends."""
         if self._work is not None:
             self._work.stopped.set()
-        self._work = work
-        return self._pool.submit(self._plan, work)
+        self._work, done = work, RosFuture[Json]()
 
-    def _on_plan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        def plan() -> None:
+            done.set_result(self._plan(work))
+            # a callback that awaits the plan goes on with the next turn of the executor
+            if self.executor is not None:
+                self.executor.wake()
+
+        self._pool.submit(plan)
+        return done
+
+    async def _on_plan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._work is None:
             error = refusal(
                 ("goal",),
@@ -153,9 +157,9 @@ class PlanningNode(Node):
             )
             summary = _refused(error)
         else:
-            summary = self._begin(_Work(self._work.goal, self._work.stamp)).result()
+            summary = await self._begin(_Work(self._work.goal, self._work.stamp))
         response.success = summary["state"] == "planned"
-        response.message = json.dumps(summary)
+        response.message = _text(summary)
         return response
 
     def _on_cancel(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -214,7 +218,7 @@ class PlanningNode(Node):
         return names.positions(topic, message.name, message.position)
 
     def _tell(self, summary: Json) -> None:
-        self._summaries.publish(String(data=json.dumps(summary)))
+        self._summaries.publish(String(data=_text(summary)))
 
 
 def _trajectory(fields: Json) -> JointTrajectory:
@@ -236,6 +240,11 @@ def _refused(error: Exception) -> Json:
     return {"state": "refused", "problem": document}
 
 
+def _text(summary: Json) -> str:
+    # problems have data of the library's own classes
+    return json_document(summary).decode()
+
+
 def _stamp(stamp: Any) -> Json:
     return {"sec": stamp.sec, "nanosec": stamp.nanosec}
 
@@ -253,7 +262,7 @@ def main(arguments: list[str]) -> None:
     node = None
     try:
         node = PlanningNode()
-        executor = MultiThreadedExecutor(THREADS)
+        executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):

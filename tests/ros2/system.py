@@ -15,7 +15,7 @@ from typing import Any
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
-from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
@@ -23,7 +23,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from joulepath.app.ros2.node import LATCHED, THREADS, PlanningNode
+from joulepath.app.ros2.node import LATCHED, PlanningNode
 from joulepath.app.ros2.planner import Planner
 
 Json = dict[str, Any]
@@ -117,7 +117,7 @@ def system(planner: Planner | None = None, **parameters: Any) -> Iterator[System
     namespace = f"/tests_{os.getpid()}_{next(_NUMBERS)}"
     values = [Parameter(name, value=value) for name, value in parameters.items()]
     node = PlanningNode(planner, namespace=namespace, context=context, parameter_overrides=values)
-    executor = MultiThreadedExecutor(THREADS, context=context)
+    executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()

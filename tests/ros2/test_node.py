@@ -138,6 +138,8 @@ def test_wrong_messages_are_refused_by_field_and_the_node_goes_on(ur5e: System) 
     pose.pose.position.x = 3.0
     far = ur5e.ask(lambda: ur5e.poses.publish(pose))
     assert far["problem"]["type"] == "/problems/unreachable-pose"
+    collides = ur5e.go_to(left(JOINTS), [0.0, -1.57, 3.1, -1.57, 0.0, 0.0])
+    assert collides["problem"]["type"] == "/problems/goal-in-collision"
     pose.pose.orientation.w = pose.pose.orientation.x = 0.0
     pose.pose.orientation.y = pose.pose.orientation.z = 0.0
     assert ur5e.ask(lambda: ur5e.poses.publish(pose))["state"] == "refused"
