@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
-from joulepath.app.api.shared.static_folder import INDEX, answer
+from joulepath.app.api.shared.static_folder import INDEX, answer, has
 
 router = APIRouter(include_in_schema=False)
 
@@ -20,5 +20,14 @@ async def root() -> RedirectResponse:
 
 @router.get("/help/{path:path}")
 async def page(request: Request, path: str) -> Response:
-    """A page, whose path ends with a slash, or a file of the site."""
-    return answer(request, FOLDER, f"{path}{INDEX}" if path.endswith("/") or not path else path)
+    """A page, whose path ends with a slash, or a file of the site.
+
+    The path of a page without the slash leads to the page: the links of a page are relative to its
+    folder. The target is the last part of the path only, so that it names no other host.
+    """
+    if path.endswith("/") or not path:
+        return answer(request, FOLDER, f"{path}{INDEX}")
+    if has(FOLDER, f"{path}/{INDEX}"):
+        query = f"?{request.url.query}" if request.url.query else ""
+        return RedirectResponse(f"{path.rpartition('/')[2]}/{query}", status_code=307)
+    return answer(request, FOLDER, path)

@@ -72,6 +72,11 @@ def answer(request: Request, folder: str, path: str) -> Response:
     return Response(found.content, media_type=found.media_type, headers=headers)
 
 
+def has(folder: str, path: str) -> bool:
+    """Whether there is a file for browsers at a path below `app/static/FOLDER`."""
+    return path in _files(folder)
+
+
 @cache
 def _files(folder: str) -> dict[str, _File]:
     """Every file of a folder by its path; nothing else can be asked for."""

@@ -59,8 +59,27 @@ def test_pages_and_files_are_served(idle: TestClient, path: str, media_type: str
     assert again.status_code == 304
 
 
+@pytest.mark.parametrize("path", ["how_to", "how_to/pendant_pose", "reference/errors"])
+def test_a_page_without_its_slash_leads_to_the_page(idle: TestClient, path: str) -> None:
+    """Also behind a proxy's path: the target is relative."""
+    answer = idle.get(f"/help/{path}", params={"q": "a"}, follow_redirects=False)
+    assert answer.status_code == 307 and answer.headers["location"] == f"{path.split('/')[-1]}/?q=a"
+    assert idle.get(f"/help/{path}").url.path == f"/help/{path}/"
+
+
 @pytest.mark.parametrize(
-    "path", ["nothing/", "how_to", "sources.txt", "style.digest", "%2e%2e/studio/main.js"]
+    "path",
+    [
+        "nothing/",
+        "nothing",
+        "sources.txt",
+        "style.digest",
+        "%2e%2e/studio/main.js",
+        "how_to/%2e%2e/how_to",
+        "/how_to",
+        "how_to%00",
+        "//example.org/how_to",
+    ],
 )
 def test_nothing_else_is_served(idle: TestClient, path: str) -> None:
     refused(idle.get(f"/help/{path}"), NotFound)
