@@ -95,18 +95,18 @@ from .optimizer.problem.targets import AnyOf, SampledPoses
 from .optimizer.problem.tool import Tool, load_tool
 from .optimizer.problem.tool_cone import ToolCone
 from .optimizer.problem.tool_path import ToolPath
-from .optimizer.progress import CandidatesFound, CandidateTried, Improved
+from .optimizer.progress import CandidatesFound, CandidateTried, Improved, StepsDone
 from .optimizer.replay.outcome import Outcome
 from .optimizer.replay.planned import PlannedBaseline, PlannedMotion, PlannedTorques
 from .optimizer.replay.play import Contact
-from .optimizer.replay.replay import (
+from .optimizer.replay.replay import replay
+from .optimizer.replay.replay_result import (
     AsPlanned,
     Replay,
     ReplayedChange,
     ReplayedRun,
     SavingRange,
     SimulatedSaving,
-    replay,
 )
 from .optimizer.result.baseline import Baseline
 from .optimizer.result.candidates import CandidateReport, CandidateStatus, UnreachableTarget
@@ -270,6 +270,7 @@ __all__ = [
     "Sphere",
     "Spline",
     "StartInCollision",
+    "StepsDone",
     "Stop",
     "StopInCollision",
     "StopPath",

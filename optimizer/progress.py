@@ -1,12 +1,16 @@
-"""Progress of a search: number and outcomes of its candidates, and the best answer so far."""
+"""Progress of a search: number and outcomes of its candidates, and the best answer so far; and of
+other computations: number of their steps.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 from joulepath.models.robot import Array
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -50,12 +54,54 @@ class Improved:
     q_goal: Array | None = None
 
 
+@dataclass(frozen=True)
+class StepsDone:
+    """Steps of a computation without a search.
+
+    Attributes:
+        done: number of steps that are done; for a motion in time, its part that is done [s].
+        total: number of all steps; None if unknown.
+        name: what a step is, in the plural.
+    """
+
+    done: float
+    total: float | None
+    name: str
+
+
 Event = CandidatesFound | CandidateTried | Improved
 Tell = Callable[[Event], None]
+TellSteps = Callable[[StepsDone], None]
 
 
-def no_listener(event: Event) -> None:
+def no_listener(event: Event | StepsDone) -> None:
     """No-op listener."""
+
+
+class Steps:
+    """Counts the steps of a computation, and tells of each.
+
+    Args:
+        name: what a step is, in the plural.
+        total: number of all steps; None if unknown.
+        tell: listener.
+    """
+
+    def __init__(self, name: str, total: float | None, tell: TellSteps) -> None:
+        self._name, self._total, self._tell = name, total, tell
+        self._done = 0.0
+        self.add(0.0)
+
+    def add(self, steps: float = 1.0) -> None:
+        """Count steps as done."""
+        self._done += steps
+        self._tell(StepsDone(self._done, self._total, self._name))
+
+    def each(self, items: Iterable[T]) -> Iterator[T]:
+        """Yield items, each of which is a step; it is done when the next one is asked for."""
+        for item in items:
+            yield item
+            self.add()
 
 
 class NewsFilter:

@@ -19,7 +19,9 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.problem import Problem, narrowed
+from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
 from joulepath.optimizer.result.solution import Solution
@@ -60,7 +62,13 @@ class WhatIf:
 
 
 @one_thread()
-def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_counter) -> WhatIf:
+def what_if(
+    solution: Solution,
+    problem: Problem,
+    clock: Clock = time.perf_counter,
+    tell: Tell = no_listener,
+    progress: bool = True,
+) -> WhatIf:
     """Compare a motion with the best one of a changed arm.
 
     The changed problem is solved on its own. If the known motion is feasible on the changed arm and
@@ -73,6 +81,9 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
         problem: the problem with the change, as by `dataclasses.replace(problem, arm=…)`, of an arm
             with as many joints. Its `deadline` holds for the whole comparison.
         clock: function that returns the time [s].
+        tell: gets the progress of the search for the changed arm.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         Energy of the known motion on the changed arm, and the best motion of this arm.
@@ -97,7 +108,8 @@ def what_if(solution: Solution, problem: Problem, clock: Clock = time.perf_count
     try:
         time_left = deadline.left - WHAT_IF.kept_share * problem.deadline
         left = replace(problem, deadline=max(time_left, WHAT_IF.least_time))
-        found = optimize(left, clock, progress=False)
+        with progress_bar("Optimising the changed arm", tell, progress) as tell:
+            found = optimize(left, clock, tell, progress=False)
     except JoulepathError as error:
         failure = error
     same, objective = energy.of(problem.objective), problem.objective

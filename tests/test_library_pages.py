@@ -6,10 +6,12 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+import joulepath as package
 from joulepath.app.cli.main import joulepath
 
 ROOT = Path(__file__).parents[1]
@@ -48,6 +50,21 @@ def test_the_command_line_page(tmp_path: Path) -> None:
     written = {file.name for file in tmp_path.iterdir()}
     named = set(re.findall(r"--(?:output|answers) (\S+)", "\n".join(found)))
     assert written == named
+
+
+def test_the_reference_has_every_public_name() -> None:
+    """By the module that `joulepath` takes it from; errors have a page of their own."""
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    shown = [path.rpartition(".") for path in re.findall(r"^::: (\S+)$", text, re.MULTILINE)]
+    named = {name for *_, name in shown}
+    assert len(named) == len(shown)
+    public = {name: getattr(package, name) for name in package.__all__}
+    errors = {
+        name for name, own in public.items() if isinstance(own, type) and issubclass(own, Exception)
+    }
+    assert named == public.keys() - errors
+    for module, _, name in shown:
+        assert getattr(import_module(module), name) is public[name]
 
 
 def test_the_command_line_page_names_every_command() -> None:

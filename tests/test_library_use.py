@@ -176,6 +176,7 @@ TYPES = {
     "Spline",
     "Stop",
     "StopPath",
+    "StepsDone",
     "StorageUse",
     "TableOptions",
     "Tool",

@@ -108,7 +108,7 @@ def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadlin
     # in the form of the query of POST /evaluate: JSON values
     query = {name: orjson.dumps(value).decode() for name, value in fields.items()}
     request_id = new_id()
-    with terminal.progress(f"Evaluating for at most {deadline:g} s"):
+    with terminal.steps(f"Evaluating for at most {deadline:g} s"):
         return answered(
             EvaluateTask(file, kind, query, wanted, request_id, deadline), deadline, request_id
         )

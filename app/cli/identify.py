@@ -146,7 +146,7 @@ def identify(
     body |= {"friction": {"terms": list(terms)}}
     body |= {"validate": [FILE_ID] * len(others)} if others else {}
     asked = validated(IdentifyRequest, _json(body), request_id)
-    with terminal.progress(f"Identifying from {len(logs)} logs"):
+    with terminal.steps(f"Identifying from {len(logs)} log{'s' if len(logs) > 1 else ''}"):
         answer = _answered(asked, read, request_id)
     write(answer, output)
     terminal.summary(lambda: summary_of(parsed(answer)))

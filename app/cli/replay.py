@@ -78,7 +78,7 @@ def replay(
         body["arm"] = _json(arm.read_bytes(), "--arm")
     request_id, deadline = new_id(), options["deadline"]
     request = validated(ReplayRequest, orjson.dumps(body), request_id)
-    with terminal.progress(f"Replaying for at most {deadline:g} s"):
+    with terminal.steps(f"Replaying for at most {deadline:g} s"):
         found = answered(ReplayTask(request, request_id), deadline, request_id)
     write(found, output)
     terminal.summary(lambda: summary_of(parsed(found)))

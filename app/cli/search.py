@@ -71,12 +71,7 @@ def search(
     timed: _Timed = request
     with terminal.progress("Loading the compiled kernel of the robot"):
         compile_kernel_of(robot_in(request))
-    # imported late: `joulepath --help` needs none of them
-    from joulepath.app.engine.listening import listening
-    from joulepath.optimizer.presentation.progress_bar import progress_bar
-
-    title = f"Optimising for at most {timed.deadline:g} s"
-    with progress_bar(title, delay=0.0) as tell, listening(tell):
+    with terminal.steps(f"Optimising for at most {timed.deadline:g} s"):
         result = result_of(task(request, request_id), timed.deadline, request_id)
     if result.kept_as is not None:
         result = result.not_kept()

@@ -27,6 +27,18 @@ def progress(description: str) -> Iterator[None]:
 
 
 @contextmanager
+def steps(title: str) -> Iterator[None]:
+    """Shows a bar with the events or steps of the task in the body, if standard error is a
+    terminal."""
+    # imported late: `joulepath --help` needs none of them
+    from joulepath.app.engine.listening import listening
+    from joulepath.optimizer.presentation.progress_bar import progress_bar
+
+    with progress_bar(title, delay=0.0) as tell, listening(tell):
+        yield
+
+
+@contextmanager
 def fraction(description: str) -> Iterator[Callable[[float], object]]:
     """Shows a bar while the body runs, if standard error is a terminal.
 

@@ -8,7 +8,7 @@ from joulepath.optimizer.evaluate.evaluation import Evaluation
 from joulepath.optimizer.problem.arm import PAYLOAD, TOOL
 from joulepath.optimizer.replay.outcome import Outcome
 from joulepath.optimizer.replay.planned import PlannedMotion
-from joulepath.optimizer.replay.replay import Replay
+from joulepath.optimizer.replay.replay_result import Replay
 from joulepath.optimizer.replay.shapes import unsimulated
 from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.result.solution import Solution

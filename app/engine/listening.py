@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import Any
 
-from joulepath.optimizer.progress import Tell, no_listener
+from joulepath.optimizer.progress import no_listener
 
-_tell: ContextVar[Tell] = ContextVar("tell", default=no_listener)
+Listener = Callable[[Any], None]
+"""Gets the events of a search, or the steps of another computation."""
+_tell: ContextVar[Listener] = ContextVar("tell", default=no_listener)
 
 
 @contextmanager
-def listening(tell: Tell) -> Iterator[None]:
+def listening(tell: Listener) -> Iterator[None]:
     """A context in which `tell` receives the events of tasks."""
     before = _tell.set(tell)
     try:
@@ -21,6 +24,6 @@ def listening(tell: Tell) -> Iterator[None]:
         _tell.reset(before)
 
 
-def listener() -> Tell:
+def listener() -> Listener:
     """The listener of the running task."""
     return _tell.get()

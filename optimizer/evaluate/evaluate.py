@@ -32,13 +32,15 @@ from joulepath.optimizer.evaluate.piecewise_motion import (
     PiecewiseMotion,
     piecewise_motion,
 )
-from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, Waypoints
 from joulepath.optimizer.evaluate.sampler import Sampler
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.quadrature import lobatto_panels
 from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 from joulepath.optimizer.result.energy import (
     Energy,
     Sensitivity,
@@ -68,6 +70,8 @@ def evaluate(
     sample_period: float | None = None,
     deadline: float = np.inf,
     clock: Clock = time.perf_counter,
+    tell: TellSteps = no_listener,
+    progress: bool = True,
 ) -> Evaluation:
     """Compute the energy of a given motion, and its use of every limit of the arm.
 
@@ -81,6 +85,9 @@ def evaluate(
         sample_period: period of the samples in the result [s]; None for no samples.
         deadline: wall time after which the computation is given up [s].
         clock: function for the current time [s].
+        tell: gets the progress, in seconds of the motion.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         Energy of the whole motion and of each segment [J], the largest use of each limit, and the
@@ -95,13 +102,20 @@ def evaluate(
     given = motion.trajectory.spline if isinstance(motion, Solution) else motion
     evaluator = _Evaluator(arm, given, sample_period)
     try:
-        with watch(end):
+        with watch(end), progress_bar("Evaluating", tell, progress) as tell:
+            steps = Steps("s of the motion", _duration(given), tell)
             for block in piecewise_motion(arm, given):
                 checkpoint()
                 evaluator.update(block)
+                steps.add(float(np.ptp(block.breakpoints)))
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
     return evaluator.finish()
+
+
+def _duration(motion: Motion) -> float | None:
+    """Duration of a motion [s]; None if it is not known before the motion is read."""
+    return float(motion.times.sum()) if isinstance(motion, Waypoints) else motion.duration
 
 
 @dataclass(frozen=True)

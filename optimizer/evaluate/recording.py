@@ -178,6 +178,13 @@ class Recording:
         """Number of segments."""
         return len(self.edges) + 1
 
+    @property
+    def duration(self) -> float | None:
+        """Time from the first row to the last [s]; None if the rows are read from a stream."""
+        if not isinstance(self.blocks, list) or not self.blocks:
+            return None
+        return float(self.blocks[-1].t[-1] - self.blocks[0].t[0])
+
     def checked(self, arm: Arm) -> Iterator[RecordedRows]:
         """Checked blocks, with times since the first row.
 

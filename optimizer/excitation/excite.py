@@ -40,6 +40,7 @@ from joulepath.optimizer.motion.spline import Spline, retimed
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import HalfSpace, Obstacle, Scene
+from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import Energy
 
@@ -78,11 +79,12 @@ EXCITATION = ExcitationSettings()
 
 
 @one_thread()
-def excite(problem: ExcitationProblem) -> Excitation:
+def excite(problem: ExcitationProblem, tell: TellSteps = no_listener) -> Excitation:
     """Find an excitation from several random starts.
 
     Args:
         problem: the request.
+        tell: gets the progress, in starts.
 
     Returns:
         The best motion of all starts completed before the deadline.
@@ -96,9 +98,11 @@ def excite(problem: ExcitationProblem) -> Excitation:
     best: Excitation | None = None
     done = feasible = 0
     limit: str | None = None
-    while done < problem.starts and not deadline.passed:
-        coordinates = design.start(done)
-        part = EXCITATION.search_share * deadline.left / (problem.starts - done)
+    for start in Steps("starts", problem.starts, tell).each(range(problem.starts)):
+        if deadline.passed:
+            break
+        coordinates = design.start(start)
+        part = EXCITATION.search_share * deadline.left / (problem.starts - start)
         done += 1
         if coordinates is None:
             limit = "clearance"

@@ -46,7 +46,9 @@ from joulepath.optimizer.identify.results import (
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.identify.rows.split import held_out_masks
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,12 @@ class Identification:
 
 @one_thread()
 def identify(
-    robot: Robot, logs: Sequence[Log], options: IdentificationOptions | None = None
+    robot: Robot,
+    logs: Sequence[Log],
+    options: IdentificationOptions | None = None,
+    *,
+    tell: TellSteps = no_listener,
+    progress: bool = True,
 ) -> Identification:
     """Identify an arm's own figures from logs of its motions.
 
@@ -128,6 +135,9 @@ def identify(
         logs: logs of one arm, at least one, as read by `read_log`; with a requested payload, the
             last log is the one with the payload.
         options: requested figures, method and held-out share.
+        tell: gets the progress, in fits: those without held-out moves, and the last to all moves.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         The figures with their standard deviations, their validation, and advice for further logs.
@@ -142,13 +152,24 @@ def identify(
         NothingHeldOut: the logs have fewer than two different motions.
     """
     logs, options = prepare(logs, options or IdentificationOptions())
+    with progress_bar("Identifying", tell, progress) as tell:
+        return _identified(robot, logs, options, tell)
+
+
+def _identified(
+    robot: Robot, logs: Sequence[Log], options: IdentificationOptions, tell: TellSteps
+) -> Identification:
+    """The identification from prepared logs."""
     last = len(logs) - 1
     rows = _rows(robot, logs, options)
     check_logs(robot, rows, logs, options)
-    validation, held_out = _validation(robot, rows, options, last)
+    masks = held_out_masks(rows, options.held_out) if options.held_out else []
+    steps = Steps("fits", len(masks) + 1, tell)
+    validation, held_out = _validation(robot, rows, options, masks, last, steps)
     payload = _payload(robot, rows, options, last)
     rows = rows if payload is None else with_payload(rows, payload)
     fitted = fit_by_method(robot, rows, options)
+    steps.add()
     parameters = parameters_of(robot, fitted.estimate, options)
     if payload is not None:
         parameters += payload.parameters(logs[-1].payload)
@@ -175,13 +196,17 @@ def identify(
 
 
 def _validation(
-    robot: Robot, rows: Rows, options: IdentificationOptions, last: int
+    robot: Robot,
+    rows: Rows,
+    options: IdentificationOptions,
+    masks: Sequence[Mask],
+    last: int,
+    steps: Steps,
 ) -> tuple[Validation | None, Mask]:
-    """Validation by held-out moves, if any are requested, and the held-out rows (n,)."""
-    if not options.held_out:
+    """Validation by the held-out moves of each mask, if any, and all held-out rows (n,)."""
+    if not masks:
         return None, np.zeros(len(rows.q), dtype=bool)
-    masks = held_out_masks(rows, options.held_out)
-    folds = [_fold(robot, rows, mask, options, last) for mask in masks]
+    folds = [_fold(robot, rows, mask, options, last) for mask in steps.each(masks)]
     return validate(robot, folds, options.velocity_threshold), np.any(masks, axis=0)
 
 

@@ -1,20 +1,20 @@
-"""A bar with the progress of a search, on a terminal or in a notebook."""
+"""A bar with the progress of a computation, on a terminal or in a notebook."""
 
 from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from joulepath.optimizer.progress import (
     CandidatesFound,
     CandidateTried,
     Event,
-    Tell,
+    StepsDone,
     no_listener,
 )
 
@@ -27,9 +27,9 @@ class ProgressBarSettings:
     """Settings of progress bars."""
 
     delay: float = 1.0
-    """Time before a bar appears [s]: most searches have ended by then."""
+    """Time before a bar appears [s]: most computations have ended by then."""
     refreshes: float = 4.0
-    """Redraws per second; each takes the search about 1 ms."""
+    """Redraws per second; each takes the computation about 1 ms."""
 
 
 PROGRESS_BAR = ProgressBarSettings()
@@ -37,9 +37,12 @@ PROGRESS_BAR = ProgressBarSettings()
 
 @contextmanager
 def progress_bar(
-    title: str, tell: Tell = no_listener, wanted: bool = True, delay: float = PROGRESS_BAR.delay
-) -> Iterator[Tell]:
-    """Show the progress of the search in the body, if somebody looks and nobody else listens.
+    title: str,
+    tell: Callable[[Any], None] = no_listener,
+    wanted: bool = True,
+    delay: float = PROGRESS_BAR.delay,
+) -> Iterator[Callable[[Any], None]]:
+    """Show the progress of the body, if somebody looks and nobody else listens.
 
     Args:
         title: what is computed.
@@ -48,7 +51,7 @@ def progress_bar(
         delay: time before the bar appears [s].
 
     Yields:
-        The listener for the search.
+        The listener for the computation: for the events of a search, or for its steps.
     """
     if not wanted or tell is not no_listener or not _is_looked_at():
         yield tell
@@ -78,15 +81,23 @@ def progress_bar(
 
 
 class _Bar:
-    """The listener that draws: candidates, energy, and the gap to its lower bound."""
+    """The listener that draws: candidates, energy, and the gap to its lower bound; or steps."""
 
     def __init__(self, shown: Progress, title: str) -> None:
         self._shown, self._title, self._tried = shown, title, 0
         self._task = shown.add_task(title, total=None)
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, event: Event | StepsDone) -> None:
         """Draw an event."""
-        if isinstance(event, CandidatesFound):
+        if isinstance(event, StepsDone):
+            text = f"{event.done:.4g}" + ("" if event.total is None else f" of {event.total:.4g}")
+            self._shown.update(
+                self._task,
+                total=event.total,
+                completed=event.done,
+                description=f"{self._title}: {text} {event.name}",
+            )
+        elif isinstance(event, CandidatesFound):
             self._shown.update(self._task, total=event.total)
         elif isinstance(event, CandidateTried):
             self._tried += 1

@@ -23,7 +23,7 @@ class ConeOrientedPose:
         position: position of the TCP in the base frame, shape (3,) [m].
         axis: axis of the tool in the TCP frame, shape (3,).
         direction: axis of the cone in the base frame, shape (3,).
-        half_angle: half angle of the cone, in [0, pi] [rad].
+        half_angle: half angle of the cone, from 0 to pi [rad].
 
     Raises:
         InvalidProblem: a vector is zero, or the angle out of range.

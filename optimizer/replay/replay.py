@@ -5,131 +5,38 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, Literal, overload
+from typing import overload
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from joulepath.optimizer.declared import Internal, Joules, NotEmpty, PerJoint, Ratio, Seconds, Unit
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 from joulepath.optimizer.replay.controller import ControlName, command, gains
 from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.outcome import Outcome, outcome, played_energy
 from joulepath.optimizer.replay.planned import PlannedMotion
 from joulepath.optimizer.replay.play import Played, play
 from joulepath.optimizer.replay.reference import Reference, reference
+from joulepath.optimizer.replay.replay_result import (
+    AsPlanned,
+    Quantity,
+    Replay,
+    ReplayedChange,
+    ReplayedRun,
+    SavingRange,
+    SimulatedSaving,
+)
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import saving
-
-Quantity = Literal["payload", "friction"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReplayedRun(Outcome):
-    """The motion under one controller."""
-
-    control: ControlName
-    """The controller."""
-
-
-@dataclass(frozen=True)
-class SimulatedSaving:
-    """Saving of the motion against a baseline."""
-
-    name: BaselineName
-    """Name of the baseline."""
-    saving: Ratio
-    """1 - energy of the motion / energy of the baseline, both simulated."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReplayedChange(Outcome):
-    """The motion on a changed arm, under the first controller, which does not know the change."""
-
-    quantity: Quantity
-    """Changed quantity."""
-    factor: Ratio
-    """Factor on the quantity."""
-    savings: list[SimulatedSaving]
-    """Savings on this arm, against every baseline on this arm."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SavingRange:
-    """Saving of the answer against a baseline, as planned and as simulated."""
-
-    name: BaselineName
-    """Name of the baseline."""
-    planned: Ratio
-    """Saving in the answer."""
-    simulated: Ratio
-    """Saving on the unchanged arm."""
-    least: Ratio
-    """Smallest saving over the unchanged and all changed arms."""
-    most: Ratio
-    """Largest saving over these."""
-    persists: bool | None = field(init=False)
-    """Whether `least` is above zero; null if nothing is saved as planned."""
-    range: Ratio = field(init=False)
-    """`most` - `least`, in percentage points."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "persists", self.least > 0 if self.planned > 0 else None)
-        object.__setattr__(self, "range", 100 * (self.most - self.least))
-
-
-@dataclass(frozen=True)
-class AsPlanned:
-    """Energy of the motion in the answer, without waiting at the goal, and the use of its torque
-    limits.
-    """
-
-    electrical: Joules
-    """Energy drawn from the supply."""
-    mechanical: Joules
-    """Mechanical work."""
-    limit_ratio: Annotated[PerJoint, Unit("1")]
-    """Largest torque / limit as planned, per joint."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Replay:
-    """A motion, planned and simulated."""
-
-    step: Annotated[Seconds, Internal]
-    """Step of the simulation."""
-    duration: Seconds
-    """Duration of the motion."""
-    planned: AsPlanned
-    """Energies and torques in the answer."""
-    torque_error: Ratio | None
-    """Largest difference of MuJoCo's torques from the torques of the answer's samples / limit; null
-    without samples."""
-    runs: Annotated[list[ReplayedRun], NotEmpty]
-    """The motion under each controller."""
-    changes: list[ReplayedChange]
-    """The motion on changed arms; empty without `perturb`."""
-    savings: list[SavingRange]
-    """Savings against each baseline; empty without `perturb`."""
-
-    def under(self, control: ControlName) -> ReplayedRun:
-        """The run under a controller.
-
-        Raises:
-            LookupError: the controller was not requested.
-        """
-        for run in self.runs:
-            if run.control == control:
-                return run
-        raise LookupError(control)
 
 
 @overload
@@ -142,6 +49,8 @@ def replay(
     clock: Clock = ...,
     *,
     problem: Problem,
+    tell: TellSteps = ...,
+    progress: bool = ...,
 ) -> Replay: ...
 @overload
 def replay(
@@ -151,6 +60,9 @@ def replay(
     perturb: Mapping[Quantity, float] | None = ...,
     deadline: float = ...,
     clock: Clock = ...,
+    *,
+    tell: TellSteps = ...,
+    progress: bool = ...,
 ) -> Replay: ...
 @overload
 def replay(
@@ -160,6 +72,9 @@ def replay(
     perturb: Mapping[Quantity, float] | None = ...,
     deadline: float = ...,
     clock: Clock = ...,
+    *,
+    tell: TellSteps = ...,
+    progress: bool = ...,
 ) -> list[Replay]: ...
 @one_thread()
 def replay(
@@ -171,6 +86,8 @@ def replay(
     clock: Clock = time.perf_counter,
     *,
     problem: Problem | None = None,
+    tell: TellSteps = no_listener,
+    progress: bool = True,
 ) -> Replay | list[Replay]:
     """Simulate a motion in MuJoCo under controllers, and on arms that differ from the planned arm.
 
@@ -185,6 +102,9 @@ def replay(
         deadline: wall time after which the replay is given up [s].
         clock: function for the current time [s].
         problem: problem of a `Solution`, which contains its arm; other motions contain theirs.
+        tell: gets the progress, in simulated motions; of a cycle, in its moves.
+        progress: whether a bar may show the progress, on a terminal or in a notebook, unless
+            `tell` is given.
 
     Returns:
         Deviations, torques, contacts and energy under each controller and of each change, and the
@@ -196,54 +116,88 @@ def replay(
         DeadlineExceeded: the deadline passed first.
     """
     try:
-        with watch(Deadline.after(deadline, clock)):
-            found = [
-                _Replayer(each, step).replay(controls, perturb or {})
-                for each in _planned(motion, problem)
-            ]
+        with (
+            watch(Deadline.after(deadline, clock)),
+            progress_bar("Replaying", tell, progress) as tell,
+        ):
+            if isinstance(motion, CycleSolution):
+                return _replayed_moves(motion, controls, step, perturb or {}, tell)
+            planned = _planned(motion, problem)
+            return _Replayer(planned, step, controls, perturb or {}, tell).replay()
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
-    return found if isinstance(motion, CycleSolution) else found[0]
 
 
-def _planned(
-    motion: Solution | CycleSolution | PlannedMotion, problem: Problem | None
-) -> Iterator[PlannedMotion]:
-    if isinstance(motion, CycleSolution):
-        for move in motion.moves:
-            yield planned_motion(move.solution, move.planned.arm, motion.objective)
-    elif isinstance(motion, PlannedMotion):
-        yield motion
-    elif problem is None:
+def _replayed_moves(
+    cycle: CycleSolution,
+    controls: Sequence[ControlName],
+    step: float,
+    perturb: Mapping[Quantity, float],
+    tell: TellSteps,
+) -> list[Replay]:
+    """The replays of all moves of a cycle."""
+    steps, found = Steps("moves", len(cycle.moves), tell), list[Replay]()
+    for move in steps.each(cycle.moves):
+        planned = planned_motion(move.solution, move.planned.arm, cycle.objective)
+        found.append(_Replayer(planned, step, controls, perturb, no_listener).replay())
+    return found
+
+
+def _planned(motion: Solution | PlannedMotion, problem: Problem | None) -> PlannedMotion:
+    if isinstance(motion, PlannedMotion):
+        return motion
+    if problem is None:
         raise InvalidProblem(
             "problem", "A solution does not name its arm: give the problem that it solves."
         )
-    else:
-        yield planned_motion(motion, problem.arm, problem.objective)
+    return planned_motion(motion, problem.arm, problem.objective)
+
+
+def _factors(
+    planned: PlannedMotion, perturb: Mapping[Quantity, float]
+) -> Iterator[tuple[Quantity, float]]:
+    """Changes of the arm: the changed quantity, and the factor on it."""
+    for quantity, fraction in perturb.items():
+        if quantity == "payload" and planned.arm.payload.mass == 0:
+            continue
+        yield quantity, 1 - fraction
+        yield quantity, 1 + fraction
 
 
 class _Replayer:
     """Simulation of one planned motion with one simulated arm."""
 
-    def __init__(self, planned: PlannedMotion, step: float) -> None:
+    def __init__(
+        self,
+        planned: PlannedMotion,
+        step: float,
+        controls: Sequence[ControlName],
+        perturb: Mapping[Quantity, float],
+        tell: TellSteps,
+    ) -> None:
         self._planned, self._step, self._plant = planned, step, Plant(planned.arm)
+        self._controls = list(dict.fromkeys(controls))
+        self._factors = [*_factors(planned, perturb)]
+        self._compares = bool(perturb)
+        compared = len(planned.baselines) if self._compares else 0
+        changes = len(self._factors)
+        total = len(self._controls) + changes + (1 + changes) * compared
+        self._steps = Steps("motions", total, tell)
         self._motion = reference(planned.course, planned.duration, step)
         checkpoint()
         self._simulated = SimulatedArm(planned.arm)
         self._loop = gains(self._plant, self._motion.q[0], self._motion.step)
 
-    def replay(self, controls: Sequence[ControlName], perturb: Mapping[Quantity, float]) -> Replay:
-        """The replay under given controllers."""
+    def replay(self) -> Replay:
+        """The replay under all controllers, then of all changes under the first."""
         torque_error, planned = self._torque_error(), self._planned
         runs = [
             ReplayedRun.extended(self._outcome(control), control=control)
-            for control in dict.fromkeys(controls)
+            for control in self._controls
         ]
-        first = controls[0]
-        simulated = self._savings(runs[0], first) if perturb else {}
-        changes = [
-            self._changed(quantity, factor, first) for quantity, factor in self._factors(perturb)
-        ]
+        first = self._controls[0]
+        simulated = self._savings(runs[0], first) if self._compares else {}
+        changes = [self._changed(quantity, factor, first) for quantity, factor in self._factors]
         self._simulated.use_figures(planned.arm)
         return Replay(
             step=self._motion.step,
@@ -259,13 +213,6 @@ class _Replayer:
         arm, motion = self._planned.arm, self._motion
         tau = self._plant.limited_torques(motion.q, motion.v, motion.a)
         return np.asarray(np.abs(tau).max(axis=0) / arm.active_limits.tau_max)
-
-    def _factors(self, perturb: Mapping[Quantity, float]) -> Iterator[tuple[Quantity, float]]:
-        for quantity, fraction in perturb.items():
-            if quantity == "payload" and self._planned.arm.payload.mass == 0:
-                continue
-            yield quantity, 1 - fraction
-            yield quantity, 1 + fraction
 
     def _changed(self, quantity: Quantity, factor: float, control: ControlName) -> ReplayedChange:
         self._simulated.use_figures(with_changes(self._planned.arm, **{quantity: factor}))
@@ -286,6 +233,7 @@ class _Replayer:
         checkpoint()
         played = play(self._simulated, motion, command(self._plant, motion, control, self._loop))
         checkpoint()
+        self._steps.add()
         return played
 
     def _savings(self, ours: Outcome, control: ControlName) -> dict[BaselineName, float]:

@@ -24,6 +24,15 @@ with progress_bar("Searching", delay={delay}) as tell:
     time.sleep({lasts})
 print("done")
 """  # noqa: E501
+STEPS = """
+from joulepath.optimizer.presentation.progress_bar import progress_bar
+from joulepath.optimizer.progress import Steps
+import time
+with progress_bar("Fitting", delay=0.0) as tell:
+    steps = Steps("fits", {total}, tell)
+    time.sleep(0.3)
+    steps.add(12)
+"""
 TWO_SEARCHES = """
 import threading, time
 from joulepath.optimizer.presentation.progress_bar import progress_bar
@@ -50,6 +59,14 @@ def test_a_terminal_shows_energy_and_gap_and_no_trace_is_left() -> None:
     text = shown(delay=0.0, lasts=0.6)
     assert "Searching: 60 J, gap 16.7%" in text
     assert text.endswith("done\n")
+
+
+@pytest.mark.parametrize(
+    ("total", "told"), [(66, "Fitting: 12 of 66 fits"), (None, "Fitting: 12 fits")]
+)
+def test_a_terminal_shows_the_steps_of_a_computation(total: int | None, told: str) -> None:
+    script = STEPS.format(total=total)
+    assert told in shown(delay=0.0, lasts=0.0, script=script.replace("{", "{{").replace("}", "}}"))
 
 
 def test_a_short_search_shows_nothing() -> None:

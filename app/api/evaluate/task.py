@@ -25,6 +25,7 @@ from joulepath.app.convert.query import query_values
 from joulepath.app.convert.recorded import as_logged, read_csv, reading_of, told_by
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import sampled_warnings
+from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.http.problems import invalid_request
@@ -35,10 +36,12 @@ from joulepath.optimizer.declared import Ratio
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.evaluation import EvaluatedMotion, Evaluation
 from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
+from joulepath.optimizer.evaluate.piecewise_motion import Motion
 from joulepath.optimizer.evaluate.recording import Recording, Waypoints
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.reading import LogReading
 from joulepath.optimizer.identify.logs.recorded import MeasuredEnergy, measured
+from joulepath.optimizer.problem.arm import Arm
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 
@@ -168,7 +171,7 @@ class EvaluateTask:
                     except InvalidTable as error:
                         return self._evaluate_log(settings, end, error)
                     motion = _csv_motion(settings, table)
-                return Evaluated(settings, evaluate(arm, motion, settings.sample_period, end.left))
+                return Evaluated(settings, _evaluation(arm, motion, settings, end))
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
 
@@ -206,15 +209,20 @@ def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluated:
         return _evaluated_log(as_logged(request), reading, end)
     with until(end):
         arm, motion = to_arm(request), to_motion(request)
-    return Evaluated(request, evaluate(arm, motion, request.sample_period, end.left))
+    return Evaluated(request, _evaluation(arm, motion, request, end))
 
 
 def _evaluated_log(asked: EvaluateSettings, reading: LogReading, end: Deadline) -> Evaluated:
     """The evaluation of the motion of a log until about `end`, with measured energies."""
     with until(end):
         arm = to_arm(asked)
-    result = evaluate(arm, reading.log.recording(), asked.sample_period, end.left)
+    result = _evaluation(arm, reading.log.recording(), asked, end)
     return Evaluated(asked, result, measured(reading.log, arm), reading.report.warnings)
+
+
+def _evaluation(arm: Arm, motion: Motion, asked: EvaluateSettings, end: Deadline) -> Evaluation:
+    """The evaluation of a motion until about `end`, whose progress the task's listener gets."""
+    return evaluate(arm, motion, asked.sample_period, end.left, tell=listener(), progress=False)
 
 
 def _csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:

@@ -14,6 +14,7 @@ from joulepath.app.answers.envelope import MotionAnswer
 from joulepath.app.convert.arm import to_arm
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.until import time_left, until
+from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import described
@@ -123,7 +124,7 @@ class ExcitationTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /excitation`, within about `deadline` seconds."""
-        found = excite(_problem(self.request, deadline))
+        found = excite(_problem(self.request, deadline), listener())
         if self.wanted == "csv":
             return TaskResult.of_csv(_csv(found))
         request, arm = self.request, arm_fields(self.request)

@@ -16,6 +16,7 @@ from joulepath.app.convert.arm import robot_named
 from joulepath.app.convert.fields import location
 from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.convert.until import until
+from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import StoredAnswer, TaskResult, json_document
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.models.robot import Array
@@ -50,7 +51,8 @@ class IdentifyTask:
         logs = [each.reading.log for each in self.logs]
         count, robot = len(self.request.logs), robot_named(logs[0].robot)
         try:
-            found = identify(robot, logs[:count], _to_options(self.request))
+            options = _to_options(self.request)
+            found = identify(robot, logs[:count], options, tell=listener(), progress=False)
             others = found.validate(logs[count:]) if logs[count:] else found.validation
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None

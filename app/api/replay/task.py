@@ -12,6 +12,7 @@ from joulepath.app.api.replay.planned_motion import to_planned_motion
 from joulepath.app.convert.given_answer import paths_of_moves, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import replay_warnings
+from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.common import Request, described
@@ -20,9 +21,11 @@ from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.kept_answers import kept_answers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import NotEmpty, Seconds
+from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 from joulepath.optimizer.replay.controller import ControlName
 from joulepath.optimizer.replay.planned import PlannedMotion
-from joulepath.optimizer.replay.replay import Quantity, Replay, replay
+from joulepath.optimizer.replay.replay import replay
+from joulepath.optimizer.replay.replay_result import Quantity, Replay
 from joulepath.optimizer.replay.simulator import mujoco
 
 PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
@@ -143,7 +146,13 @@ class ReplayTask:
         except ValidationError as error:
             raise invalid_request(error, "body", "answer") from None
         warnings = list[str]()
-        motions = [self._replayed(leg, motion, end, warnings) for leg, motion in planned]
+        # of one motion, its simulations are the steps; of a cycle, its moves
+        alone = len(planned) == 1
+        inner, outer = (listener(), no_listener) if alone else (no_listener, listener())
+        steps = Steps("moves", len(planned), outer)
+        motions = [
+            self._replayed(leg, motion, end, warnings, inner) for leg, motion in steps.each(planned)
+        ]
         answer = ReplayAnswer(
             request=self.request_id,
             robot=planned[0][1].arm.robot.name,
@@ -169,7 +178,12 @@ class ReplayTask:
         ]
 
     def _replayed(
-        self, leg: int | None, planned: PlannedMotion, end: Deadline, warnings: list[str]
+        self,
+        leg: int | None,
+        planned: PlannedMotion,
+        end: Deadline,
+        warnings: list[str],
+        tell: TellSteps,
     ) -> ReplayedMotion:
         """The entry of one motion; adds its warnings."""
         perturb, said = _perturbation(self.asked.perturb), list[str]()
@@ -178,7 +192,14 @@ class ReplayTask:
         if perturb and planned.compared and not planned.baselines:
             said.append(NO_BASELINES)
         found = replay(
-            planned, CONTROLS[self.asked.control], self.asked.step, perturb, end.left, end.clock
+            planned,
+            CONTROLS[self.asked.control],
+            self.asked.step,
+            perturb,
+            end.left,
+            end.clock,
+            tell=tell,
+            progress=False,
         )
         where = "" if leg is None else f"Leg {leg}: "
         warnings += [f"{where}{words}" for words in (*said, *replay_warnings(planned, found))]

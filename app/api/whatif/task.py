@@ -26,6 +26,7 @@ from joulepath.app.convert.given_motion import to_motion
 from joulepath.app.convert.recorded import as_logged
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.until import time_left, until
+from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.arm import ArmRequest
@@ -48,6 +49,7 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.names import first_repeated
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.progress import Steps
 from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.what_if import what_if
@@ -158,6 +160,7 @@ class _Work:
         self.clock, self.began = deadline.clock, deadline.clock()
         self.shares = DeadlineShares(deadline, 1 + len(request.changes))
         self.collector = AnswerCollector()
+        self.steps = Steps("arms", 1 + len(request.changes), listener())
 
     def result_of(
         self, robot: str, objective: Objective | None, base: WhatifBase, changes: list[ChangeResult]
@@ -198,8 +201,12 @@ class _Optimized(_Work):
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
         with inside("optimize"):
             best = certified(optimize(first, progress=False))
+        self.steps.add()
         base = WhatifBase.of(best, self._kept(asked, best), best.status, holds=True)
-        rows = [self._row(asked, k, best, problem) for k, problem in enumerate(problems)]
+        rows = [
+            self._row(asked, k, best, problem)
+            for k, problem in enumerate(self.steps.each(problems))
+        ]
         return self.result_of(asked.robot, asked.objective, base, rows)
 
     def _problem(self, asked: OptimizeRequest, k: int) -> Problem | OutsideLimits:
@@ -224,7 +231,9 @@ class _Optimized(_Work):
         if self.shares.used_up:
             return self.failed(change, DeadlineExceeded([]))
         try:
-            found = what_if(base, replace(problem, deadline=min(asked.deadline, share)))
+            found = what_if(
+                base, replace(problem, deadline=min(asked.deadline, share)), progress=False
+            )
         except DeadlineExceeded as error:
             return self.failed(change, error)
         certificate = found.certificate
@@ -271,8 +280,9 @@ class _Evaluated(_Work):
             arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
         with inside("evaluate"):
             found = self._evaluate(arm, asked)
+        self.steps.add()
         base = WhatifBase.of(found.total, self._kept(asked, found), None, _holds(found))
-        rows = [self._row(asked, k, found, arm) for k, arm in enumerate(arms)]
+        rows = [self._row(asked, k, found, arm) for k, arm in enumerate(self.steps.each(arms))]
         return self.result_of(asked.robot, None, base, rows)
 
     def _arm(self, asked: EvaluateRequest, k: int) -> Arm:
@@ -282,7 +292,7 @@ class _Evaluated(_Work):
 
     def _evaluate(self, arm: Arm, asked: EvaluateRequest) -> Evaluation:
         deadline = min(asked.deadline or math.inf, self.shares.next())
-        return evaluate(arm, to_motion(asked), asked.sample_period, deadline)
+        return evaluate(arm, to_motion(asked), asked.sample_period, deadline, progress=False)
 
     def _row(self, asked: EvaluateRequest, k: int, base: Evaluation, arm: Arm) -> ChangeResult:
         change = self.request.changes[k]

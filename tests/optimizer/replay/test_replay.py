@@ -27,7 +27,8 @@ from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import TIME_GRID, course_of
-from joulepath.optimizer.replay.replay import Replay, replay
+from joulepath.optimizer.replay.replay import replay
+from joulepath.optimizer.replay.replay_result import Replay
 from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, START, problem, tcp_pose
