@@ -6,11 +6,11 @@ from functools import cache
 from importlib.resources import files
 
 from fastapi import APIRouter, Request
-from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
+from fastapi.openapi.docs import get_redoc_html
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 
 from joulepath.app.exceptions.transport import NotFound
-from joulepath.app.http.openapi_pages import short_document
+from joulepath.app.http.openapi_short import short_document
 
 router = APIRouter(include_in_schema=False)
 
@@ -18,6 +18,8 @@ _ASSETS = {
     "swagger-ui-bundle.js": "text/javascript",
     "swagger-ui.css": "text/css",
     "redoc.standalone.js": "text/javascript",
+    "page.css": "text/css",
+    "page.js": "text/javascript",
 }
 # a picture fetched by Redoc from the internet
 _REDOC_LOGO = b"https://cdn.redoc.ly/redoc/logo-mini.svg"
@@ -31,30 +33,13 @@ _HEADERS = {
 }
 
 
-_SWAGGER = {
-    # without this it fetches a badge from validator.swagger.io
-    "validatorUrl": None,
-    # colouring an answer of a megabyte takes seconds
-    "syntaxHighlight": False,
-    "displayRequestDuration": True,
-    "filter": True,
-}
+_PAGE = "page.html"
 
 
 @router.get("/docs")
-async def swagger(request: Request) -> HTMLResponse:
-    """Swagger UI."""
-    root = request.scope.get("root_path", "")
-    page = get_swagger_ui_html(
-        openapi_url=f"{root}/docs/openapi.json",
-        title=request.app.title,
-        swagger_js_url=f"{root}/docs/swagger-ui-bundle.js",
-        swagger_css_url=f"{root}/docs/swagger-ui.css",
-        swagger_favicon_url=_NO_PICTURE,
-        swagger_ui_parameters=_SWAGGER,
-    )
-    page.headers.update(_HEADERS)
-    return page
+async def swagger() -> HTMLResponse:
+    """Swagger UI. Its addresses are relative: they hold behind a proxy's path, too."""
+    return HTMLResponse(_read(_PAGE), headers=_HEADERS)
 
 
 @router.get("/redoc")
@@ -80,7 +65,7 @@ def document(request: Request) -> JSONResponse:
 
 @router.get("/docs/{name}")
 def asset(name: str) -> Response:
-    """A script or style sheet of the two pages."""
+    """A script or style sheet of the two pages: our own, or of Swagger UI and Redoc."""
     if name not in _ASSETS:
         raise NotFound
     return Response(
@@ -90,5 +75,7 @@ def asset(name: str) -> Response:
 
 @cache
 def _read(name: str) -> bytes:
-    content = (files("fastapi_offline") / "static" / name).read_bytes()
+    own = files("joulepath") / "app" / "static" / "docs" / name
+    packaged = files("fastapi_offline") / "static" / name
+    content = own.read_bytes() if own.is_file() else packaged.read_bytes()
     return content.replace(_REDOC_LOGO, _NO_PICTURE.encode())

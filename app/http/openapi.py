@@ -23,7 +23,7 @@ from joulepath.app.exceptions.queue import Busy, TooManyRequests
 from joulepath.app.exceptions.transport import HeadTooLarge
 from joulepath.app.http.answer_examples import add_examples
 from joulepath.app.http.authentication import SCHEME
-from joulepath.app.http.openapi_pages import add_pages
+from joulepath.app.http.openapi_pages import add_groups, add_pages
 from joulepath.app.http.problems import model_of_problem, path_of, problem_of
 from joulepath.app.http.sites import PROBES
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
@@ -144,6 +144,7 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
         add_examples(schemas, answer["content"]["application/json"]["schema"], example["answer"])
     _add_access(document, with_keys)
     add_pages(document)
+    add_groups(schemas)
     for deadline in _deadlines(document):
         deadline["maximum"] = settings.max_deadline
         if "default" in deadline:

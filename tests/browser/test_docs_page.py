@@ -8,13 +8,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, ViewportSize, expect
 
 from tests.app.access.test_key_file import add
 from tests.app.live import ANSWER, Server, serving
 from tests.browsers import BROWSER, MISSING, chromium
 
 PATIENCE = 1000 * ANSWER  # [ms]
+
+SCREEN: ViewportSize = {"width": 1280, "height": 900}
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
@@ -71,6 +73,48 @@ def test_authorize(guarded: tuple[Server, str], page: Page) -> None:
         "nothing comes from elsewhere"
     )
     assert not blocked
+
+
+def test_an_operation_fits_a_screen_and_is_tried_out(
+    guarded: tuple[Server, str], page: Page
+) -> None:
+    """Every operation, as it is before one of its parts is opened; the page follows nothing but
+    this service.
+    """
+    server, secret = guarded
+    faults: list[str] = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+    page.set_viewport_size(SCREEN)
+    page.goto(f"{server.url}/docs")
+    operations = page.locator(".opblock")
+    expect(operations.last).to_be_visible()
+    heights = dict[str, float]()
+    for operation in operations.all():
+        operation.locator(".opblock-summary-control").click()
+        expect(operation.locator(".response").last).to_be_visible()
+        box = operation.bounding_box()
+        assert box is not None
+        heights[operation.get_attribute("id") or ""] = box["height"]
+        operation.locator(".opblock-summary-control").click()
+    assert {name: own for name, own in heights.items() if own > SCREEN["height"]} == {}
+    assert len(heights) > 50
+
+    page.locator(".auth-wrapper > .authorize").click()
+    page.locator(".auth-container input").fill(secret)
+    page.locator(".auth-btn-wrapper .authorize").click()
+    page.locator(".auth-btn-wrapper .btn-done").click()
+    operation = page.locator("#operations-studies-create_studies_post")
+    operation.locator(".opblock-summary-control").click()
+    body = operation.locator(".opblock-section-request-body")
+    body.get_by_role("tab", name="Schema").click()
+    expect(body.locator("table td code").first).to_have_text("name")
+    body.get_by_role("tab", name="Example").click()
+    operation.locator(".try-out__btn").click()
+    operation.locator(".execute").click()
+    status = operation.locator(".live-responses-table .response-col_status").last
+    expect(status).to_contain_text("201", timeout=PATIENCE)
+    assert faults == []
 
 
 def test_a_page_of_another_site_reaches_nothing(guarded: tuple[Server, str], page: Page) -> None:
