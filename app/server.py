@@ -34,6 +34,9 @@ class ServerSettings:
     """Time [s] to read arrived requests before idle connections are closed."""
     large_block: int = 1 << 20
     """Least size of separately mapped blocks [byte], above the pieces of bodies."""
+    document_delay: float = 5.0
+    """Time after the start [s] at which the OpenAPI document is built, which takes 1 s: the first
+    reader of `/docs` does not wait for it, and the start of the workers has ended by then."""
     backlog: int = 2048
     """Connections waiting to be accepted, the default of uvicorn."""
 
@@ -61,6 +64,13 @@ class _Server(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, app: FastAPI, connections: Connections) -> None:
         super().__init__(config)
         self._state, self._connections = app.state, connections
+        self._build_document = app.openapi
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begins to listen; builds the OpenAPI document later, in a thread."""
+        await super().startup(sockets)
+        loop = asyncio.get_running_loop()
+        loop.call_later(SERVER.document_delay, loop.run_in_executor, None, self._build_document)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Lets running requests finish; too long ones are answered by `shutting-down`."""

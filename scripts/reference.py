@@ -105,11 +105,13 @@ def _problem(schema: dict[str, Any]) -> str:
 
 def _table(name: str, schema: dict[str, Any]) -> str:
     required = set(schema.get("required", ()))
-    rows = [
-        f"| `{field}` | {_type(own)}{_limits(field, own, required)} | "
-        f"{_cell(own.get('description', ''))} |"
-        for field, own in schema.get("properties", {}).items()
-    ]
+    rows, group = list[str](), ""
+    for field, own in schema.get("properties", {}).items():
+        if own.get("x-group", "") != group:
+            group = own["x-group"]
+            rows.append(f"| **{group}** | | |")
+        kind = f"{_type(own)}{_limits(field, own, required)}"
+        rows.append(f"| `{field}` | {kind} | {_cell(own.get('description', ''))} |")
     text = _cell(schema.get("description", ""))
     if "properties" not in schema:
         return "\n".join([f"### {name}", "", text, "", f"{_type(schema)}.", ""])
