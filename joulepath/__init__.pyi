@@ -1,6 +1,7 @@
 __version__: str
 
-from .app.client import Client, ServiceUnreachable
+from .app.client.client import Client
+from .app.client.errors import ServiceUnreachable
 from .app.exceptions.base import InvalidRequest, ServiceError
 from .models.own_arm.description import InvalidArm
 from .models.registry import load_robot, robot_names

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, overload
+from typing import Annotated, Any, overload
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.presentation.result import Result, Rows, per_joint
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.pose import Pose
 
@@ -52,8 +53,8 @@ class IKSolution:
         object.__setattr__(self, "collides", collides)
 
 
-@dataclass(frozen=True, eq=False)
-class IKSolutions(Sequence[IKSolution]):
+@dataclass(frozen=True, eq=False, repr=False)
+class IKSolutions(Result, Sequence[IKSolution]):
     """All configurations found for a pose, as a sequence.
 
     `complete`: whether every branch is among the configurations. Otherwise the inverse kinematics
@@ -75,6 +76,34 @@ class IKSolutions(Sequence[IKSolution]):
 
     def __iter__(self) -> Iterator[IKSolution]:
         return iter(self.solutions)
+
+    def _headline(self) -> str:
+        colliding = sum(each.collides for each in self)
+        return (
+            f"{len(self)} configurations, {colliding} of them collide"
+            + ("" if self.complete else ", others may be missing")
+            + (", not isolated" if any(each.free for each in self) else "")
+        )
+
+    def _rows(self) -> Rows:
+        rows = [
+            (
+                each.label,
+                " ".join(f"{angle:.1f}" for angle in np.degrees(each.q)),
+                str(each.collides),
+            )
+            for each in self
+        ]
+        return [("branch", "joints [°]", "collides"), *rows]
+
+    def _shown(self) -> Any:
+        return {"solutions": self.solutions, "complete": self.complete}
+
+    def _columns(self) -> dict[str, Any]:
+        """One row per configuration."""
+        names = ("label", "limit_distance", "smallest_singular_value", "collides")
+        columns = {name: [getattr(each, name) for each in self] for name in names}
+        return columns | per_joint("q", np.array([each.q for each in self]))
 
 
 @one_thread()

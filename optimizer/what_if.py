@@ -8,8 +8,10 @@ motion optimised for it (`reoptimised`).
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
@@ -19,11 +21,13 @@ from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.presentation.chart import Chart
 from joulepath.optimizer.presentation.progress_bar import progress_bar
+from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.problem.problem import Problem, narrowed
 from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.result.certificate import Certificate
-from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.result.energy import Energy, energy_text
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE
@@ -44,8 +48,8 @@ class WhatIfSettings:
 WHAT_IF = WhatIfSettings()
 
 
-@dataclass(frozen=True)
-class WhatIf:
+@dataclass(frozen=True, eq=False, repr=False)
+class WhatIf(Result):
     """Result of a change.
 
     Attributes:
@@ -59,6 +63,44 @@ class WhatIf:
     certificate: Certificate
     reoptimised: Solution | None
     error: JoulepathError | None
+
+    def _headline(self) -> str:
+        same = energy_text(self.same_motion, "electrical")
+        if self.reoptimised is None:
+            return f"same motion {same}; {type(self.error).__name__}"
+        best = self.reoptimised.energy
+        saved = best.electrical.total - self.same_motion.electrical.total
+        return f"same motion {same}; reoptimised {energy_text(best, 'electrical')}, {saved:+.3g} J"
+
+    def _rows(self) -> Rows:
+        columns = self._columns()
+        titles = ("motion", "electrical [J]", "mechanical [J]", "within the limits")
+        names = ("motion", "electrical", "mechanical", "valid")
+        rows = zip(*(columns[name] for name in names), strict=True)
+        return [titles, *([row[0], f"{row[1]:.4g}", f"{row[2]:.4g}", str(row[3])] for row in rows)]
+
+    def _shown(self) -> Any:
+        best = self.reoptimised
+        return {
+            "same_motion": self.same_motion,
+            "certificate": self.certificate,
+            "reoptimised": best and best.solved_motion(),
+            "problem": self.error and str(self.error),
+        }
+
+    def _columns(self) -> dict[str, Any]:
+        """One row for the known motion, and one for the best of the changed arm."""
+        best = self.reoptimised
+        energies = [self.same_motion, *([best.energy] if best else [])]
+        return {
+            "motion": ["same_motion", *(["reoptimised"] if best else [])],
+            "electrical": [each.electrical.total for each in energies],
+            "mechanical": [each.mechanical.total for each in energies],
+            "valid": [self.certificate.valid, *([best.certificate.valid] if best else [])],
+        }
+
+    def _charts(self) -> Sequence[Chart]:
+        return self.reoptimised._charts() if self.reoptimised else ()
 
 
 @one_thread()

@@ -30,7 +30,7 @@ def SERVICE(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def connect(context: click.Context, url: str, key: str | None) -> None:
     """Gives the commands of a group a client of the service, until they end."""
-    from joulepath.app.client import Client
+    from joulepath.app.client.client import Client
 
     try:
         context.obj = context.with_resource(Client(url, key))
@@ -41,7 +41,7 @@ def connect(context: click.Context, url: str, key: str | None) -> None:
 @contextmanager
 def answered() -> Iterator[None]:
     """Raises Refused for the problem that the service answers with, or if none answers."""
-    from joulepath.app.client import ServiceUnreachable
+    from joulepath.app.client.errors import ServiceUnreachable
     from joulepath.optimizer.exceptions import DeclaredError
 
     try:

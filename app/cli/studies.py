@@ -13,7 +13,7 @@ from joulepath.app.cli.service import SERVICE, answered, connect, json_of
 from joulepath.app.cli.table import table
 
 if TYPE_CHECKING:
-    from joulepath.app.client import Client
+    from joulepath.app.client.client import Client
 
 HEAD = ("id", "name", "robot", "iterations", "last [J]", "best [J]", "threshold [J]", "met")
 STEPS = ("optimize", "evaluate")

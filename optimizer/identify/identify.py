@@ -46,13 +46,15 @@ from joulepath.optimizer.identify.results import (
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.identify.rows.split import held_out_masks
 from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.presentation.progress_bar import progress_bar
+from joulepath.optimizer.presentation.result import Result
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result):
     """An arm's figures from logs, with their uncertainty and validation."""
 
     robot: Robot
@@ -114,6 +116,41 @@ class Identification:
             covariance; see docs/reference/identification.md.
         """
         return document_of(self.figures(), date)
+
+    def _headline(self) -> str:
+        told = sum(each.identified for each in self.parameters)
+        text = f"{self.robot.name}, {told} of {len(self.parameters)} figures identified"
+        power = self.validation and self.validation.fitted.power
+        if power and self.validation:
+            text += f", {power.energy_mean:.2g} % error of energy on {self.validation.moves} moves"
+        return text
+
+    def _rows(self) -> Sequence[Sequence[str]]:
+        names = ("figure", "joint", "value", "sd", "previous")
+        rows = (
+            [_cell(getattr(each, name)) for name in names]
+            for each in self.parameters
+            if each.identified
+        )
+        return [names, *rows]
+
+    def _shown(self) -> Any:
+        names = (
+            *("parameters", "structure", "physical", "validation", "residuals", "temperatures"),
+            *("noise", "thresholds", "advice"),
+        )
+        return {"robot": self.robot.name} | {name: getattr(self, name) for name in names}
+
+    def _columns(self) -> dict[str, Any]:
+        """One row per figure that was sought."""
+        names = shown_fields(IdentifiedParameter)
+        return {name: [getattr(each, name) for each in self.parameters] for name in names}
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 @one_thread()

@@ -25,11 +25,12 @@ class Comparable:
 
 def same(first: Any, second: Any) -> bool:
     """Whether two values have the same type and content, arrays included; a list may equal a
-    tuple."""
+    tuple, and what is not a number in one is not a number in the other."""
     if first is second:
         return True
     if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
-        return np.array_equal(first, second)
+        kinds = {np.asarray(each).dtype.kind for each in (first, second)}
+        return np.array_equal(first, second, equal_nan=kinds == {"f"})
     if isinstance(first, list | tuple) and isinstance(second, list | tuple):
         return len(first) == len(second) and all(map(same, first, second))
     if type(first) is not type(second):
@@ -43,4 +44,4 @@ def same(first: Any, second: Any) -> bool:
         return first.keys() == second.keys() and all(
             same(first[name], second[name]) for name in first
         )
-    return bool(first == second)
+    return bool(first == second or (first != first and second != second))

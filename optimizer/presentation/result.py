@@ -37,8 +37,8 @@ class Result(Comparable):
         raise NotImplementedError
 
     def _charts(self) -> Sequence[Chart]:
-        """Curves; the first are the most important ones."""
-        raise NotImplementedError
+        """Curves; the first are the most important ones. None for results without curves."""
+        return ()
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self._headline()})"
@@ -84,7 +84,10 @@ class Result(Comparable):
         """
         charts = self._charts()
         if not charts:
-            raise ValueError(f"{self!r} has no samples to draw: ask for them by `sample_period`.")
+            raise ValueError(
+                f"{self!r} has no curves to draw. An evaluation has them with a `sample_period`; "
+                "other results without curves are tables: see `to_frame`."
+            )
         return plotted(charts, self._headline())
 
 

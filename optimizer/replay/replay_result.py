@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from joulepath.optimizer.declared import Internal, Joules, NotEmpty, PerJoint, Ratio, Seconds, Unit
+from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.replay.controller import ControlName
 from joulepath.optimizer.replay.outcome import Outcome
 from joulepath.optimizer.result.baseline import BaselineName
@@ -81,8 +82,8 @@ class AsPlanned:
     """Largest torque / limit as planned, per joint."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Replay:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Replay(Result):
     """A motion, planned and simulated."""
 
     step: Annotated[Seconds, Internal]
@@ -111,3 +112,42 @@ class Replay:
             if run.control == control:
                 return run
         raise LookupError(control)
+
+    def _headline(self) -> str:
+        run = self.runs[0]
+        lasting = [each.name for each in self.savings if each.persists]
+        parts = [
+            f"{run.control} {run.electrical:.4g} J electrical",
+            f"{run.electrical_error:+.3%} of the plan",
+            f"{1e3 * run.tcp_error:.3g} mm off",
+            *(["collides"] if run.collides else []),
+            *([f"still saves against {', '.join(lasting)}"] if lasting else []),
+        ]
+        return ", ".join(parts)
+
+    def _rows(self) -> Rows:
+        names = ("control", "change", "electrical", "electrical_error", "tcp_error", "collides")
+        columns = self._columns()
+        cells = [
+            [f"{each:.4g}" if isinstance(each, float) else str(each) for each in row]
+            for row in zip(*(columns[name] for name in names), strict=True)
+        ]
+        head = ("controller", "change", "electrical [J]", "error [1]", "TCP error [m]", "collides")
+        return [head, *cells]
+
+    def _shown(self) -> Any:
+        return self
+
+    def _columns(self) -> dict[str, Any]:
+        """One row per controller, then one per changed arm."""
+        outcomes: list[Outcome] = [*self.runs, *self.changes]
+        first = self.runs[0].control
+        numbers = ("electrical", "mechanical", "electrical_error", "tcp_error", "collides")
+        return {
+            "control": [*(run.control for run in self.runs), *(first for _ in self.changes)],
+            "change": [
+                *("" for _ in self.runs),
+                *(f"{each.quantity} × {each.factor:.4g}" for each in self.changes),
+            ],
+            **{name: [getattr(each, name) for each in outcomes] for name in numbers},
+        }

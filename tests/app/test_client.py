@@ -13,7 +13,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import joulepath
-from joulepath.app.client import error_of
+from joulepath.app.client.errors import error_of
 from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.http.problems import path_of, problem_of
 from joulepath.optimizer.exceptions import OutsideLimits
@@ -33,6 +33,28 @@ def test_it_optimizes_as_the_service_does(service: joulepath.Client) -> None:
     assert whole["energy"]["electrical"]["total"] == parts["energy"]["electrical"]["total"]
     assert service.get(whole["answer"])["id"] == whole["id"]
     assert service.export("csv", whole["id"]).startswith(b"t,q1,")
+
+
+def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
+    """By the same names; many problems are a job, and shapes are data."""
+    own = {"optimize_many", "capsule_between"}
+    public = {name: getattr(joulepath, name) for name in joulepath.__all__}
+    functions = {name for name in public if name.islower()} - own
+    assert functions >= {"optimize", "replay", "load_tool"}
+    assert {name for name in functions if not hasattr(service, name)} == set()
+    assert service.robot_names() == joulepath.robot_names()
+    assert service.tool_names() == joulepath.tool_names()
+    robot = joulepath.load_robot("ur10e")
+    assert service.load_robot("ur10e")["joints"] == list(robot.joint_names)
+    tool = service.load_tool(joulepath.tool_names()[0])
+    assert tool["name"] == joulepath.tool_names()[0]
+
+
+def test_it_reports_and_advises(service: joulepath.Client) -> None:
+    found = service.optimize(move())
+    page = service.report(answer=found["id"], format="html")
+    assert page.startswith(b"<!") and b"J" in page
+    assert service.advice(optimize=move(), period=6.0, changes=[])["waiting"] is not None
 
 
 def test_it_evaluates_and_inverts(service: joulepath.Client) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import joulepath
+from tests.identification_logs import csv_of, recorded, truth_of
 
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = START + 0.3
@@ -50,6 +51,21 @@ def result(name: str) -> Any:
         )
     if name == "Front":
         return joulepath.pareto(replace(problem(), objective="mechanical", duration_max=2.0), 2)
+    if name == "WhatIf":
+        heavier = replace(problem().arm, payload=joulepath.Payload(mass=3.0))
+        return joulepath.what_if(result("Solution"), replace(problem(), arm=heavier))
+    if name == "IKSolutions":
+        pose = joulepath.Pose.from_rotvec([0.4, -0.2, 0.3], [np.pi, 0.0, 0.0])
+        return joulepath.inverse_kinematics(problem().arm, pose, windings=False)
+    if name == "Replay":
+        return joulepath.replay(
+            result("Solution"), step=2e-3, perturb={"friction": 0.3}, problem=problem()
+        )
+    if name == "Identification":
+        robot = problem().arm.robot
+        content = csv_of(recorded(robot, truth_of(robot), moves=4))
+        options = joulepath.LogOptions(payload=joulepath.Payload())
+        return joulepath.identify(robot, [joulepath.read_log(content, robot, options).log])
     stops = [
         joulepath.Stop(name="pick", target=GOAL, dwell=0.2, payload=joulepath.Payload(mass=2.0)),
         joulepath.Stop(name="place", target=START - 0.2, payload=joulepath.Payload()),
@@ -59,7 +75,9 @@ def result(name: str) -> Any:
     )
 
 
-ALL = ["Solution", "Evaluation", "Comparison", "Front", "CycleSolution"]
+DRAWN = ["Solution", "Evaluation", "Comparison", "Front", "CycleSolution", "WhatIf"]
+TABLES = ["IKSolutions", "Replay", "Identification"]
+ALL = DRAWN + TABLES
 SAVED = ["Solution", "Evaluation", "Front", "CycleSolution"]
 LONGEST_REPR = 200
 
@@ -84,12 +102,17 @@ def test_the_text_has_the_figures() -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_its_html_is_a_table_and_a_picture(name: str) -> None:
-    """It is well-formed, and each curve has as many points as are drawn."""
+def test_its_html_is_a_table(name: str) -> None:
     html = ElementTree.fromstring(result(name)._repr_html_())
     rows = html.findall("./table/tbody/tr")
     titles = html.findall("./table/thead/tr/th")
     assert rows and all(len(row) == len(titles) for row in rows)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_its_html_has_a_picture(name: str) -> None:
+    """It is well-formed, and each curve has as many points as are drawn."""
+    html = ElementTree.fromstring(result(name)._repr_html_())
     namespace = "{http://www.w3.org/2000/svg}"
     curves = html.findall(f"./{namespace}svg/{namespace}polyline")
     assert len(curves) >= 1
@@ -155,12 +178,14 @@ def test_a_file_of_something_else_is_refused(content: str, tmp_path: Path) -> No
         joulepath.Solution.load(file)
 
 
-@pytest.mark.parametrize("name", SAVED)
+@pytest.mark.parametrize("name", ALL)
 def test_it_is_the_same_after_pickling(name: str) -> None:
     assert pickle.loads(pickle.dumps(result(name))) == result(name)
 
 
 def test_results_of_other_motions_differ() -> None:
+    assert result("IKSolutions") != replace(result("IKSolutions"), complete=False)
+    assert result("Replay") != replace(result("Replay"), duration=1.0)
     solution = result("Solution")
     spline = solution.trajectory.spline
     moved = replace(spline, control_points=spline.control_points + 1e-12)
@@ -205,12 +230,18 @@ def test_what_is_missing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_nothing_is_drawn_without_samples() -> None:
     found = joulepath.evaluate(problem().arm, result("Solution"))
-    with pytest.raises(ValueError, match="no samples to draw"):
+    with pytest.raises(ValueError, match="a `sample_period`"):
         found.plot()
     assert "svg" not in found._repr_html_()
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_has_no_curves_to_draw(name: str) -> None:
+    with pytest.raises(ValueError, match="no curves to draw"):
+        result(name).plot()
+
+
+@pytest.mark.parametrize("name", DRAWN)
 def test_its_plot_has_all_curves(name: str) -> None:
     pyplot = pytest.importorskip("matplotlib.pyplot")
     figure = result(name).plot()

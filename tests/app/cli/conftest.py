@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from starlette.testclient import TestClient
 
-import joulepath.app.client
-from joulepath.app.client import Client
+import joulepath.app.client.client
+from joulepath.app.client.client import Client
 from tests.app.cli.console import Here
 from tests.app.live import LOCAL
 
@@ -28,6 +28,6 @@ def service(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
         def close(self) -> None:
             """Leaves the shared client open."""
 
-    monkeypatch.setattr(joulepath.app.client, "Client", Shared)
+    monkeypatch.setattr(joulepath.app.client.client, "Client", Shared)
     monkeypatch.setattr("joulepath.app.cli.jobs.PERIOD", 0.05)
     monkeypatch.setenv("JOULEPATH_URL", LOCAL)

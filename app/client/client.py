@@ -4,42 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
 import orjson
 
-from joulepath.app.exceptions.base import InternalError, ServiceError
-from joulepath.app.exceptions.error_types import types_of_error
-from joulepath.optimizer.exceptions import DeclaredError, JoulepathError
+from joulepath.app.client.errors import Json, ServiceUnreachable, error_in
 from joulepath.optimizer.presentation.extras import required
 
-Json = dict[str, Any]
+PENDING = ("queued", "running")
+"""States of an identification that has not ended."""
 ENDED = ("done", "cancelled")
 """States of a job whose requests have all ended."""
-
-
-@dataclass(eq=False)
-class ServiceUnreachable(ServiceError, JoulepathError):
-    """No service answers at this address, or the connection broke."""
-
-    title = "Service unreachable"
-    remedy = "Check the address, and that the service runs: `joulepath serve` starts one."
-    status = 503
-
-    url: str
-    """Address of the service."""
-    reason: str
-    """What happened instead."""
-
-    def __str__(self) -> str:
-        return (
-            f"No service answers at {self.url}: {self.reason}. Check the address; "
-            "`joulepath serve` starts a service."
-        )
 
 
 class Client:
@@ -158,9 +135,54 @@ class Client:
         """Begin to identify an arm's own figures: `POST /identifications`.
 
         Returns:
-            The identification as it stands; `get` of its path says when it is done.
+            The identification as it stands; see `wait_for_identification`.
         """
         return self._post("/identifications", request, fields)
+
+    def wait_for_identification(self, id: str, period: float = 1.0) -> Json:
+        """Wait until an identification has ended: `GET /identifications/{id}`.
+
+        Args:
+            id: id of the identification.
+            period: time between two looks [s].
+
+        Returns:
+            The identification with its `state`, and its `result` or its `problem`.
+        """
+        while True:
+            found = self.get(f"/identifications/{id}")
+            if found["state"] not in PENDING:
+                return found
+            time.sleep(period)
+
+    def advice(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Find changes of a motion or a cycle that need less energy: `POST /advice`."""
+        return self._post("/advice", request, fields)
+
+    def report(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> bytes:
+        """Write a page on a motion or a cycle: `POST /report`.
+
+        Returns:
+            The page, as HTML or as PDF.
+        """
+        content: bytes = self._send("POST", "/report", json={**(request or {}), **fields}).content
+        return content
+
+    def load_robot(self, name: str) -> Json:
+        """All parameters of a robot: `GET /robots/{name}`."""
+        return self.get(f"/robots/{name}")
+
+    def robot_names(self) -> tuple[str, ...]:
+        """Names of all robots: `GET /robots`."""
+        return tuple(each["name"] for each in self.get("/robots")["robots"])
+
+    def load_tool(self, name: str) -> Json:
+        """All figures of a tool: `GET /tools/{name}`."""
+        return self.get(f"/tools/{name}")
+
+    def tool_names(self) -> tuple[str, ...]:
+        """Names of all tools: `GET /tools`."""
+        return tuple(each["name"] for each in self.get("/tools")["tools"])
 
     def send_job(
         self, requests: Sequence[Mapping[str, Any]], name: str | None = None, **fields: Any
@@ -296,47 +318,5 @@ class Client:
         except self._httpx.TransportError as error:
             raise ServiceUnreachable(self._url, str(error) or type(error).__name__) from error
         if answer.is_error:
-            raise _error_of(answer, self._url)
+            raise error_in(answer, self._url)
         return answer
-
-
-def _error_of(answer: Any, url: str) -> DeclaredError:
-    try:
-        document = orjson.loads(answer.content)
-        return error_of(document)
-    except (orjson.JSONDecodeError, KeyError, TypeError, AttributeError):
-        reason = f"it answers {answer.status_code}, but not as joulepath does"
-        return ServiceUnreachable(url, reason)
-
-
-def error_of(document: Json) -> DeclaredError:
-    """The error of a problem document (RFC 9457).
-
-    Args:
-        document: the document. Its fields beyond those of every problem become data of the error,
-            and `instance` the id of the request.
-    """
-    slug = document["type"].rpartition("/")[2]
-    kind = next((each for each in types_of_error() if each.slug() == slug), InternalError)
-    # mypy considers classes of dataclass exceptions unhashable, like their instances
-    error = _told(kind)  # type: ignore[arg-type]
-    told = error.__new__(error)
-    fixed = ("type", "title", "status")
-    vars(told).update({name: value for name, value in document.items() if name not in fixed})
-    vars(told)["document"] = document
-    return told
-
-
-@cache
-def _told(kind: type[DeclaredError]) -> type[DeclaredError]:
-    """A kind of error whose message is the one that the service wrote."""
-
-    def message(self: Any) -> str:
-        return str(vars(self)["detail"])
-
-    def reduce(self: Any) -> tuple[Any, ...]:
-        return error_of, (vars(self)["document"],)
-
-    own = {"__str__": message, "__reduce__": reduce, "__module__": kind.__module__}
-    bases = (kind,) if issubclass(kind, JoulepathError) else (kind, JoulepathError)
-    return type(kind.__name__, bases, own | {"__doc__": kind.__doc__})

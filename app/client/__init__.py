@@ -1,0 +1,1 @@
+"""`joulepath.Client`: the functions of the library over HTTP."""

@@ -1,0 +1,78 @@
+"""Errors of the client: no service, and the error of a problem document."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import orjson
+
+from joulepath.app.exceptions.base import InternalError, ServiceError
+from joulepath.app.exceptions.error_types import types_of_error
+from joulepath.optimizer.exceptions import DeclaredError, JoulepathError
+
+Json = dict[str, Any]
+
+
+@dataclass(eq=False)
+class ServiceUnreachable(ServiceError, JoulepathError):
+    """No service answers at this address, or the connection broke."""
+
+    title = "Service unreachable"
+    remedy = "Check the address, and that the service runs: `joulepath serve` starts one."
+    status = 503
+
+    url: str
+    """Address of the service."""
+    reason: str
+    """What happened instead."""
+
+    def __str__(self) -> str:
+        return (
+            f"No service answers at {self.url}: {self.reason}. Check the address; "
+            "`joulepath serve` starts a service."
+        )
+
+
+def error_in(answer: Any, url: str) -> DeclaredError:
+    """The error that a response of httpx tells, or that no service answers at `url`."""
+    try:
+        document = orjson.loads(answer.content)
+        return error_of(document)
+    except (orjson.JSONDecodeError, KeyError, TypeError, AttributeError):
+        reason = f"it answers {answer.status_code}, but not as joulepath does"
+        return ServiceUnreachable(url, reason)
+
+
+def error_of(document: Json) -> DeclaredError:
+    """The error of a problem document (RFC 9457).
+
+    Args:
+        document: the document. Its fields beyond those of every problem become data of the error,
+            and `instance` the id of the request.
+    """
+    slug = document["type"].rpartition("/")[2]
+    kind = next((each for each in types_of_error() if each.slug() == slug), InternalError)
+    # mypy considers classes of dataclass exceptions unhashable, like their instances
+    error = _told(kind)  # type: ignore[arg-type]
+    told = error.__new__(error)
+    fixed = ("type", "title", "status")
+    vars(told).update({name: value for name, value in document.items() if name not in fixed})
+    vars(told)["document"] = document
+    return told
+
+
+@cache
+def _told(kind: type[DeclaredError]) -> type[DeclaredError]:
+    """A kind of error whose message is the one that the service wrote."""
+
+    def message(self: Any) -> str:
+        return str(vars(self)["detail"])
+
+    def reduce(self: Any) -> tuple[Any, ...]:
+        return error_of, (vars(self)["document"],)
+
+    own = {"__str__": message, "__reduce__": reduce, "__module__": kind.__module__}
+    bases = (kind,) if issubclass(kind, JoulepathError) else (kind, JoulepathError)
+    return type(kind.__name__, bases, own | {"__doc__": kind.__doc__})
