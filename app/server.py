@@ -8,6 +8,7 @@ import errno
 import logging
 import math
 import socket
+import sys
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
@@ -69,6 +70,8 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begins to listen; builds the OpenAPI document later, in a thread."""
         await super().startup(sockets)
+        if sockets and sys.stderr.isatty():
+            print(told(sockets), file=sys.stderr)
         loop = asyncio.get_running_loop()
         loop.call_later(SERVER.document_delay, loop.run_in_executor, None, self._build_document)
 
@@ -108,6 +111,16 @@ def listen(host: str, port: int) -> list[socket.socket]:
             f"The service cannot listen on {host}, port {port} ({reason}): {remedy}."
         ) from None
     return sockets
+
+
+def told(sockets: list[socket.socket]) -> str:
+    """What a terminal shows between the lines of the log: where the service is."""
+    addresses = (each.getsockname()[:2] for each in sockets)
+    urls = [f"http://{f'[{host}]' if ':' in host else host}:{port}" for host, port in addresses]
+    return (
+        f"joulepath is at {' and '.join(urls)}: the studio at /studio, the pages at /help, the API "
+        "at /docs. Ctrl-C ends it."
+    )
 
 
 def serve(settings: Settings) -> None:

@@ -38,7 +38,7 @@ from joulepath.app.cli.whatif import whatif
 Exit codes:
     0  the answer is written
     1  the request is valid, and the answer is a problem: no motion, deadline passed, ...
-    2  wrong usage or invalid input: problems validation, invalid-table and unknown-robot
+    2  wrong usage or invalid input: invalid-request, invalid-table, unknown-robot, unknown-tool
   130  interrupted by Ctrl-C
   141  the program that reads standard output has ended (SIGPIPE)
 

@@ -23,6 +23,7 @@ from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.replay.task import ReplayAnswer
 from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.app.exceptions.transport import BodyTooLarge, MalformedHttp
+from joulepath.app.server import listen, told
 from tests.app.live import (
     CLIENT,
     EXIT,
@@ -306,3 +307,13 @@ def test_workers_do_not_outlive_a_killed_parent() -> None:
         server.process.kill()
         until(lambda: not any(alive(pid) for pid in everyone))
         assert isinstance(future.exception(), httpx2.TransportError)
+
+
+def test_a_terminal_is_told_where_the_service_is() -> None:
+    with ExitStack() as opened:
+        sockets = [opened.enter_context(each) for each in listen("127.0.0.1", 0)]
+        port = sockets[0].getsockname()[1]
+        assert told(sockets).startswith(f"joulepath is at http://127.0.0.1:{port}: the studio")
+        if socket.has_ipv6:
+            sockets += [opened.enter_context(each) for each in listen("::1", 0)]
+            assert f"{port} and http://[::1]:" in told(sockets)
