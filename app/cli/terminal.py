@@ -58,15 +58,11 @@ def fraction(description: str) -> Iterator[Callable[[float], object]]:
 
 def problem(document: dict[str, Any], remedy: str) -> str:
     """A problem document in words, with each field that is wrong and what to do."""
+    from joulepath.app.client.errors import wrong_fields
+
     lines = [f"{document['title']}: {document['detail']}"]
-    lines += [f"  {_place(each['loc'])}: {each['msg']}" for each in document.get("errors", [])]
+    lines += [f"  {each}" for each in wrong_fields(document)]
     return "\n".join([*lines, *([remedy] if remedy else [])])
-
-
-def _place(loc: list[str | int]) -> str:
-    """The name of a field: `start.q.1` of `["body", "start", "q", 1]`."""
-    inner = loc[1:] if loc[:1] in (["body"], ["query"]) else loc
-    return ".".join(map(str, inner)) or "the request"
 
 
 def summary(lines: Callable[[], dict[str, str]]) -> None:

@@ -63,12 +63,23 @@ def error_of(document: Json) -> DeclaredError:
     return told
 
 
+def wrong_fields(document: Json) -> list[str]:
+    """The fields that a problem document finds wrong, one a line: `start.q.1: must be …`."""
+    return [f"{_place(each['loc'])}: {each['msg']}" for each in document.get("errors", ())]
+
+
+def _place(loc: list[str | int]) -> str:
+    """The name of a field: `start.q.1` of `["body", "start", "q", 1]`."""
+    inner = loc[1:] if loc[:1] in (["body"], ["query"]) else loc
+    return ".".join(map(str, inner)) or "the request"
+
+
 @cache
 def _told(kind: type[DeclaredError]) -> type[DeclaredError]:
     """A kind of error whose message is the one that the service wrote."""
 
     def message(self: Any) -> str:
-        return str(vars(self)["detail"])
+        return "\n".join([str(vars(self)["detail"]), *wrong_fields(vars(self)["document"])])
 
     def reduce(self: Any) -> tuple[Any, ...]:
         return error_of, (vars(self)["document"],)

@@ -52,7 +52,7 @@ def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
 
 def test_it_reports_and_advises(service: joulepath.Client) -> None:
     found = service.optimize(move())
-    page = service.report(answer=found["id"], format="html")
+    page = service.report(optimize=move(), answer=found["id"])
     assert page.startswith(b"<!") and b"J" in page
     assert service.advice(optimize=move(), period=6.0, changes=[])["waiting"] is not None
 
@@ -75,6 +75,7 @@ def test_an_error_is_the_library_s_own(service: joulepath.Client) -> None:
         service.optimize(move(colour="red"))
     assert [each["loc"] for each in invalid.value.errors] == [["body", "colour"]]
     assert isinstance(invalid.value, joulepath.ServiceError)
+    assert "\ncolour: Unknown field" in str(invalid.value)
 
 
 @pytest.mark.parametrize("kind", types_of_error())
