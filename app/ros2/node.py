@@ -21,7 +21,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from joulepath.app.client import Client
+from joulepath.app.client.client import Client
 from joulepath.app.engine.result import json_document
 from joulepath.app.http.problems import problem_of
 from joulepath.app.ros2.messages import JointNames, Json, pose_target, refusal, summary_of

@@ -15,7 +15,7 @@ import orjson
 from pydantic import ValidationError
 
 from joulepath.app.api.optimize.task import OptimizeTask
-from joulepath.app.client import Client
+from joulepath.app.client.client import Client
 from joulepath.app.convert.arm import robot_named, to_arm
 from joulepath.app.convert.own_robots import own_robot_named
 from joulepath.app.engine.result import json_document
