@@ -4,8 +4,11 @@ where the test is about something else.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +25,7 @@ from joulepath.optimizer.deadline import Stopped
 from joulepath.optimizer.exceptions import UnknownRobot
 from tests.ros2.system import Json, System, system
 
+ROOT = Path(__file__).parents[2]
 UR5E = joulepath.load_robot("ur5e")
 JOINTS = list(UR5E.joint_names)
 START = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
@@ -257,3 +261,13 @@ def test_a_hundred_plans_in_a_row_are_the_same(ur5e: System) -> None:
     ur5e.stand(left(JOINTS), START)
     energies = [ur5e.go_to(left(JOINTS), GOAL)["energy"] for _ in range(100)]
     assert np.ptp(energies) <= SAME_ENERGY * energies[0]
+
+
+def test_the_example_prints_the_joules_of_a_plan() -> None:
+    example = ROOT / "examples" / "ros2" / "plan_to_joints.py"
+    with system(robot="ur5e") as own:
+        command = [sys.executable, str(example), "--ros-args", "-r", f"__ns:={own.namespace}"]
+        done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
+        assert done.returncode == 0, done.stderr
+        # the figures of the page, which the library computes
+        assert done.stdout.startswith("43.2 J") and "less than straight" in done.stdout
