@@ -155,11 +155,11 @@ def _load(name: str, law: dict[str, Any], nq: int) -> Array | None:
 
 
 def _friction_laws(figures: dict[str, Any], nq: int) -> dict[str, FrictionLaw]:
-    knee = float(figures["friction_table"]["knee"]["value"])
+    knee = figures["friction_table"]["knee"]
     return {
         name: FrictionLaw(
             name=name,
-            knee=knee,
+            knee=float(law.get("knee", knee)["value"]),
             load=_load(name, law, nq),
             **{part: _joints(law[part], nq) for part in ("coulomb", "curved", "speed", "viscous")},
         )

@@ -19,14 +19,17 @@ from joulepath.models.robot import Array
 from joulepath.models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS
 
 TOP = ("covariance", "session_sd", "move_sd")
-# least and greatest value of the parts of a friction law, of which `load` is optional
+# least and greatest value of the parts of a friction law
 LAW: dict[str, tuple[float, float]] = {
     "coulomb": (0.0, 1e5),
     "curved": (0.0, 1e5),
     "speed": (1e-6, 1e5),
     "viscous": (0.0, 1e5),
     "load": (0.0, 0.999),
+    "knee": (1e-6, 1.0),
 }
+OPTIONAL = frozenset({"load", "knee"})
+"""Parts of a friction law that may be left out; the knee is one number for all joints."""
 REPLACEABLE: dict[str, dict[str, tuple[float, float]]] = {
     "drives": {
         "torque_constant": (1e-6, 1e6),
@@ -193,12 +196,14 @@ def _laws(own: dict[str, Any], content: Any, nq: int) -> dict[str, Any]:
         if law == own.get(name):
             continue
         where = f"friction_laws.{name}"
-        if not isinstance(law, dict) or not set(LAW) - {"load"} <= set(law) <= set(LAW):
+        if not isinstance(law, dict) or not set(LAW) - OPTIONAL <= set(law) <= set(LAW):
             raise InvalidFigures(
-                where, f"must have the figures {', '.join(LAW)}, of which load may be left out."
+                where,
+                f"must have the figures {', '.join(LAW)}, of which "
+                f"{' and '.join(sorted(OPTIONAL))} may be left out.",
             )
         laws[name] = {
-            part: _figure(f"{where}.{part}", law[part], LAW[part], (nq,))
+            part: _figure(f"{where}.{part}", law[part], LAW[part], () if part == "knee" else (nq,))
             for part in LAW
             if part in law
         }

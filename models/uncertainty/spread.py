@@ -27,6 +27,8 @@ LOAD = "load"
 SESSION = "session"
 INERTIALS = "inertials"
 _DRY = ("coulomb", "curved", "viscous")
+Places = set[tuple[str, int]]
+"""Figures and joints."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class _Sources:
     def spread(self) -> Spread:
         known = self._known
         # The covariance of another friction law does not apply.
-        identified = set() if known is None else {name for name, _ in known.places(self.law)}
+        identified = set() if known is None else {*known.places(self.law)}
         self._electronics(identified)
         self._friction(identified)
         self._drives(identified)
@@ -160,44 +162,54 @@ class _Sources:
         known = self.deviations.setdefault(source, np.zeros((DRAWS, self._size)))
         known[:, place(name, nq)] += deviation.reshape(DRAWS, -1)
 
+    def _unknown(self, names: tuple[str, ...], identified: Places) -> Array:
+        """1 for each joint (nq,) without identified figures of these names, 0 for all others."""
+        joints = range(self.robot.nq)
+        return np.array([float(all((name, j) not in identified for name in names)) for j in joints])
+
     def _letters(self, section: str, name: str) -> set[str]:
         return trust_letters(self.robot.figures.get(section, {}).get(name))
 
-    def _electronics(self, identified: set[str]) -> None:
-        if BASE_POWER not in identified:
+    def _electronics(self, identified: Places) -> None:
+        if (BASE_POWER, 0) not in identified:
             factor = self._factor("idle_power", self._letters("electronics", "idle_power"))
             self._add("idle_power", BASE_POWER, self.robot.electronics.idle_power * (factor - 1))
 
-    def _friction(self, identified: set[str]) -> None:
-        """Without identification: one factor common to all joints, and one factor per joint."""
+    def _friction(self, identified: Places) -> None:
+        """Of joints without identification: one factor common to all, and one factor for each."""
         nominal, nq = self._nominal, self.robot.nq
         law = self.robot.figures.get("friction_laws", {}).get(self.law, {})
-        if not identified & set(_DRY):
+        unknown = self._unknown(_DRY, identified)
+        if unknown.any():
             common = self._factor("friction_common")[:, None]
             joints = [self._factor("friction_joint", trust_letters(law)) for _ in range(nq)]
             factor = common * np.stack(joints, axis=1)
             for name in _DRY:
-                self._add(FRICTION, name, nominal[place(name, nq)] * (factor - 1))
-        if LOAD not in identified and "load" not in law:
-            loaded = np.arange(nq) < default_ranges()[LOAD]["joints"]
-            self._add(LOAD, "load", self._factor(LOAD)[:, None] * loaded)
+                self._add(FRICTION, name, unknown * nominal[place(name, nq)] * (factor - 1))
+        loaded = unknown * self._unknown((LOAD,), identified)
+        loaded *= np.arange(nq) < default_ranges()[LOAD]["joints"]
+        # zeros of a law with a load are the robot's own, unless logs identified others of them
+        named = "load" in law and not any(name == LOAD for name, _ in identified)
+        if loaded.any() and not named:
+            unnamed = nominal[place(LOAD, nq)] == 0
+            self._add(LOAD, "load", self._factor(LOAD)[:, None] * loaded * unnamed)
 
-    def _drives(self, identified: set[str]) -> None:
+    def _drives(self, identified: Places) -> None:
         nominal, nq = self._nominal, self.robot.nq
         large = large_joints(self.robot)
         for name in ("torque_constant", "rotor_inertia", "copper"):
-            if name in identified:
+            unknown = self._unknown((name,), identified)
+            if not unknown.any():
                 continue
             letters = self._letters("drives", name)
             ranges = ("copper_large", "copper_small") if name == "copper" else (name, name)
             first, second = (self._factor(each, letters)[:, None] for each in ranges)
-            self._add(name, name, nominal[place(name, nq)] * (np.where(large, first, second) - 1))
-        if "inverter_linear" not in identified and not nominal[place("inverter_linear", nq)].any():
-            self._add(
-                "inverter_linear",
-                "inverter_linear",
-                np.tile(self._factor("inverter_linear")[:, None], nq),
-            )
+            factor = np.where(large, first, second)
+            self._add(name, name, unknown * nominal[place(name, nq)] * (factor - 1))
+        name = "inverter_linear"
+        unknown = self._unknown((name,), identified)
+        if unknown.any() and not (unknown * nominal[place(name, nq)]).any():
+            self._add(name, name, self._factor(name)[:, None] * unknown)
 
     def _identified(self, known: Covariance) -> tuple[Array, Array]:
         """Draws (n, p) with the covariance of the document, and this covariance (p, p)."""
@@ -214,13 +226,13 @@ class _Sources:
             column[:] = self._normal()
         return normal @ root.T, covariance
 
-    def _session(self, session_sd: float, identified: set[str]) -> Array:
-        """Draws (n, p) of the friction on another day: one factor for all joints."""
+    def _session(self, session_sd: float, identified: Places) -> Array:
+        """Draws (n, p) of the friction on another day: one factor for all identified joints."""
         nq, result = self.robot.nq, np.zeros((DRAWS, self._size))
         factor = session_sd * self._normal()
-        for name in (*_DRY, "load"):
-            if identified & {*_DRY, "load"}:
-                result[:, place(name, nq)] = factor[:, None] * self._nominal[place(name, nq)]
+        known = 1 - self._unknown((*_DRY, LOAD), identified)
+        for name in (*_DRY, LOAD):
+            result[:, place(name, nq)] = factor[:, None] * known * self._nominal[place(name, nq)]
         return result
 
 
