@@ -80,7 +80,12 @@ Examples:
 @METHOD
 @PERIOD
 @TERMS
-@click.option("--refit", is_flag=True, help="Find the links' inertials, too.")
+@click.option(
+    "--refit/--keep",
+    default=None,
+    help="Find the links' inertials, too, or keep the robot's own. Default: refit them to torques "
+    "measured behind the gears alone.",
+)
 @click.option(
     "--estimator",
     type=click.Choice(get_args(Estimator)),
@@ -104,6 +109,12 @@ Examples:
     default="auto",
     help="What efforts are.",
 )
+@click.option(
+    "--torque-side",
+    type=click.Choice(["motor", "link"]),
+    help="Where torques were measured: at the motor, or behind the gear. Default: as the robot's "
+    "torque limits.",
+)
 def identify(
     logs: tuple[Path, ...],
     output: Path | None,
@@ -113,12 +124,13 @@ def identify(
     method: str,
     period: float | None,
     terms: tuple[str, ...],
-    refit: bool,
+    refit: bool | None,
     estimator: str,
     payload: float | None,
     com: tuple[float, float, float],
     units: str,
     effort: str,
+    torque_side: str | None,
 ) -> None:
     """Finds the figures of one arm from its LOGS, with their standard deviations.
 
@@ -135,6 +147,7 @@ def identify(
         "payload": carried,
         "units": units,
         "effort": effort,
+        "torque_side": torque_side,
     }
     read = tuple(read_log_file(settings, file, request_id) for file in (*logs, *others))
     body: dict[str, Any] = {
@@ -142,7 +155,8 @@ def identify(
         "estimator": estimator,
         "fit": list(fit),
     }
-    body |= {"method": method, "period": period, "inertials": "refit" if refit else "keep"}
+    inertials = "automatic" if refit is None else "refit" if refit else "keep"
+    body |= {"method": method, "period": period, "inertials": inertials}
     body |= {"friction": {"terms": list(terms)}}
     body |= {"validate": [FILE_ID] * len(others)} if others else {}
     asked = validated(IdentifyRequest, _json(body), request_id)
@@ -192,6 +206,8 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
     told = [each for each in result["parameters"] if each["identified"]]
     lines = {"identified": f"{len(told)} of {len(result['parameters'])} figures"}
     lines["validated on"] = f"{result['validation']['moves']} moves that no fit has seen"
+    if result["warnings"]:
+        lines["warnings"] = " ".join(result["warnings"])
     if result["payload"] is not None:
         carried = result["payload"]
         lines["payload"] = (

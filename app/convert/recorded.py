@@ -37,6 +37,7 @@ def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:
         units=settings.units,
         current_units=settings.current_units,
         effort=settings.effort,
+        torque_side=settings.torque_side,
         name=settings.name,
         tags=tuple(settings.tags),
         max_bytes=most_bytes,
@@ -111,6 +112,7 @@ def read_csv(file: Path, asked: EvaluateCsvSettings, otherwise: InvalidTable) ->
         units=asked.units,
         current_units=asked.current_units,
         effort=asked.effort,
+        torque_side=asked.torque_side,
     )
     robot = robot_named(asked.robot)
     try:

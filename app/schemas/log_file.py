@@ -30,7 +30,7 @@ class LogColumns(Request):
         "Motor currents.", None, ["amps_1", "amps_2"], default=None
     )
     torque: _Columns | None = described(
-        "Motor torques at the joints.", None, ["nm_1", "nm_2"], default=None
+        "Torques at the joints.", None, ["nm_1", "nm_2"], default=None
     )
     effort: _Columns | None = described(
         "Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None
@@ -64,9 +64,17 @@ class LogFile(Request):
     )
     current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
     effort: Literal["auto", "current", "torque", "external"] = described(
-        "What the efforts are: motor currents, motor torques at the joints, or torques from "
-        "outside, without gravity. `auto` finds it out.",
+        "What the efforts are: motor currents, torques at the joints, or torques from outside, "
+        "without gravity. `auto` finds it out.",
         None,
         "auto",
         default="auto",
+    )
+    torque_side: Literal["motor", "link"] | None = described(
+        "Where torques were measured: at the `motor`, with rotor and friction; or at the `link`, "
+        "by sensors behind the gears, without them. Null: as the robot's `limits.torque_side`. It "
+        "has no effect on currents.",
+        None,
+        "link",
+        default=None,
     )

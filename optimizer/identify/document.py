@@ -1,16 +1,22 @@
 """Identified figures in the form of a robot's `figures.yaml`.
 
-A figure has a value, unit, source, trust letter and standard deviation.
+A figure has a value, unit, source, trust letter and standard deviation. What the logs did not
+identify keeps the robot's own value, source and letter; a figure of some joints has the worst
+letter of its joints.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.models.trust import TRUST
+from joulepath.models.uncertainty.document import DOCUMENT
 from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES
+from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
 from joulepath.optimizer.identify.results import IdentifiedFigures
 
 FRICTION_LAW = "identified"
@@ -20,51 +26,64 @@ _LAW_UNITS = {
     "speed": "rad/s",
     "viscous": "N·m·s/rad",
     "load": "1",
+    "knee": "rad/s",
 }
 _DRIVES = {
     "torque_constant": "N·m/A",
     "rotor_inertia": "kg·m²",
     "copper": "W/A²",
+    "inverter_constant": "W",
     "inverter_linear": "W/A",
+    "inverter_quadratic": "W/A²",
 }
 _INERTIALS = {"mass": "kg", "center_of_mass": "m", "inertia": "kg·m²"}
-TRUST = "B"
+IDENTIFIED = "B"
 LINK_MASS = "inertials.m"
+UNDETERMINED = (
+    "The logs hardly determine joints {}: their values are the most probable ones, given the logs "
+    "and the ranges of the robot's own figures."
+)
+KEPT = "Joints {} keep the robot's own values, of trust {}: {}"
 
 
-def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
+def document_of(
+    own: Mapping[str, Any], law: str, figures: IdentifiedFigures, date: str
+) -> dict[str, Any]:
     """Document of identified figures, with their covariance.
 
     Sections without identified figures are left out. Names in the covariance are paths of figures
     with the number of the joint: `drives.copper.2`.
 
     Args:
+        own: the robot's own figures by section.
+        law: name of the robot's own friction law.
         figures: the figures.
         date: date of the sources of the figures.
     """
     source = f"identified from logs {', '.join(figures.logs)}, {date}"
 
-    def figure(name: str, unit: str) -> dict[str, Any]:
-        value = figures.values[name]
-        content = {"value": value.tolist(), "unit": unit, "source": source, "trust": TRUST}
-        deviations = _deviations(figures, name, value)
-        return content if deviations is None else content | {"sd": deviations.tolist()}
+    def section(units: dict[str, str], known: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            name: _figure(figures, name, unit, source, known.get(name))
+            for name, unit in units.items()
+            if name in figures.values
+        }
 
-    def section(units: dict[str, str]) -> dict[str, Any]:
-        return {name: figure(name, unit) for name, unit in units.items() if name in figures.values}
-
-    law, drives, inertials = section(_LAW_UNITS), section(_DRIVES), section(_INERTIALS)
+    friction = section(_LAW_UNITS, own["friction_laws"][law])
+    drives = section(_DRIVES, own["drives"])
+    electronics = section({"idle_power": "W"}, own["electronics"])
+    inertials = section(_INERTIALS, own["inertials"])
     document: dict[str, Any] = {"robot": figures.robot}
-    if law:
-        document["friction_laws"] = {FRICTION_LAW: law}
+    if friction:
+        document["friction_laws"] = {FRICTION_LAW: friction}
     if drives:
         document["drives"] = drives
-    if "idle_power" in figures.values:
-        document["electronics"] = {"idle_power": figure("idle_power", "W")}
+    if electronics:
+        document["electronics"] = electronics
     if inertials:
         turned = {"value": np.zeros((len(figures.values["mass"]), 3)).tolist(), "unit": "rad"}
         document["inertials"] = inertials | {
-            "inertia_frame_rpy": turned | {"source": source, "trust": TRUST}
+            "inertia_frame_rpy": turned | {"source": source, "trust": inertials["mass"]["trust"]}
         }
     listed = [k for k, (name, _) in enumerate(figures.parameters) if _path(name) is not None]
     if listed:
@@ -73,6 +92,37 @@ def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
             "matrix": _symmetric(figures.covariance[np.ix_(listed, listed)]).tolist(),
         }
     return document | {"session_sd": figures.session_sd, "move_sd": figures.move_sd}
+
+
+def _figure(
+    figures: IdentifiedFigures, name: str, unit: str, source: str, own: dict[str, Any] | None
+) -> dict[str, Any]:
+    """One figure; the robot's `own` one if no joint differs from it."""
+    value, identified = figures.values[name], figures.identified[name]
+    changed = identified
+    if own is not None:
+        differs = value != np.asarray(own["value"], dtype=float)
+        changed = identified | (differs.any(axis=1) if differs.ndim > 1 else differs)
+        if not np.any(changed):
+            return own
+    letters = [IDENTIFIED] * bool(np.any(identified))
+    notes = list[str]()
+    if own is not None and not np.all(identified):
+        letters.append(own["trust"])
+        for joints, text in ((changed & ~identified, UNDETERMINED), (~changed, KEPT)):
+            if np.ndim(joints) and joints.any():
+                numbers = numbers_of_joints(np.flatnonzero(joints).tolist())
+                notes.append(text.format(numbers, own["trust"], own["source"]))
+    content: dict[str, Any] = {
+        "value": value.tolist(),
+        "unit": unit,
+        "source": source,
+        "trust": max(letters or [IDENTIFIED], key=list(TRUST).index),
+    }
+    if notes:
+        content["note"] = " ".join(notes)[: DOCUMENT.text]
+    deviations = _deviations(figures, name, value)
+    return content if deviations is None else content | {"sd": deviations.tolist()}
 
 
 def _deviations(figures: IdentifiedFigures, name: str, value: Array) -> Array | None:

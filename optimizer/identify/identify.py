@@ -11,9 +11,10 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.fitted_arm import own_arm
+from joulepath.optimizer.identify.arm.logged_torque import logged_torque, motor_torque
 from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.fits.by_method import fit_by_method, prepare
-from joulepath.optimizer.identify.fits.fitting import FitResult, motor_torque
+from joulepath.optimizer.identify.fits.fitting import FitResult
 from joulepath.optimizer.identify.fits.payload_fit import (
     IdentifiedPayload,
     fit_payload,
@@ -76,6 +77,11 @@ class Identification(Result):
     logs: tuple[str, ...]
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """Remarks on figures whose own values the logs reject."""
+        return tuple(each.named_remark for each in self.parameters if each.identified and each.why)
+
+    @property
     def noise(self) -> MeasuredNoise | None:
         """Noise of a periodic motion; None for other methods."""
         return self.fitted.noise
@@ -103,7 +109,9 @@ class Identification(Result):
 
     def figures(self) -> IdentifiedFigures:
         """Figures of all joints, with their covariance."""
-        return figures_of(self.robot, self.fitted, self.spread, self.options, self.logs)
+        return figures_of(
+            self.robot, self.fitted, self.spread, self.options, self.parameters, self.logs
+        )
 
     def document(self, date: str) -> dict[str, Any]:
         """The figures as a document, which `load_robot(robot, figures=document)` computes with.
@@ -115,7 +123,7 @@ class Identification(Result):
             Value, unit, source, trust letter and standard deviation of each figure, and their
             covariance; see docs/reference/identification.md.
         """
-        return document_of(self.figures(), date)
+        return document_of(self.robot.figures, self.robot.friction.name, self.figures(), date)
 
     def _headline(self) -> str:
         told = sum(each.identified for each in self.parameters)
@@ -224,7 +232,7 @@ def _identified(
         temperatures=temperatures_of(
             rows, motor_torque(fitted.arm, rows), fitted.arm, fitted.clusters, threshold
         ),
-        advice=advice_of(fitted, rows),
+        advice=advice_of(robot, fitted, rows),
         validation=validation,
         payload=payload,
         curves=curves_of([(fitted.arm, rows, ~held_out)], threshold),
@@ -265,7 +273,7 @@ def _payload(
     if "payload" not in options.fit:
         return None
     return fit_payload(
-        robot, rows, motor_torque(own_arm(robot), rows), last, options.velocity_threshold
+        robot, rows, logged_torque(own_arm(robot), rows), last, options.velocity_threshold
     )
 
 

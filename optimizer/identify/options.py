@@ -48,8 +48,9 @@ class IdentificationOptions:
     fit: Sequence[Target] = ("friction", "rotor")
     """Requested figures. Power is added if the logs have it; friction and rotors are added if the
     payload of the last log is requested."""
-    refit: bool = False
-    """Whether to fit the inertials of the links, too."""
+    refit: bool | None = None
+    """Whether to fit the inertials of the links, too; None: only to torques that were measured
+    behind the gears, which identify nothing else."""
     method: Method = "automatic"
     period: float | None = None
     """Period of the motion for the method `periodic` [s]."""
@@ -111,7 +112,7 @@ class IdentificationOptions:
     @property
     def needs_regressor(self) -> bool:
         """Whether the fit needs the regressor of the links."""
-        return self.refit or self.links_unknown
+        return bool(self.refit) or self.links_unknown
 
     @property
     def targets(self) -> tuple[Target, ...]:

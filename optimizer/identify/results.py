@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.declared import (
     Count,
     Internal,
@@ -41,7 +41,14 @@ class IdentifiedParameter:
     identified: bool
     """Whether the logs determine the figure."""
     why: str
-    """Reason for not identifying it; empty if the logs determine it."""
+    """Reason for not identifying it, or a remark on a value that is identified poorly because the
+    logs reject the robot's own; otherwise empty."""
+
+    @property
+    def named_remark(self) -> str:
+        """`why`, with the name of the figure."""
+        place = "" if self.joint is None else f" of joint {self.joint + 1}"
+        return f"{self.figure}{place}: {self.why}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +221,8 @@ class IdentifiedFigures:
     robot: str
     values: dict[str, Array]
     """Complete figures by name: joints without an identified value have the robot's own."""
+    identified: dict[str, Mask]
+    """Whether the logs identify the value of each joint (nq,), or of the whole arm (), by name."""
     parameters: tuple[Name, ...]
     """Names of the p parameters that the logs changed."""
     sd: Array

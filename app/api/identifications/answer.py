@@ -63,6 +63,10 @@ class IdentificationResult:
     the mean power of a move). `PUT /figures` of another server takes them, too."""
     parameters: tuple[IdentifiedParameter, ...]
     """All figures that were sought."""
+    warnings: list[str]
+    """Figures at a bound or with a large standard deviation, which are used because the logs reject
+    the robot's own values. They mean that the robot's links, torque constants or payload do not fit
+    the logs."""
     structure: Structure
     """Base parameters of the links and rotors."""
     physical: Physical | None
@@ -90,6 +94,7 @@ class IdentificationResult:
             found.robot.name,
             found.document(datetime.now(UTC).date().isoformat()),
             found.parameters,
+            list(found.warnings),
             found.structure,
             found.physical,
             validation,

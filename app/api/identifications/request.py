@@ -85,12 +85,13 @@ class IdentifyRequest(Request):
         ge=0.1,
         le=1e4,
     )
-    inertials: Literal["keep", "refit"] = described(
+    inertials: Literal["automatic", "keep", "refit"] = described(
         "`keep`: the robot's own. `refit`: they are found, too, as those of real bodies near the "
-        "robot's own.",
+        "robot's own. `automatic`: they are refitted to torques that were measured behind the "
+        "gears, which identify nothing else, and kept otherwise.",
         None,
-        "keep",
-        default="keep",
+        "automatic",
+        default="automatic",
     )
     friction: FrictionTerms = Field(
         description="Terms of the friction law.", default=FrictionTerms()

@@ -70,7 +70,7 @@ def _to_options(request: IdentifyRequest) -> IdentificationOptions:
     held_out = 1.0 if by == "moves" else by.fraction if isinstance(by, Fraction) else 0.0
     return IdentificationOptions(
         fit=tuple(request.fit),
-        refit=request.inertials == "refit",
+        refit=None if request.inertials == "automatic" else request.inertials == "refit",
         method=request.method,
         period=request.period,
         held_out=held_out,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Literal
 
 from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.values import CREATED, LOG_ID
@@ -43,6 +44,12 @@ class LogEffort(Response):
         "torque; 0: without gravity. Null: the motion does not tell.",
         "1/A or 1",
         {"shoulder_lift_joint": 0.1, "elbow_joint": 0.1},
+    )
+    torque_side: Literal["motor", "link"] = described(
+        "Where they were measured: at the `motor`, with rotor and friction; or at the `link`, "
+        "behind the gear, without them. Currents are always of the motor.",
+        None,
+        "motor",
     )
 
 

@@ -22,6 +22,18 @@ FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
 
 
 @dataclass(frozen=True, eq=False)
+class LinkSensor:
+    """What torque sensors behind the gears see beside the bodies, per joint (nq,)."""
+
+    coulomb: Array
+    """Coulomb friction behind the sensors [N·m]."""
+    viscous: Array
+    """Viscous friction behind the sensors [N·m·s/rad]."""
+    offset: Array
+    """Reading of the sensors without a torque [N·m]."""
+
+
+@dataclass(frozen=True, eq=False)
 class FittedArm:
     """Figures of an arm, per joint (nq,) unless stated otherwise.
 
@@ -50,6 +62,8 @@ class FittedArm:
     """Change (10 nq,) of the links' parameters from the robot's own; None for the own links."""
     link_scale: float = 1.0
     """Factor on the masses of all links [1]."""
+    sensor: LinkSensor | None = None
+    """Sensors behind the gears; None where no such torques were fitted."""
 
     def rigid_torque(self, rows: Rows) -> Array:
         """Rigid-body torque (n, nq) [N·m]."""
@@ -74,6 +88,16 @@ class FittedArm:
         """Motor torque (n, nq) [N·m]."""
         parts = self.torque_parts(rows)
         return parts.rigid + parts.rotor + parts.other + friction_torque(parts)
+
+    def measured_torque(self, rows: Rows) -> Array:
+        """Torque (n, nq) [N·m] that is measured: of the motors, or behind the gears."""
+        if not rows.link_side:
+            return self.torque(rows)
+        rigid, sensor = self.rigid_torque(rows), self.sensor
+        if sensor is None:
+            return rigid
+        sign = rows.v / np.hypot(rows.v, self.knee)
+        return np.asarray(rigid + sensor.coulomb * sign + sensor.viscous * rows.v + sensor.offset)
 
     def torque_parts(self, rows: Rows) -> TorqueParts:
         """Torque parts from which the power follows."""
@@ -129,7 +153,9 @@ def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
         offset=np.zeros(nq),
         rotor_inertia=drives.rotor_inertia,
         torque_constant=drives.torque_constant,
-        power_parameters=PowerParameters.nominal(idle, drives.copper, drives.inverter_linear),
+        power_parameters=PowerParameters.nominal(
+            idle, drives.copper + drives.inverter_quadratic, drives.inverter_linear
+        ),
         regeneration=robot.electronics.regeneration,
         knee=law.knee if knee is None else knee,
     )

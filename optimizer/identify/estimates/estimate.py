@@ -26,6 +26,8 @@ class Estimate:
     """Reason (p,) for keeping the robot's own value; empty for a figure found from the logs."""
     prior_covariance: Array
     """Covariance (p, p) due to errors of figures assumed before the fit."""
+    remarks: tuple[str, ...] = ()
+    """Remark (p,) on a figure found from the logs, or empty; no remarks if there are none."""
 
     @property
     def covariance(self) -> Array:
@@ -56,4 +58,7 @@ def join_estimates(estimates: list[Estimate], shared: Array | None = None) -> Es
         replicates=np.hstack([each.replicates for each in estimates]),
         reasons=tuple(reason for each in estimates for reason in each.reasons),
         prior_covariance=covariance,
+        remarks=tuple(
+            remark for each in estimates for remark in each.remarks or ("",) * len(each.names)
+        ),
     )

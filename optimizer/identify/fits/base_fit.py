@@ -16,15 +16,18 @@ from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, bas
 from joulepath.optimizer.identify.arm.friction_columns import lower_bounds
 from joulepath.optimizer.identify.choices import Estimator
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.estimates.grouped import (
-    GroupedEquations,
-    jackknife,
-    leave_one_out,
-    solve_bounded,
-)
+from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, solve_bounded
 from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
 from joulepath.optimizer.identify.fits.block import own_value
-from joulepath.optimizer.identify.fits.torque_fit import AT_BOUND, TORQUE_FIT, UNCERTAIN
+from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
+from joulepath.optimizer.identify.fits.determined import (
+    DETERMINED,
+    REJECTED,
+    reason_of,
+    rejections,
+    unbounded,
+    with_reasons,
+)
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
@@ -115,8 +118,9 @@ def fit_base(
 ) -> Estimate:
     """Fit base parameters and friction by ordinary, weighted or reweighted least squares.
 
-    With the method `essential_parameters`, undetermined unknowns are held at the robot's own
-    values, the least determined first, until all others are determined.
+    Undetermined friction and rotors, and with the method `essential_parameters` all undetermined
+    unknowns, are held at the robot's own values, the least determined first, until all others are
+    determined. An unknown whose own value the logs reject is not held.
 
     Args:
         robot: the robot with its own figures.
@@ -125,9 +129,24 @@ def fit_base(
         clusters: partition of the rows for the jackknife.
         options: requested figures and estimator.
     """
-    arm = base_regression(robot, rows, torque, clusters, options)
+    speeds = curve_speeds(robot, rows, torque, clusters, options)
+    return with_speeds(
+        robot, speeds, lambda speeds: _fit(robot, rows, torque, clusters, options, speeds)
+    )
+
+
+def _fit(
+    robot: Robot,
+    rows: Rows,
+    torque: Array,
+    clusters: Clusters,
+    options: IdentificationOptions,
+    speeds: Array | None,
+) -> Estimate:
+    """The fit of `fit_base`, for given speeds (nq,) of the curved terms."""
+    arm = base_regression(robot, rows, torque, clusters, options, speeds)
     terms = base_terms(robot, arm, options)
-    columns, lower, own, block = terms.columns(arm), terms.lower, terms.own, arm.block
+    columns, lower, block = terms.columns(arm), terms.lower, arm.block
     weight = np.ones_like(arm.values)
     for _ in range(BASE_FIT.passes(options.estimator)):
         grouped = GroupedEquations.of(columns, arm.values, weight, block.cluster, clusters.count)
@@ -135,27 +154,63 @@ def fit_base(
         weight = inverse_variance_weights(
             block.joint, arm.values - columns @ value, options.estimator == "irls"
         )
-    free, reasons = np.ones(len(own), dtype=bool), [""] * len(own)
+    return hold_undetermined(terms, grouped, options)
+
+
+def hold_undetermined(
+    terms: BaseTerms,
+    grouped: GroupedEquations,
+    options: IdentificationOptions,
+) -> Estimate:
+    """Solve for the unknowns that the rows determine, with all others at the robot's own values.
+
+    Args:
+        terms: the unknowns.
+        grouped: normal equations.
+        options: the method.
+    """
+    own, lower = terms.own, terms.lower
+    free, reasons, remarks = np.ones(len(own), dtype=bool), [""] * len(own), [""] * len(own)
+    may_hold = np.arange(len(own)) >= len(terms.expressed)
+    if options.method == "essential_parameters":
+        may_hold[:] = True
     while True:
         part, value = _free_equations(grouped, own, free), own.copy()
-        value[free] = solve_bounded(part.gram.sum(axis=0), part.moment.sum(axis=0), lower[free])
-        replicates = np.tile(value, (clusters.count, 1))
-        replicates[:, free] = leave_one_out(part, value[free], (value > lower)[free])
-        if options.method != "essential_parameters":
+        gram, moment = part.gram.sum(axis=0), part.moment.sum(axis=0)
+        value[free] = solve_bounded(gram, moment, lower[free])
+        inside = (value > lower)[free]
+        gradient = gram @ value[free] - moment
+        solution = unbounded(part, value[free], inside, ~inside, gradient)
+        rejected, sd = np.zeros(len(own)), np.zeros(len(own))
+        rejected[free], sd[free] = rejections(solution, own[free]), solution.sd
+        relative = _relative_sd(terms.names, value, sd, free & may_hold)
+        doubted = relative > DETERMINED.max_relative_sd
+        reason = {
+            k: reason_of(float(value[k]), float(sd[k])) for k in np.flatnonzero(doubted).tolist()
+        }
+        remarks = [
+            REJECTED.format(reason[k], own[k], rejected[k]) if k in reason else ""
+            for k in range(len(own))
+        ]
+        open_terms = np.flatnonzero(doubted & (rejected == 0))
+        if not len(open_terms):
             break
-        relative = _relative_sd(terms.names, value, replicates, free)
-        worst = int(np.argmax(relative))
-        if relative[worst] <= TORQUE_FIT.max_relative_sd:
-            break
-        free[worst] = False
-        reasons[worst] = (
-            UNCERTAIN.format(relative[worst]) if np.isfinite(relative[worst]) else AT_BOUND
-        )
-    return Estimate(terms.names, value, replicates, tuple(reasons), np.zeros((len(own), len(own))))
+        worst = int(open_terms[np.argmax(relative[open_terms])])
+        free[worst], reasons[worst] = False, reason[worst]
+    replicates = np.tile(value, (len(grouped.gram), 1))
+    replicates[:, free] = solution.replicates
+    none = np.zeros((len(own), len(own)))
+    found = Estimate(terms.names, value, replicates, tuple(reasons), none, tuple(remarks))
+    return with_reasons(found, range(len(terms.expressed)))
 
 
 def base_regression(
-    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
+    robot: Robot,
+    rows: Rows,
+    torque: Array,
+    clusters: Clusters,
+    options: IdentificationOptions,
+    speeds: Array | None,
 ) -> WholeArmRegression:
     """Regression of motor torques (n, nq) [N·m] on all bodies, friction and rotors."""
     assert rows.regressor is not None
@@ -167,6 +222,7 @@ def base_regression(
         options,
         rows.regressor,
         np.zeros(PARAMETERS_PER_BODY * robot.nq),
+        speeds,
     )
 
 
@@ -181,10 +237,9 @@ def _free_equations(grouped: GroupedEquations, own: Array, free: Mask) -> Groupe
     return GroupedEquations(grouped.gram[:, free][:, :, free], (grouped.moment - held)[:, free])
 
 
-def _relative_sd(names: tuple[Name, ...], value: Array, replicates: Array, free: Mask) -> Array:
+def _relative_sd(names: tuple[Name, ...], value: Array, sd: Array, free: Mask) -> Array:
     """Standard deviations (p,) over values; 0 for held unknowns and for offsets, which are kept
     with any standard deviation."""
-    sd = np.sqrt(np.diag(jackknife(replicates)))
     counts = free & np.array([term != "offset" for term, _ in names])
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(counts, np.where(value != 0, sd / np.abs(value), np.inf), 0.0)

@@ -19,6 +19,7 @@ from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, leave_one_out
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
+from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.whole_fit import LINK
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
@@ -68,13 +69,14 @@ def fit_wrench(
             gram, moment, len(own) // PARAMETERS_PER_BODY, np.full(len(own), -np.inf)
         )
     spread = np.linalg.solve(gram, precision)
-    return Estimate(
+    found = Estimate(
         names=tuple((LINK + part, joint) for joint in range(robot.nq) for part in LINKS),
         value=value,
         replicates=leave_one_out(grouped, value, np.ones(len(own), dtype=bool), precision),
         reasons=("",) * len(own),
         prior_covariance=spread @ np.linalg.inv(gram),
     )
+    return with_reasons(found, range(len(own)))
 
 
 def _weights(residuals: Array, clusters: Clusters) -> Array:

@@ -9,12 +9,38 @@ import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, column, lower_bounds
+from joulepath.optimizer.identify.choices import Estimator
 from joulepath.optimizer.identify.estimates.estimate import Name
-from joulepath.optimizer.identify.estimates.grouped import IntArray
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    IntArray,
+    solve_bounded,
+)
+from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
 from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
+
+@dataclass(frozen=True)
+class BlockFitSettings:
+    """Solutions of each estimator; all but the first reweight the rows."""
+
+    ols_passes: int = 1
+    wls_passes: int = 2
+    """For several joints; the rows of one joint have equal weights."""
+    irls_passes: int = 8
+
+    def passes(self, estimator: Estimator, joints: int) -> int:
+        """Solutions of an estimator for a number of joints."""
+        return {
+            "ols": self.ols_passes,
+            "wls": self.wls_passes if joints > 1 else 1,
+            "irls": self.irls_passes,
+        }[estimator]
+
+
+BLOCK_FIT = BlockFitSettings()
 SCALE = "scale"
 """Factor on the rigid torque: the robot's own torque constant over the real one."""
 
@@ -38,8 +64,8 @@ class JointBlock:
     """The robot's own values of the terms."""
     spread: Mapping[int | None, float]
     """Standard deviation of the rigid torque of each joint [N·m]."""
-    speed: float | None
-    """Candidate for the speed of the curved term [rad/s]; None for the robot's own."""
+    speed: Array
+    """Speeds (nq,) at which the curved terms bend [rad/s]."""
 
 
 def terms_of(options: IdentificationOptions) -> list[str]:
@@ -56,7 +82,7 @@ def joint_block(
     clusters: Clusters,
     options: IdentificationOptions,
     joints: Sequence[int],
-    speed: float | None = None,
+    speed: Array | None = None,
 ) -> JointBlock:
     """Regression of some joints.
 
@@ -67,7 +93,7 @@ def joint_block(
         clusters: partition of the rows.
         options: requested figures.
         joints: numbers of the joints.
-        speed: speed of the curved term [rad/s]; None for the robot's own, joint by joint.
+        speed: speeds (nq,) of the curved terms [rad/s]; None for the robot's own.
     """
     terms, knee = terms_of(options), robot.friction.knee if options.knee is None else options.knee
     couplings = [
@@ -76,7 +102,7 @@ def joint_block(
     coupled = [term for term in terms if term in ("coulomb", "viscous", "rotor_inertia")]
     names = [(term, joint) for joint in joints for term in terms]
     names += [(COUPLED + term, k) for k, _ in couplings for term in coupled]
-    own_speed = robot.friction.speed if speed is None else np.full(robot.nq, speed)
+    speed = robot.friction.speed if speed is None else speed
     parts = list[tuple[Array, Array, int, IntArray]]()
     known, spread = _known_torque(robot, rows, options), dict[int | None, float]()
     for at, joint in enumerate(joints):
@@ -86,7 +112,7 @@ def joint_block(
         columns = np.zeros((int(use.sum()), len(names)))
         for k, term in enumerate(terms):
             columns[:, at * len(terms) + k] = column(
-                term, v[:, joint], a[:, joint], rigid[:, joint], knee, float(own_speed[joint])
+                term, v[:, joint], a[:, joint], rigid[:, joint], knee, float(speed[joint])
             )
         for c, (_, coupling) in enumerate(couplings):
             ratios = coupling.ratios
@@ -126,6 +152,22 @@ def moving_rows(
         if joint in coupling.joints:
             use &= np.abs(rows.v @ coupling.ratios) > threshold
     return use
+
+
+def weighted_solution(
+    block: JointBlock, clusters: Clusters, options: IdentificationOptions
+) -> tuple[Array, Array]:
+    """Solution (p,) and weights (n,) of the rows."""
+    weight = np.ones_like(block.values)
+    for step in range(passes := BLOCK_FIT.passes(options.estimator, len(np.unique(block.joint)))):
+        grouped = GroupedEquations.of(
+            block.columns, block.values, weight, block.cluster, clusters.count
+        )
+        found = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), block.lower)
+        if step < passes - 1:
+            residuals = block.values - block.columns @ found
+            weight = inverse_variance_weights(block.joint, residuals, options.estimator == "irls")
+    return found, weight
 
 
 def own_value(robot: Robot, name: Name) -> float:

@@ -9,8 +9,9 @@ import numpy as np
 
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identify.arm.logged_torque import motor_torque
 from joulepath.optimizer.identify.errors import MethodNotApplicable
-from joulepath.optimizer.identify.fits.fitting import FitResult, fit_rows, motor_torque
+from joulepath.optimizer.identify.fits.fitting import FitResult, fit_rows
 from joulepath.optimizer.identify.fits.periodic import cut_into_periods
 from joulepath.optimizer.identify.fits.temperature import (
     TEMPERATURE,
@@ -28,6 +29,8 @@ def prepare(
 ) -> tuple[list[Log], IdentificationOptions]:
     """Logs and options in the form that the method of the options needs.
 
+    Links are refitted to torques behind the gears, unless the options keep them.
+
     Raises:
         MethodNotApplicable: the logs lack a channel or a property that the method needs.
         InvalidProblem: the options lack the period of the method `periodic`.
@@ -35,6 +38,10 @@ def prepare(
     missing = _missing_requirement(logs, options)
     if missing:
         raise MethodNotApplicable(options.method, missing)
+    if options.refit is None:
+        keeps = options.method != "automatic" or "payload" in options.fit
+        refit = not keeps and any(_behind_gears(log) for log in logs)
+        options = replace(options, refit=refit)
     if options.method == "motor_current":
         return [*logs], replace(
             options, fit=tuple(dict.fromkeys((*options.fit, "torque_constant")))
@@ -68,8 +75,17 @@ def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> F
     return fitted
 
 
+def _behind_gears(log: Log) -> bool:
+    return log.effort_meaning == "torque" and log.torque_side == "link"
+
+
 def _missing_requirement(logs: Sequence[Log], options: IdentificationOptions) -> str:
     """Requirement of the method that the logs do not meet, as a sentence; empty if none."""
+    if options.method in ("threshold_velocity", "temperature") and any(map(_behind_gears, logs)):
+        return (
+            "it needs motor currents or torques of the motors in every log. Torques of sensors "
+            "behind the gears do not contain the friction of motors and gears."
+        )
     match options.method:
         case "automatic":
             return ""

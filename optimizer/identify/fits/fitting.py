@@ -10,10 +10,19 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm, with_torques
+from joulepath.optimizer.identify.arm.logged_torque import logged_torque
 from joulepath.optimizer.identify.arm.power_model import PowerParameters, packed_size
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
+from joulepath.optimizer.identify.fits.determined import with_reasons
+from joulepath.optimizer.identify.fits.link_side import (
+    as_sensor_terms,
+    kept_drives,
+    seen_behind_gears,
+    sensor_of,
+    sensor_options,
+)
 from joulepath.optimizer.identify.fits.periodic import fit_periodic
 from joulepath.optimizer.identify.fits.power_fit import (
     PowerFit,
@@ -83,7 +92,7 @@ class FitResult:
 def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitResult:
     """Fit the logged channels: torques, power or both; or the wrench beneath the base."""
     clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
-    torque, with_power = motor_torque(arm, rows), bool(np.isfinite(rows.power).any())
+    torque, with_power = logged_torque(arm, rows), bool(np.isfinite(rows.power).any())
     size = packed_size(robot.nq)
     moving_power = rows.power[np.isfinite(rows.power) & ~rows.rest]
     fitted = FitResult(
@@ -102,20 +111,27 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitRes
     errors = np.zeros((0, 0))
     if np.isfinite(torque).any():
         fitted, errors = _with_torque(robot, rows, torque, fitted, options)
-    return _with_power(robot, rows, fitted, errors, options) if with_power else fitted
+    if with_power:
+        return _with_power(robot, rows, fitted, errors, options)
+    if rows.link_side:
+        kept = kept_drives(robot, clusters.count, options)
+        return replace(fitted, estimate=join_estimates([fitted.estimate, kept]))
+    return fitted
 
 
 def _with_torque(
     robot: Robot, rows: Rows, torque: Array, fitted: FitResult, options: IdentificationOptions
 ) -> tuple[FitResult, Array]:
     """The fit with torques, and the errors (k, p) of the parameters of its `prior_error_arms`."""
-    own = fitted.arm
-    noise = None
+    own, noise = fitted.arm, None
+    if rows.link_side:
+        robot, options = seen_behind_gears(robot), sensor_options(options)
     if options.method == "periodic":
         found, noise = fit_periodic(robot, rows, torque, fitted.clusters, options)
     else:
         fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
         found = fit(robot, rows, torque, fitted.clusters, options)
+    found = as_sensor_terms(found) if rows.link_side else found
     of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
     terms = tuple(
         name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link
@@ -123,7 +139,10 @@ def _with_torque(
     matrix, before = _link_changes(robot, options)
 
     def arm(values: Array) -> FittedArm:
-        changed = with_torques(own, terms, values[~of_links], tuple(options.couplings))
+        if rows.link_side:
+            changed = replace(own, sensor=sensor_of(robot.nq, terms, values[~of_links]))
+        else:
+            changed = with_torques(own, terms, values[~of_links], tuple(options.couplings))
         if not of_links.any():
             return changed
         return replace(changed, link_change=matrix @ (values[of_links] - before))
@@ -183,11 +202,6 @@ def _independent_errors(covariance: Array) -> Array:
     return np.asarray(np.sqrt(sizes[kept])[:, None] * directions[:, kept].T * sd)
 
 
-def motor_torque(arm: FittedArm, rows: Rows) -> Array:
-    """Logged motor torques (n, nq) [N·m], NaN if not logged."""
-    return rows.effort * arm.torque_constant if rows.current else rows.effort
-
-
 def _with_power(
     robot: Robot, rows: Rows, fitted: FitResult, errors: Array, options: IdentificationOptions
 ) -> FitResult:
@@ -203,7 +217,8 @@ def _with_power(
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
     torque_known = len(fitted.estimate.names) > 0
-    prior = power_prior(robot, torque_known)
+    friction_known = torque_known and not rows.link_side
+    prior = power_prior(robot, friction_known, links_known=torque_known)
     fit = fit_power(
         arm.torque_parts(part),
         part.power,
@@ -218,7 +233,7 @@ def _with_power(
     shifts = moved[len(others) :]
     by_torques = moved[: len(others)] if torque_known else 0.0
     without, by_rows = fit.without_cluster + by_torques, fit.row_replicates + by_torques
-    matrix, constant, names = _figures_of_power(robot, prior, torque_known)
+    matrix, constant, names = _figures_of_power(robot, prior, friction_known, torque_known)
     estimate = Estimate(
         names,
         matrix @ fit.value + constant,
@@ -228,22 +243,23 @@ def _with_power(
     )
     before = matrix @ np.linalg.inv(prior.precision) @ matrix.T
     unknown = np.diag(estimate.covariance) > FIT.max_sd_ratio**2 * np.diag(before)
-    estimate = replace(
-        estimate, reasons=tuple(HARDLY_KNOWN if each else "" for each in unknown.tolist())
+    estimate = with_reasons(
+        replace(estimate, reasons=tuple(HARDLY_KNOWN if each else "" for each in unknown.tolist())),
+        range(len(names)),
     )
     relative = _covariance_scale(robot.nq, fit.value)
     return replace(
         fitted,
-        arm=_with_parameters(arm, fit.value, torque_known),
+        arm=_with_parameters(arm, fit.value, friction_known),
         estimate=join_estimates(
             [fitted.estimate, estimate], errors.T @ shifts @ matrix.T if torque_known else None
         ),
         arms_without_cluster=_each_with_parameters(
-            fitted.arms_without_cluster, without, torque_known
+            fitted.arms_without_cluster, without, friction_known
         ),
-        row_error_arms=_each_with_parameters(fitted.row_error_arms, by_rows, torque_known),
+        row_error_arms=_each_with_parameters(fitted.row_error_arms, by_rows, friction_known),
         prior_error_arms=_each_with_parameters(
-            fitted.prior_error_arms, fit.value + shifts, torque_known
+            fitted.prior_error_arms, fit.value + shifts, friction_known
         ),
         prior_covariance=np.outer(relative, relative) * fit.prior_covariance,
         covariance_increase=np.outer(relative, relative) * fit.covariance_increase,
@@ -277,18 +293,18 @@ def _covariance_scale(nq: int, value: Array) -> Array:
 
 
 def _each_with_parameters(
-    arms: Sequence[FittedArm], values: Array, torque_known: bool
+    arms: Sequence[FittedArm], values: Array, friction_known: bool
 ) -> tuple[FittedArm, ...]:
     return tuple(
-        _with_parameters(arm, each, torque_known) for arm, each in zip(arms, values, strict=True)
+        _with_parameters(arm, each, friction_known) for arm, each in zip(arms, values, strict=True)
     )
 
 
-def _with_parameters(arm: FittedArm, values: Array, torque_known: bool) -> FittedArm:
+def _with_parameters(arm: FittedArm, values: Array, friction_known: bool) -> FittedArm:
     """The arm with packed figures, whose factors and increments change its own figures."""
     found = PowerParameters.unpacked(values)
     nominal = PowerParameters.nominal(found.idle, found.copper, found.inverter)
-    if torque_known:
+    if friction_known:
         return replace(arm, power_parameters=nominal)
     return replace(
         arm,
@@ -304,7 +320,7 @@ def _with_parameters(arm: FittedArm, values: Array, torque_known: bool) -> Fitte
 
 
 def _figures_of_power(
-    robot: Robot, prior: PowerPrior, torque_known: bool
+    robot: Robot, prior: PowerPrior, friction_known: bool, links_known: bool
 ) -> tuple[Array, Array, tuple[Name, ...]]:
     """Matrix (f, p) and constants (f,) from packed figures (p,) to named figures, and the names."""
     nq, own, every = robot.nq, own_arm(robot), np.eye(packed_size(robot.nq))
@@ -312,7 +328,7 @@ def _figures_of_power(
     names += [(figure, joint) for figure in ("copper", "inverter_linear") for joint in range(nq)]
     matrix = [*every[: len(names)]]
     constant = [0.0] * len(names)
-    if not torque_known:
+    if not friction_known:
         for figure, part in (("coulomb", 2), ("curved", 2), ("viscous", 3), ("rotor_inertia", 4)):
             for joint in np.flatnonzero(getattr(own, figure)).tolist():
                 names.append((figure, joint))
@@ -322,6 +338,7 @@ def _figures_of_power(
             names.append(("load", joint))
             matrix.append(every[1 + 5 * nq + joint])
             constant.append(float(own.load[joint]))
+    if not links_known:
         names.append((LINK_MASS_SCALE, None))
         matrix.append(every[-1])
         constant.append(0.0)

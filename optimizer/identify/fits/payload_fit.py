@@ -26,6 +26,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
     solve_bounded,
 )
 from joulepath.optimizer.identify.fits.block import moving_rows
+from joulepath.optimizer.identify.fits.determined import DETERMINED
 from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.results import IdentifiedParameter
@@ -256,7 +257,7 @@ def _payload_of_body(
             f"The last of the logs carries {-mass:.3g} kg less than the others say of theirs: name "
             "the log with the payload last, and give the `payload` of the others.",
         )
-    if not max(sd, min_mass) <= TORQUE_FIT.max_relative_sd * mass:
+    if not max(sd, min_mass) <= DETERMINED.max_relative_sd * mass:
         unknown = np.diag([sd**2, 0.0, 0.0, 0.0])
         return IdentifiedPayload(
             log, 0.0, np.zeros(3), unknown, np.zeros(PARAMETERS_PER_BODY), NO_DIFFERENCE

@@ -72,12 +72,13 @@ class PowerPrior:
     precision: Array
 
 
-def power_prior(robot: Robot, torque_known: bool) -> PowerPrior:
+def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerPrior:
     """Prior from the ranges of the robot's own figures.
 
     Args:
         robot: the robot with its own figures.
-        torque_known: whether friction, rotors, offsets and masses count as known.
+        friction_known: whether friction, rotors and offsets count as known.
+        links_known: whether the masses of the links count as known.
     """
     known_sd = POWER_FIT.known_sd
     drives, nq = robot.drives, robot.nq
@@ -88,7 +89,8 @@ def power_prior(robot: Robot, torque_known: bool) -> PowerPrior:
     large, small = (
         _range(robot, each, "drives", "copper") for each in ("copper_large", "copper_small")
     )
-    joints = zip(drives.copper.tolist(), large_joints(robot).tolist(), strict=True)
+    windings = drives.copper + drives.inverter_quadratic
+    joints = zip(windings.tolist(), large_joints(robot).tolist(), strict=True)
     copper_mean, copper_sd = np.transpose(
         [_lognormal_around(own, *(large if is_large else small)) for own, is_large in joints]
     )
@@ -104,11 +106,12 @@ def power_prior(robot: Robot, torque_known: bool) -> PowerPrior:
     variance[np.ix_(copper, copper)] = _half_common(copper_sd)
     variance[np.ix_(inverter, inverter)] = _half_common(np.full(nq, (high - low) / (2 * P95)))
     common, own, rotors, links, load_sd = known_sd, known_sd, known_sd, known_sd, np.zeros(nq)
-    if not torque_known:
+    if not links_known:
+        links = LINK_ERRORS.mass
+    if not friction_known:
         common, own = (
             _friction_width(robot, each) for each in ("friction_common", "friction_joint")
         )
-        links = LINK_ERRORS.mass
         rotors = lognormal(*_range(robot, "rotor_inertia", "drives", "rotor_inertia"))[1]
         if robot.friction.load is None:
             loaded = np.arange(nq) < default_ranges()["load"]["joints"]
@@ -120,7 +123,7 @@ def power_prior(robot: Robot, torque_known: bool) -> PowerPrior:
     variance[np.ix_(load, load)] = _half_common(load_sd) + known_sd**2 * np.eye(nq)
     variance[np.ix_(rotor, rotor)] = _half_common(np.full(nq, rotors))
     offset_sd = np.maximum(POWER_FIT.offset_sd * robot.friction.coulomb, known_sd)
-    variance[offset, offset] = known_sd**2 if torque_known else offset_sd**2
+    variance[offset, offset] = known_sd**2 if friction_known else offset_sd**2
     variance[-1, -1] = links**2
     mean = np.concatenate(
         [[idle_mean], copper_mean, inverter_mean, np.ones(3 * nq), load_mean, np.zeros(nq), [1.0]]

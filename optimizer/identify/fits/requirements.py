@@ -25,7 +25,7 @@ def check_logs(
 
     Raises:
         EffortNotUsable: the efforts of a log exclude gravity.
-        InvalidProblem: the requested figures exclude each other or need other channels.
+        InvalidProblem: the requested figures exclude each other or need other channels or links.
         PayloadUnknown: torque constants are requested, and the payload is not known.
         NoPowerChannel: power is requested, and no log has it.
         NotExcited: the logs have no motion, or neither torques nor power.
@@ -54,6 +54,12 @@ def check_logs(
             "fit", "A payload needs links that are known, and no couplings: leave it out."
         )
     power = bool(np.isfinite(rows.power).any())
+    if rows.link_side and not (power or options.needs_regressor or "payload" in options.fit):
+        raise InvalidProblem(
+            "inertials",
+            "The torques of these logs were measured behind the gears. They identify links, and "
+            "neither friction nor rotors: refit the inertials, or log motor currents.",
+        )
     if "power" in options.fit and not power:
         raise NoPowerChannel
     if options.held_out and rows.rest.all():

@@ -7,24 +7,38 @@ figures, and the remaining terms are fitted again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
-from joulepath.optimizer.identify.estimates.grouped import (
-    GroupedEquations,
-    jackknife,
-    leave_one_out,
-    solve_bounded,
+from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
+from joulepath.optimizer.identify.fits.block import (
+    SCALE,
+    JointBlock,
+    joint_block,
+    weighted_solution,
 )
-from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
-from joulepath.optimizer.identify.fits.block import SCALE, JointBlock, joint_block
-from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
+from joulepath.optimizer.identify.fits.curve_speed import (
+    coupled_joints,
+    curve_speeds,
+    with_speeds,
+)
+from joulepath.optimizer.identify.fits.determined import (
+    AT_BOUND,
+    DETERMINED,
+    LAW_KEPT,
+    NOT_MOVING,
+    REJECTED,
+    UNCERTAIN,
+    rejections,
+    unbounded,
+)
+from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -33,11 +47,9 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 class TorqueFitSettings:
     """Settings of the fit of friction and rotors to torques."""
 
-    max_relative_sd: float = 0.3
-    """Standard deviation of a figure over its value, above which the figure is not identified."""
     max_scale_sd: float = 0.03
-    """The same for the factor on the torque constant: the robot's own constant is better than a
-    poor estimate."""
+    """Standard deviation of the factor on the torque constant, above which the constant is not
+    identified: the robot's own constant is better than a poor estimate."""
     min_load_sds: float = 3.0
     """Standard deviations that a load term must exceed to be identified."""
     min_load_spread: float = 0.05
@@ -49,23 +61,12 @@ class TorqueFitSettings:
     """Relative standard deviation of the robot's own rotor inertia [1]."""
     own_load_sd: float = 0.06
     """Standard deviation of the robot's own load friction [1]."""
-    min_curve_speed: float = 0.05
-    """Smallest candidate for the speed of the curved term [rad/s]."""
-    max_curve_speed: float = 3.0
-    """Largest candidate for the speed of the curved term [rad/s]."""
-    curve_speeds: int = 12
-    """Number of candidates for the speed of the curved term."""
-    irls_passes: int = 8
-    """Solutions of the iteratively reweighted least squares."""
     min_rows: int = 20
     """Rows of a term, below which its joint does not count as moving."""
 
 
 TORQUE_FIT = TorqueFitSettings()
-NOT_MOVING = "The joint hardly moves in these logs."
-UNCERTAIN = "Its standard deviation is {:.0%} of its value."
-LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
-AT_BOUND = "The fit puts it at its bound, 0."
+LITTLE_LOAD = "It is below {:g} standard deviations."
 
 
 def fit_torques(
@@ -80,39 +81,17 @@ def fit_torques(
         clusters: partition of the rows for the jackknife.
         options: requested figures.
     """
-    settings = TORQUE_FIT
-    estimates, speeds = list[Estimate](), dict[int, float]()
-    candidates = np.geomspace(
-        settings.min_curve_speed, settings.max_curve_speed, settings.curve_speeds
-    )
-    for joints in _coupled_joints(robot.nq, options.couplings):
-        block = joint_block(robot, rows, torque, clusters, options, joints)
-        if "curved" in options.terms:
-            # the torque is not linear in the speed of the curved term: the best candidate is taken
-            block = min(
-                (
-                    joint_block(robot, rows, torque, clusters, options, joints, speed)
-                    for speed in candidates
-                ),
-                key=lambda each: _squared_error(each, clusters, options),
-            )
-        estimate = _fit_block(robot, block, clusters, options)
-        estimates.append(estimate)
-        if block.speed is not None:
-            kept = {name for name, why in zip(estimate.names, estimate.reasons, strict=True) if why}
-            speeds |= {joint: block.speed for joint in joints if ("curved", joint) not in kept}
-    estimate = join_estimates(estimates)
-    if "torque_constant" in options.fit:
-        estimate = _with_torque_constants(robot, estimate)
-    return join_estimates([estimate, _speed_estimate(speeds, clusters.count)])
 
+    def fit(speeds: Array | None) -> Estimate:
+        blocks = [
+            joint_block(robot, rows, torque, clusters, options, joints, speeds)
+            for joints in coupled_joints(robot.nq, options.couplings)
+        ]
+        found = join_estimates([_fit_block(robot, each, clusters, options) for each in blocks])
+        constants = "torque_constant" in options.fit
+        return _with_torque_constants(robot, found) if constants else found
 
-def _speed_estimate(speeds: Mapping[int, float], clusters: int) -> Estimate:
-    """Speeds [rad/s] of the curved terms by joint, whose errors are part of those of the terms."""
-    names: tuple[Name, ...] = tuple(("speed", joint) for joint in speeds)
-    value = np.array([*speeds.values()])
-    covariance = np.zeros((len(value), len(value)))
-    return Estimate(names, value, np.tile(value, (clusters, 1)), ("",) * len(value), covariance)
+    return with_speeds(robot, curve_speeds(robot, rows, torque, clusters, options), fit)
 
 
 def _with_torque_constants(robot: Robot, found: Estimate) -> Estimate:
@@ -148,30 +127,20 @@ def _with_torque_constants(robot: Robot, found: Estimate) -> Estimate:
     )
     slope = np.abs(value / np.where(found.value != 0, found.value, 1.0))
     return Estimate(
-        names, value, replicates, found.reasons, found.prior_covariance * np.outer(slope, slope)
+        names,
+        value,
+        replicates,
+        found.reasons,
+        found.prior_covariance * np.outer(slope, slope),
+        found.remarks,
     )
-
-
-def _coupled_joints(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
-    """Sets of joints that couplings tie together; single joints otherwise."""
-    graph = np.eye(nq)
-    for coupling in couplings:
-        graph[np.ix_(coupling.joints, coupling.joints)] = 1
-    labels = connected_components(graph, directed=False)[1]
-    return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
-
-
-def _squared_error(block: JointBlock, clusters: Clusters, options: IdentificationOptions) -> float:
-    found, _ = _weighted_solution(block, clusters, options)
-    residuals = block.values - block.columns @ found
-    return float(residuals @ residuals)
 
 
 def _fit_block(
     robot: Robot, block: JointBlock, clusters: Clusters, options: IdentificationOptions
 ) -> Estimate:
     """Fit a block, holding the least determined term at its own value until all are determined."""
-    held = _undetermined(robot, block)
+    held = undetermined(robot, block)
     while True:
         free = [k for k, name in enumerate(block.names) if name not in held]
         own = np.array([block.own[name] if name in held else 0.0 for name in block.names])
@@ -182,21 +151,25 @@ def _fit_block(
             values=block.values - block.columns @ own - _own_curve(robot, block, held),
             lower=block.lower[free],
         )
-        value, weight = _weighted_solution(part, clusters, options)
+        value, weight = weighted_solution(part, clusters, options)
         grouped = GroupedEquations.of(
             part.columns, part.values, weight, block.cluster, clusters.count
         )
         inside = value > part.lower
-        replicates = leave_one_out(grouped, value, inside)
-        worst = _least_determined(part, value, np.sqrt(np.diag(jackknife(replicates))), inside)
+        gradient = grouped.gram.sum(axis=0) @ value - grouped.moment.sum(axis=0)
+        solution = unbounded(grouped, value, inside, ~inside, gradient)
+        doubts = doubts_of(part, value, solution.sd)
+        rejected = rejections(solution, np.array([block.own[name] for name in part.names]))
+        worst = _least_determined(part, doubts, rejected)
         if not worst:
             break
         held |= worst
         for coulomb in [name for name in worst if name[0] == "coulomb"]:
             # a law is kept as a whole: its other terms have no meaning beside the Coulomb friction
             # of another law
-            others = [(term, coulomb[1]) for term in ("viscous", "curved", "load")]
-            held |= dict.fromkeys((name for name in others if name in block.names), LAW_KEPT)
+            for name, distance in zip(part.names, rejected.tolist(), strict=True):
+                if name[0] in ("viscous", "curved", "load") and name[1] == coulomb[1]:
+                    held |= {} if distance else {name: LAW_KEPT}
     # equations of all terms, with the same weights
     grouped = GroupedEquations.of(
         block.columns, block.values, weight, block.cluster, clusters.count
@@ -204,13 +177,18 @@ def _fit_block(
     full = own.copy()
     full[free] = value
     all_replicates = np.tile(full, (clusters.count, 1))
-    all_replicates[:, free] = replicates
+    all_replicates[:, free] = solution.replicates
+    remarks = dict.fromkeys(block.names, "")
+    for name, doubt, distance in zip(part.names, doubts, rejected.tolist(), strict=True):
+        if doubt.reason:
+            remarks[name] = REJECTED.format(doubt.reason, block.own[name], distance)
     return Estimate(
         names=block.names,
         value=full,
         replicates=all_replicates,
         reasons=tuple(held.get(name, "") for name in block.names),
         prior_covariance=_prior_covariance(block, grouped, free, inside),
+        remarks=tuple(remarks.values()),
     )
 
 
@@ -223,21 +201,24 @@ def _prior_covariance(
     held = [k for k in range(len(block.names)) if k not in free]
     gram = grouped.gram.sum(axis=0)
     if at and held:
-        settings = TORQUE_FIT
-        relative_sd = {
-            "coulomb": settings.own_friction_sd,
-            "viscous": settings.own_friction_sd,
-            "rotor_inertia": settings.own_rotor_sd,
-        }
-        names = [block.names[k] for k in held]
-        sd = np.array([relative_sd.get(name[0], 0.0) * (block.own[name] or 0.0) for name in names])
-        sd = np.where([name[0] == "load" for name in names], settings.own_load_sd, sd)
+        sd = own_deviations(block, [block.names[k] for k in held])
         moved = np.linalg.lstsq(gram[np.ix_(at, at)], gram[np.ix_(at, held)] * sd, rcond=None)[0]
         covariance[np.ix_(at, at)] = moved @ moved.T
     return covariance
 
 
-def _undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:
+def own_deviations(block: JointBlock, names: Sequence[Name]) -> Array:
+    """Standard deviations (k,) of the robot's own values of some terms."""
+    relative = {
+        "coulomb": TORQUE_FIT.own_friction_sd,
+        "viscous": TORQUE_FIT.own_friction_sd,
+        "rotor_inertia": TORQUE_FIT.own_rotor_sd,
+    }
+    sd = np.array([relative.get(name[0], 0.0) * block.own[name] for name in names])
+    return np.where([name[0] == "load" for name in names], TORQUE_FIT.own_load_sd, sd)
+
+
+def undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:
     """Terms that the rows cannot determine, for any torques, with the reason."""
     held = dict[Name, str]()
     for k, name in enumerate(block.names):
@@ -271,50 +252,45 @@ def _own_curve(robot: Robot, block: JointBlock, held: dict[Name, str]) -> Array:
     return total
 
 
-def _weighted_solution(
-    block: JointBlock, clusters: Clusters, options: IdentificationOptions
-) -> tuple[Array, Array]:
-    """Solution (p,) and weights (n,) of the rows."""
-    weight = np.ones_like(block.values)
-    passes = {
-        "ols": 1,
-        "wls": 2 if len(np.unique(block.joint)) > 1 else 1,
-        "irls": TORQUE_FIT.irls_passes,
-    }[options.estimator]
-    for step in range(passes):
-        grouped = GroupedEquations.of(
-            block.columns, block.values, weight, block.cluster, clusters.count
-        )
-        found = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), block.lower)
-        if step < passes - 1:
-            residuals = block.values - block.columns @ found
-            weight = inverse_variance_weights(block.joint, residuals, options.estimator == "irls")
-    return found, weight
+class Doubt(NamedTuple):
+    """Why a term is not determined; empty if it is."""
+
+    reason: str
+    size: float
+    """Standard deviation over value, over that of a determined term [1]."""
 
 
-def _least_determined(block: JointBlock, value: Array, sd: Array, inside: Mask) -> dict[Name, str]:
-    """The least determined term, with the reason; empty if all are determined.
+def doubts_of(block: JointBlock, value: Array, sd: Array) -> list[Doubt]:
+    """Doubts about the fitted terms of a block; offsets are kept with any standard deviation."""
+    found = list[Doubt]()
+    for k, (term, _) in enumerate(block.names):
+        inside = value[k] > block.lower[k] and value[k] != 0
+        relative = float(sd[k] / abs(value[k])) if inside else np.inf
+        size = relative / (TORQUE_FIT.max_scale_sd if term == SCALE else DETERMINED.max_relative_sd)
+        if term == "load" and not value[k] >= TORQUE_FIT.min_load_sds * sd[k] > 0:
+            found.append(Doubt(LITTLE_LOAD.format(TORQUE_FIT.min_load_sds), np.inf))
+        elif term == "offset" or size <= 1:
+            found.append(Doubt("", 0.0))
+        else:
+            reason = UNCERTAIN.format(relative) if np.isfinite(relative) else AT_BOUND
+            found.append(Doubt(reason, size))
+    return found
 
-    Offsets are kept with any standard deviation.
+
+def _least_determined(
+    block: JointBlock, doubts: Sequence[Doubt], rejected: Array
+) -> dict[Name, str]:
+    """The least determined terms whose own values are not rejected, with the reasons.
+
+    Load friction comes first; its doubts do not depend on other terms.
     """
-    settings = TORQUE_FIT
-    load = [
-        k
-        for k, name in enumerate(block.names)
-        if name[0] == "load" and not value[k] >= settings.min_load_sds * sd[k] > 0
-    ]
-    if load:
-        reason = f"It is below {settings.min_load_sds:g} standard deviations."
-        return {block.names[k]: reason for k in load}
-    worst, largest = None, settings.max_relative_sd
-    for k, name in enumerate(block.names):
-        if name[0] == "offset":
-            continue
-        relative = float(sd[k] / abs(value[k])) if inside[k] and value[k] != 0 else np.inf
-        if name[0] == SCALE:
-            relative *= settings.max_relative_sd / settings.max_scale_sd
-        if relative > largest:
-            worst, largest = name, relative
-    if worst is None:
-        return {}
-    return {worst: UNCERTAIN.format(largest) if np.isfinite(largest) else AT_BOUND}
+    open_terms = {
+        name: doubt
+        for name, doubt, distance in zip(block.names, doubts, rejected.tolist(), strict=True)
+        if doubt.reason and not distance
+    }
+    load = {name: doubt.reason for name, doubt in open_terms.items() if name[0] == "load"}
+    if load or not open_terms:
+        return load
+    worst = max(open_terms, key=lambda name: open_terms[name].size)
+    return {worst: open_terms[worst].reason}

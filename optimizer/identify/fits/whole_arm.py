@@ -44,6 +44,7 @@ def whole_arm_regression(
     options: IdentificationOptions,
     bodies: Array,
     change: Array,
+    speeds: Array | None,
 ) -> WholeArmRegression:
     """Regression of all joints.
 
@@ -55,9 +56,10 @@ def whole_arm_regression(
         options: requested figures.
         bodies: regressor (n, nq, 10 bodies) of the links, and of further bodies to be found.
         change: change (10 nq,) of the links' parameters already contained in `rows.rigid`.
+        speeds: speeds (nq,) of the curved terms [rad/s]; None for the robot's own.
     """
     joints = range(robot.nq)
-    block = joint_block(robot, rows, torque, clusters, options, joints)
+    block = joint_block(robot, rows, torque, clusters, options, joints, speeds)
     uses = [
         moving_rows(rows, torque, joint, options.velocity_threshold, options.couplings)
         for joint in joints

@@ -7,24 +7,29 @@ joint.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.estimates.grouped import (
-    GroupedEquations,
-    jackknife,
-    leave_one_out,
-)
+from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
 from joulepath.optimizer.identify.estimates.robust import bisquare_weights
+from joulepath.optimizer.identify.fits.block import JointBlock
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
-from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
+from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
+from joulepath.optimizer.identify.fits.determined import (
+    REJECTED,
+    rejections,
+    unbounded,
+    with_reasons,
+)
+from joulepath.optimizer.identify.fits.torque_fit import doubts_of, own_deviations, undetermined
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
@@ -32,7 +37,6 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 LINK = "inertials."
 LINK_NAMES = frozenset(LINK + part for part in LINKS)
-NOT_LOADED = "It is below {:g} standard deviations, or the rigid torque hardly varies."
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,8 @@ class WholeFitSettings:
     """Prior standard deviation of a term over the robot's own value [1]."""
     default_sd: float = 10.0
     """Prior standard deviation of a term that the robot has no value of [SI unit]."""
-    held_sd: float = 1e-9
-    """Prior standard deviation of a term that is held [SI unit]."""
+    bound_sds: float = 1e-3
+    """Standard deviations from a bound, within which a value is at the bound [1]."""
 
 
 WHOLE_FIT = WholeFitSettings()
@@ -70,45 +74,136 @@ def fit_whole(
         clusters: partition of the rows for the jackknife.
         options: requested figures and weight of the prior.
     """
-    own, bodies = body_parameters(robot.model), rows.regressor
-    assert bodies is not None
-    change, held = np.zeros_like(own), frozenset[int]()
-    for _ in range(WHOLE_FIT.load_passes):
-        now = replace(rows, rigid=rows.rigid + bodies @ change)
-        arm = whole_arm_regression(robot, now, torque, clusters, options, bodies, change)
-        mean, precision = _prior(robot, arm, options, held)
-        value, grouped = _solve(arm, clusters, options, mean, precision, robot.nq)
-        free = np.concatenate([np.ones(len(own), bool), value[len(own) :] > arm.block.lower])
-        replicates = leave_one_out(grouped, value, free, precision)
-        change = value[: len(own)] - own
-        held |= _unloaded(robot, arm, value, np.sqrt(np.diag(jackknife(replicates))), len(own))
-        terms = arm.block.names
-        del arm, now  # the columns are large, and those of the next pass need the memory
-    hessian = grouped.gram.sum(axis=0) + precision
-    spread = np.linalg.solve(hessian, precision)
-    order = np.r_[len(own) : len(value), : len(own)]
-    links = [(LINK + part, joint) for joint in range(robot.nq) for part in LINKS]
-    names = (*terms, *links)
-    return Estimate(
-        names=names,
-        value=value[order],
-        replicates=replicates[:, order],
-        reasons=tuple(
-            NOT_LOADED.format(TORQUE_FIT.min_load_sds) if k - len(own) in held else ""
-            for k in order
-        ),
-        prior_covariance=(spread @ np.linalg.inv(hessian))[np.ix_(order, order)],
+    speeds = curve_speeds(robot, rows, torque, clusters, options)
+    return with_speeds(
+        robot, speeds, lambda speeds: _fit(robot, rows, torque, clusters, options, speeds)
     )
 
 
-def _prior(
-    robot: Robot, arm: WholeArmRegression, options: IdentificationOptions, held: frozenset[int]
-) -> tuple[Array, Array]:
-    """Prior mean (p,) and precision (p, p) of bodies and other terms, of which some are `held`."""
-    own, names = body_parameters(robot.model), arm.block.names
-    mean = np.concatenate([own, [arm.block.own[name] for name in names]])
-    sd = np.array([_prior_sd(robot, name, arm.block.own[name]) for name in names])
-    sd[list(held)] = WHOLE_FIT.held_sd
+def _fit(
+    robot: Robot,
+    rows: Rows,
+    torque: Array,
+    clusters: Clusters,
+    options: IdentificationOptions,
+    speeds: Array | None,
+) -> Estimate:
+    """The fit of `fit_whole`, for given speeds (nq,) of the curved terms."""
+    own, bodies = body_parameters(robot.model), rows.regressor
+    assert bodies is not None
+    change, held = np.zeros_like(own), dict[Name, str]()
+    for _ in range(WHOLE_FIT.load_passes):
+        now = replace(rows, rigid=rows.rigid + bodies @ change)
+        arm = whole_arm_regression(robot, now, torque, clusters, options, bodies, change, speeds)
+        held |= undetermined(robot, arm.block)
+        grouped = _weighted(robot, arm, clusters, options, held)
+        # the columns are large, and those of the next pass need the memory
+        block = replace(arm.block, columns=np.zeros((0, len(arm.block.names))))
+        del arm, now
+        solution = _determined(robot, block, grouped, options, held)
+        change = solution.value[: len(own)] - own
+    return _estimate(robot, solution, block.names, held)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solution:
+    """Links first, then the other terms, p in all."""
+
+    value: Array
+    replicates: Array
+    """Values (G, p) without one cluster each."""
+    prior_covariance: Array
+    """Covariance (p, p) by the prior."""
+    remarks: dict[Name, str]
+
+
+def _estimate(
+    robot: Robot, solution: _Solution, terms: tuple[Name, ...], held: dict[Name, str]
+) -> Estimate:
+    """The estimate of friction, rotors and couplings, then of the links."""
+    count, bodies = len(solution.value), len(solution.value) - len(terms)
+    order = np.r_[bodies:count, :bodies]
+    names = (*terms, *((LINK + part, joint) for joint in range(robot.nq) for part in LINKS))
+    found = Estimate(
+        names=names,
+        value=solution.value[order],
+        replicates=solution.replicates[:, order],
+        reasons=tuple(held.get(name, "") for name in names),
+        prior_covariance=solution.prior_covariance[np.ix_(order, order)],
+        remarks=tuple(solution.remarks.get(name, "") for name in names),
+    )
+    return with_reasons(found, range(len(terms), count))
+
+
+def _determined(
+    robot: Robot,
+    block: JointBlock,
+    grouped: GroupedEquations,
+    options: IdentificationOptions,
+    held: dict[Name, str],
+) -> _Solution:
+    """The solution whose undetermined terms are held at the robot's own values.
+
+    The least determined term of each joint is held until all others are determined. A term whose
+    own value the logs reject is not held.
+
+    Args:
+        robot: the robot with its own figures.
+        block: names and bounds of the terms beside the links.
+        grouped: weighted normal equations.
+        options: weight of the prior.
+        held: reasons of the held terms, to which further ones are added.
+    """
+    bodies = PARAMETERS_PER_BODY * robot.nq
+    lower, (mean, precision) = _lower(block, bodies), _prior(robot, block, options)
+    gram = grouped.gram.sum(axis=0) + precision
+    moment = grouped.moment.sum(axis=0) + precision @ mean
+    while True:
+        free = _free(block, bodies, held)
+        value = _solution_of(gram, moment, mean, free, robot.nq, lower)
+        inverse = np.zeros_like(gram)
+        inverse[np.ix_(free, free)] = np.linalg.inv(gram[np.ix_(free, free)])
+        # an interior-point method ends beside a bound, not at it
+        inside = free & (value - lower > WHOLE_FIT.bound_sds * np.sqrt(np.diag(inverse)))
+        value = np.where(inside | ~free, value, lower)
+        gradient = np.where(inside, 0.0, gram @ value - moment)
+        solution = unbounded(grouped, value, inside, free & ~inside, gradient, precision)
+        rejected = dict(zip(block.names, rejections(solution, mean)[bodies:], strict=True))
+        doubts = {
+            name: doubt
+            for name, doubt in zip(
+                block.names,
+                doubts_of(block, value[bodies:], solution.sd[bodies:]),
+                strict=True,
+            )
+            if doubt.reason and name not in held
+        }
+        open_terms = [name for name in doubts if not rejected[name]]
+        if not open_terms:
+            break
+        for joint in {joint for _, joint in open_terms}:
+            worst = max(
+                (name for name in open_terms if name[1] == joint),
+                key=lambda name: doubts[name].size,
+            )
+            held[worst] = doubts[worst].reason
+    moved = inverse @ gram[:, ~free] * own_deviations(block, block.names)[~free[bodies:]]
+    return _Solution(
+        value,
+        solution.replicates,
+        inverse @ precision @ inverse + moved @ moved.T,
+        {
+            name: REJECTED.format(doubt.reason, block.own[name], rejected[name])
+            for name, doubt in doubts.items()
+        },
+    )
+
+
+def _prior(robot: Robot, block: JointBlock, options: IdentificationOptions) -> tuple[Array, Array]:
+    """Prior mean (p,) and precision (p, p) of bodies and other terms."""
+    own = body_parameters(robot.model)
+    mean = np.concatenate([own, [block.own[name] for name in block.names]])
+    sd = np.array([_prior_sd(robot, name, block.own[name]) for name in block.names])
     precision = np.zeros((len(mean), len(mean)))
     precision[: len(own), : len(own)] = options.prior_weight * distance_metric(own)
     precision[len(own) :, len(own) :] = np.diag(sd**-2.0)
@@ -125,17 +220,39 @@ def _prior_sd(robot: Robot, name: Name, own: float) -> float:
     return WHOLE_FIT.relative_sd * own if known else WHOLE_FIT.default_sd
 
 
-def _solve(
+def _lower(block: JointBlock, bodies: int) -> Array:
+    """Lower bounds (p,): none for bodies."""
+    return np.concatenate([np.full(bodies, -np.inf), block.lower])
+
+
+def _free(block: JointBlock, bodies: int, held: Mapping[Name, str]) -> Mask:
+    """Unknowns (p,) that are not held."""
+    terms = [name not in held for name in block.names]
+    return np.concatenate([np.ones(bodies, dtype=bool), np.array(terms, dtype=bool)])
+
+
+def _solution_of(
+    gram: Array, moment: Array, mean: Array, free: Mask, links: int, lower: Array
+) -> Array:
+    """Solution (p,) of the normal equations, in which only the `free` unknowns leave the `mean`."""
+    value = mean.copy()
+    rest = moment[free] - gram[np.ix_(free, ~free)] @ mean[~free]
+    value[free] = solve_consistent(gram[np.ix_(free, free)], rest, links, lower[free])
+    return value
+
+
+def _weighted(
+    robot: Robot,
     arm: WholeArmRegression,
     clusters: Clusters,
     options: IdentificationOptions,
-    mean: Array,
-    precision: Array,
-    links: int,
-) -> tuple[Array, GroupedEquations]:
-    """Solution (p,) under the prior, and the weighted normal equations."""
+    held: Mapping[Name, str],
+) -> GroupedEquations:
+    """Normal equations, weighted by the residuals of a solution with some terms `held`."""
     block = arm.block
-    lower = np.concatenate([np.full(PARAMETERS_PER_BODY * links, -np.inf), block.lower])
+    mean, precision = _prior(robot, block, options)
+    bodies = arm.bodies.shape[1]
+    free, lower = _free(block, bodies, held), _lower(block, bodies)
     value, weight = mean, _weights(arm, arm.values - arm.torque(mean), clusters, False)
     for _ in range(WHOLE_FIT.weight_passes):
         grouped = GroupedEquations.of(
@@ -143,11 +260,11 @@ def _solve(
         )
         gram = grouped.gram.sum(axis=0) + precision
         moment = grouped.moment.sum(axis=0) + precision @ mean
-        value = solve_consistent(gram, moment, links, lower)
+        value = _solution_of(gram, moment, mean, free, robot.nq, lower)
         weight = _weights(
             arm, arm.values - arm.torque(value), clusters, options.estimator == "irls"
         )
-    return value, grouped
+    return grouped
 
 
 def _weights(arm: WholeArmRegression, residuals: Array, clusters: Clusters, robust: bool) -> Array:
@@ -159,17 +276,3 @@ def _weights(arm: WholeArmRegression, residuals: Array, clusters: Clusters, robu
         share = bisquare_weights(rest) if robust else np.ones_like(rest)
         weight[rows] = share / effective_variance(rest, share, Clusters(cluster, clusters.count))
     return weight
-
-
-def _unloaded(
-    robot: Robot, arm: WholeArmRegression, value: Array, sd: Array, bodies: int
-) -> frozenset[int]:
-    """Numbers of the load terms that the rows do not determine."""
-    settings, found = TORQUE_FIT, list[int]()
-    for k, (term, joint) in enumerate(arm.block.names):
-        if term == "load" and joint is not None:
-            limit = float(robot.limits.tau_max[joint])
-            little = arm.block.spread[joint] < settings.min_load_spread * limit
-            if little or not value[bodies + k] >= settings.min_load_sds * sd[bodies + k] > 0:
-                found.append(k)
-    return frozenset(found)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, TorqueSide
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.identify.logs.motion import LoggedMotion, smooth_sign, thinned
 
@@ -40,6 +40,8 @@ class EffortReport:
     """Slope of the effort against the torque of rigid bodies and rotors, of the two joints (by
     name) that carry most of the gravity: about 1 / torque constant for currents, 1 for torques, 0
     for efforts without gravity; None if the motion does not determine it."""
+    torque_side: TorqueSide = "motor"
+    """Where the efforts were measured: at the motors, or behind the gears."""
 
 
 def effort_report(motion: LoggedMotion, effort: Array) -> EffortReport:

@@ -8,14 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from joulepath.models.robot import UPRIGHT, Array
+from joulepath.models.robot import UPRIGHT, Array, TorqueSide
 from joulepath.optimizer.evaluate.recording import Recording
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Payload
 
 EffortMeaning = Literal["current", "torque", "external"]
-"""Meaning of logged efforts: motor currents [A], motor torques at the joints [N·m], or external
-torques [N·m], without gravity, rigid body and friction."""
+"""Meaning of logged efforts: motor currents [A], torques at the joints [N·m], or external torques
+[N·m], without gravity, rigid body and friction."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,9 @@ class Log:
     effort: Array | None = None
     """Efforts (n, joints), in the unit of their meaning."""
     effort_meaning: EffortMeaning | None = None
+    torque_side: TorqueSide = "motor"
+    """Where torques were measured: `motor`, with rotor and friction, or `link`, by sensors behind
+    the gears, without them. Currents are always those of the motors."""
     power: Array | None = None
     """Power drawn from the arm's bus (n,) [W]."""
     temperature: Array | None = None
@@ -89,6 +92,10 @@ class Log:
         if (self.effort is None) != (self.effort_meaning is None):
             raise InvalidProblem(
                 "effort", "effort and effort_meaning must be given together, or neither of them."
+            )
+        if self.torque_side == "link" and self.effort_meaning == "current":
+            raise InvalidProblem(
+                "torque_side", "Currents are those of the motors: torque_side must be motor."
             )
 
     @property

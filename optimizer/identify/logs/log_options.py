@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, TorqueSide
 from joulepath.optimizer.identify.logs.file_rows import FILE
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.problem.arm import Payload
@@ -27,6 +27,9 @@ class LogOptions:
     current_units: Literal["A", "mA"] = "A"
     effort: EffortMeaning | Literal["auto"] | None = "auto"
     """Meaning of the efforts; `auto` determines it from the log, and None leaves them out."""
+    torque_side: TorqueSide | None = None
+    """Where torques were measured: `motor`, or `link`, by sensors behind the gears; None for the
+    side of the robot's torque limits. It has no effect on currents."""
     name: str | None = None
     tags: tuple[str, ...] = ()
     max_bytes: int = FILE.max_bytes

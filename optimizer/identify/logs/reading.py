@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
@@ -121,6 +121,7 @@ def _read(source: Path | bytes, robot: Robot, options: LogOptions) -> LogReading
         a=a,
         effort=None if efforts is None else efforts.values,
         effort_meaning=None if efforts is None else efforts.report.meaning,
+        torque_side="motor" if efforts is None else efforts.report.torque_side,
         power=power,
         temperature=logged["temperature"],
         wrench=logged["wrench"],
@@ -167,6 +168,8 @@ def _efforts(
         names = [channels.columns.names[k] for k in channels.columns.groups[group]]
         check_signs(regressions, names)
     report = choose_meaning(by_slope, group, options.effort, remarks)
+    if report.meaning == "torque":
+        report = replace(report, torque_side=options.torque_side or motion.robot.torque_side)
     remarks += effort_warnings(motion.robot, regressions, effort, report.meaning)
     return _Efforts(group, effort, report)
 

@@ -25,7 +25,8 @@ class MeasuredEnergy:
     """Integral of the logged power of the arm's bus. Null if the log has none."""
     by_efforts: Joules | None
     """Integral of the power that the motors take by their logged currents or torques, with the
-    losses of the robot's drives and its idle power. Null if the log has none."""
+    losses of the robot's drives and its idle power, and with the robot's friction and rotors if the
+    torques were measured behind the gears. Null if the log has none."""
 
     @property
     def best(self) -> float | None:
@@ -70,9 +71,11 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
     if torque is None:
         return MeasuredEnergy(drawn, None)
     q, v, a = (channel[rows].astype(float) for channel in (log.q, log.v, log.a))
-    tau = plant.torques(q, v, a)
+    tau, motor = plant.torques(q, v, a), torque[rows]
+    if log.torque_side == "link":
+        motor = motor + plant.arm.drives.rotor_inertia * a + plant.friction.torque(v, motor)
     # the measured torque beyond that of the motion is lost
-    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, tau_friction=torque[rows] - tau)
+    energy = breakdown(weights, v, a, tau, 0.0, plant.arm, tau_friction=motor - tau)
     return MeasuredEnergy(drawn, energy.electrical.total)
 
 

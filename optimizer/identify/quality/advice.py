@@ -16,8 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.parameters import index
+from joulepath.models.uncertainty.spread import spread_of
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, FitResult
 from joulepath.optimizer.identify.results import Advice
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -36,6 +39,11 @@ _LOGGING_ADVICE = {
     "torques.",
     "inverter_linear": "Log the arm at rest in poses of different load, with its power.",
 }
+_OF_DRIVES = ("coulomb", "viscous", "curved", "load", "rotor_inertia")
+_BEHIND_GEARS = (
+    "Log motor currents, or the power of the arm's bus: torques that were measured behind the "
+    "gears contain neither friction nor rotors."
+)
 
 
 @dataclass(frozen=True)
@@ -49,9 +57,12 @@ class AdviceSettings:
 ADVICE = AdviceSettings()
 
 
-def advice_of(fitted: FitResult, rows: Rows) -> Advice | None:
+def advice_of(robot: Robot, fitted: FitResult, rows: Rows) -> Advice | None:
     """The figure to measure better for motions like those of the rows; None without variance."""
     names, covariance = fitted.estimate.names, fitted.estimate.covariance
+    of_links = rows.link_side and not np.isfinite(rows.power).any()
+    if of_links:
+        names, covariance = _own_errors(robot)
     known = [k for k, (name, _) in enumerate(names) if name in _LOGGING_ADVICE]
     gradient = np.array([energy_derivative(fitted.arm, rows, *names[k]) for k in known])
     part = covariance[np.ix_(known, known)]
@@ -62,7 +73,19 @@ def advice_of(fitted: FitResult, rows: Rows) -> Advice | None:
     shares = np.where(own > 0, with_energy**2 / np.where(own > 0, own * total, 1.0), 0.0)
     worst = int(np.argmax(shares))
     name, joint = names[known[worst]]
-    return Advice(name, joint, float(shares[worst]), _LOGGING_ADVICE[name])
+    do = _BEHIND_GEARS if of_links and name in _OF_DRIVES else _LOGGING_ADVICE[name]
+    return Advice(name, joint, float(shares[worst]), do)
+
+
+def _own_errors(robot: Robot) -> tuple[tuple[Name, ...], Array]:
+    """Names of the figures that the links' torques do not identify, and the covariance (k, k) of
+    the robot's own values."""
+    figures = (*_OF_DRIVES, "copper", "inverter_linear")
+    names: list[Name] = [("idle_power", None)]
+    names += [(figure, joint) for figure in figures for joint in range(robot.nq)]
+    at = [0 if joint is None else index(name, joint, robot.nq) for name, joint in names]
+    parts = spread_of(robot, robot.friction.name).covariances.values()
+    return tuple(names), np.asarray(sum(parts))[np.ix_(at, at)]
 
 
 def energy_derivative(arm: FittedArm, rows: Rows, name: str, joint: int | None) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from joulepath.models.robot import Mask
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
-from joulepath.optimizer.identify.fits.fitting import motor_torque
+from joulepath.optimizer.identify.arm.logged_torque import logged_torque
 from joulepath.optimizer.identify.results import Curves
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -39,7 +39,7 @@ def curves_of(parts: Sequence[tuple[FittedArm, Rows, Mask]], threshold: float) -
         thinned = np.zeros_like(mask)
         thinned[np.flatnonzero(mask)[::every]] = True
         shown = rows.take(thinned)
-        torque = motor_torque(arm, shown)
+        torque = logged_torque(arm, shown)
         moving = np.isfinite(torque) & (np.abs(shown.v) > threshold)
         curves.append(
             Curves(
@@ -47,7 +47,7 @@ def curves_of(parts: Sequence[tuple[FittedArm, Rows, Mask]], threshold: float) -
                 move=shown.move,
                 time=shown.time,
                 torque=torque,
-                modelled_torque=np.where(moving, arm.torque(shown), np.nan),
+                modelled_torque=np.where(moving, arm.measured_torque(shown), np.nan),
                 power=shown.power,
                 modelled_power=np.where(np.isfinite(shown.power), arm.power(shown)[0], np.nan),
             )

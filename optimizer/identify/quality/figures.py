@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
+from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE, FitResult
 from joulepath.optimizer.identify.fits.whole_fit import LINK, LINK_NAMES
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.interval import Spread
 from joulepath.optimizer.identify.quality.structure import inertials_of
-from joulepath.optimizer.identify.results import IdentifiedFigures
+from joulepath.optimizer.identify.results import IdentifiedFigures, IdentifiedParameter
 
-FRICTION_LAW = ("coulomb", "viscous", "load", "curved")
+DRY = ("coulomb", "viscous", "load", "curved")
+LAW = (*DRY, "speed")
 """Figures of the friction law: given for all joints, or not at all."""
+INERTIALS = ("mass", "center_of_mass", "inertia")
 
 
 def figures_of(
@@ -26,30 +30,53 @@ def figures_of(
     fitted: FitResult,
     spread: Spread,
     options: IdentificationOptions,
+    parameters: Sequence[IdentifiedParameter],
     logs: tuple[str, ...],
 ) -> IdentifiedFigures:
-    """Figures of a fit.
+    """Figures of a fit, without those that stay the robot's own for all joints.
 
     Args:
         robot: the robot with its own figures.
         fitted: the fit.
         spread: errors of moves and days.
         options: options of the fit.
+        parameters: the parameters, with whether they are identified.
         logs: names of the logs.
     """
-    values = _values(robot, fitted, options)
+    told = {(each.figure, each.joint) for each in parameters if each.identified}
+    own, values = _own(robot), _values(robot, fitted, options)
+    identified = {
+        name: _identified(robot.nq, name, told, value != own[name] if name in own else True)
+        for name, value in values.items()
+    }
+    same = {
+        name
+        for name, value in values.items()
+        if name in own and not identified[name].any() and np.array_equal(value, own[name])
+    }
+    if not same >= set(LAW):
+        same -= {*LAW}
+    values = {name: value for name, value in values.items() if name not in same}
+    if options.knee is not None and "coulomb" in values:
+        values["knee"], identified["knee"] = np.array(fitted.arm.knee), np.array(True)
+    kept = {
+        (each.figure, each.joint)
+        for each in parameters
+        if not each.identified and each.value == each.previous
+    }
     # figures that the logs determine only together with others are part of the covariance, too
     rows = {
         name: row
         for name, row in _covariance_rows(robot, fitted)
-        if name[0] in values or name[0] in LINK_NAMES
+        if (name[0] in values or name[0] in LINK_NAMES) and name not in kept
     }
-    matrix = np.array([*rows.values()])
+    matrix = np.array([*rows.values()]).reshape(-1, len(fitted.estimate.names))
     covariance = matrix @ fitted.estimate.covariance @ matrix.T
     known = np.flatnonzero(np.diag(covariance) > 0)
     return IdentifiedFigures(
         robot=robot.name,
         values=values,
+        identified=identified,
         parameters=tuple([*rows][k] for k in known.tolist()),
         sd=np.sqrt(np.diag(covariance)[known]),
         covariance=covariance[np.ix_(known, known)],
@@ -59,25 +86,71 @@ def figures_of(
     )
 
 
+def _own(robot: Robot) -> dict[str, Array]:
+    """The robot's own values of figures of joints and of the idle power."""
+    law, drives = robot.friction, robot.drives
+    load = np.zeros(robot.nq) if law.load is None else law.load
+    own = {name: getattr(law, name) for name in LAW} | {"load": load}
+    return own | vars(drives) | {"idle_power": np.array(robot.electronics.idle_power)}
+
+
 def _values(robot: Robot, fitted: FitResult, options: IdentificationOptions) -> dict[str, Array]:
     """Values of all figures with a fitted part, by name."""
     arm = fitted.arm
     names_fitted = {figure for figure, _ in fitted.estimate.names}
-    names = [
-        name for name in (*FRICTION_LAW, "rotor_inertia", "torque_constant") if name in names_fitted
-    ]
-    if names_fitted & set(FRICTION_LAW):
-        names += [name for name in (*FRICTION_LAW, "speed") if name not in names]
+    names = [name for name in ("rotor_inertia", "torque_constant") if name in names_fitted]
+    if names_fitted & set(DRY):
+        names += LAW
     values = {name: np.array(getattr(arm, name)) for name in names}
     if "idle_power" in names_fitted:
-        power = arm.power_parameters
-        values |= {"idle_power": np.array(power.idle), "copper": power.copper}
-        values["inverter_linear"] = power.inverter
+        values |= _powers(robot, arm)
     if LINK_MASS_SCALE in names_fitted:
         values |= inertials_of(robot, (arm.link_scale - 1) * body_parameters(robot.model))
     if arm.link_change is not None and not options.reduced:
         values |= inertials_of(robot, arm.link_change)
     return values
+
+
+def _powers(robot: Robot, arm: FittedArm) -> dict[str, Array]:
+    """Idle power, and the losses of windings and inverters.
+
+    The power determines only the sum of the idle power and the inverters' constant losses, and the
+    sum of all losses with the square of the current: the robot's own inverter keeps its share.
+    """
+    power, drives = arm.power_parameters, robot.drives
+    constants = float(drives.inverter_constant.sum())
+    share = min(1.0, power.idle / constants) if constants else 1.0
+    quadratic = np.minimum(drives.inverter_quadratic, power.copper)
+    return {
+        "idle_power": np.array(power.idle - share * constants),
+        "inverter_constant": share * drives.inverter_constant,
+        "copper": power.copper - quadratic,
+        "inverter_quadratic": quadratic,
+        "inverter_linear": power.inverter,
+    }
+
+
+def _identified(nq: int, name: str, told: AbstractSet[Name], differs: Mask | bool) -> Mask:
+    """Whether the logs identify a figure of each joint (nq,), or of the whole arm ().
+
+    With the friction of a joint, its other terms are replaced: they belong to the same law.
+
+    Args:
+        nq: number of joints.
+        name: name of the figure.
+        told: names of the identified parameters.
+        differs: whether the values differ from the robot's own.
+    """
+    if name == "idle_power":
+        return np.array((name, None) in told)
+    parts = {LINK + part for part in LINKS} if name in INERTIALS else {name}
+    found = np.array([any((part, joint) in told for part in parts) for joint in range(nq)])
+    if name in INERTIALS:
+        return np.asarray(found | ((LINK_MASS_SCALE, None) in told))
+    if name in LAW:
+        law = np.array([any((part, joint) in told for part in DRY) for joint in range(nq)])
+        return np.asarray(found | (law & differs & (name in ("curved", "speed", "load"))))
+    return found
 
 
 def _covariance_rows(robot: Robot, fitted: FitResult) -> Iterator[tuple[Name, Array]]:

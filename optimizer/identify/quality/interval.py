@@ -16,6 +16,7 @@ from scipy.special import stdtrit
 from joulepath.models.robot import Array
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identify.arm.logged_torque import motor_torque
 from joulepath.optimizer.identify.estimates.grouped import jackknife
 from joulepath.optimizer.identify.fits.fitting import FitResult
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -129,8 +130,9 @@ def own_variance(squares: Array, explained: Array) -> float:
 
 
 def session_factors(fitted: FitResult, rows: Rows) -> tuple[float, ...]:
-    """Friction of each log over the fitted friction, from torques; empty without torques."""
-    effort = rows.effort * fitted.arm.torque_constant if rows.current else rows.effort
+    """Friction of each log over the fitted friction, from torques of the motors; empty without
+    these."""
+    effort = motor_torque(fitted.arm, rows)
     friction = fitted.arm.friction_torque(rows) - fitted.arm.offset
     rest = effort - fitted.arm.link_torque(rows) - fitted.arm.offset
     use = np.isfinite(effort)

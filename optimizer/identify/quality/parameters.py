@@ -11,7 +11,6 @@ from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms
 from joulepath.optimizer.identify.fits.block import own_value
 from joulepath.optimizer.identify.fits.fitting import LINK_MASS_SCALE
-from joulepath.optimizer.identify.fits.torque_fit import AT_BOUND, TORQUE_FIT, UNCERTAIN
 from joulepath.optimizer.identify.fits.whole_fit import LINK
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import IdentifiedParameter
@@ -24,23 +23,20 @@ def parameters_of(
     base = BaseTerms.of(robot, [], options) if options.reduced else None
     own = {} if base is None else dict(zip(base.names, base.own.tolist(), strict=True))
     deviations = np.sqrt(np.diag(estimate.covariance)).tolist()
-    values = estimate.value.tolist()
+    values, remarks = estimate.value.tolist(), estimate.remarks or ("",) * len(estimate.names)
     return tuple(
-        _parameter(name, value, sd, own[name] if name in own else _own_value(robot, name), reason)
-        for name, value, sd, reason in zip(
-            estimate.names, values, deviations, estimate.reasons, strict=True
+        IdentifiedParameter(
+            *name,
+            value,
+            sd,
+            own[name] if name in own else _own_value(robot, name),
+            not reason,
+            reason or remark,
+        )
+        for name, value, sd, reason, remark in zip(
+            estimate.names, values, deviations, estimate.reasons, remarks, strict=True
         )
     )
-
-
-def _parameter(
-    name: Name, value: float, sd: float, previous: float, reason: str
-) -> IdentifiedParameter:
-    if not reason and value == 0:
-        reason = AT_BOUND
-    elif not reason and not sd <= TORQUE_FIT.max_relative_sd * abs(value):
-        reason = UNCERTAIN.format(sd / abs(value))
-    return IdentifiedParameter(*name, value, sd, previous, not reason, reason)
 
 
 def _own_value(robot: Robot, name: Name) -> float:

@@ -34,7 +34,7 @@ STRUCTURE = StructureSettings()
 
 def structure_of(robot: Robot, rows: Rows, options: IdentificationOptions) -> Structure:
     """Parameters of bodies and fitted rotors, and their excitation by the rows."""
-    rotors = "rotor" in options.fit
+    rotors = "rotor" in options.fit and not rows.link_side
     base = base_parameters(robot.model, rotors)
     condition, excited = None, None
     if rows.regressor is not None:

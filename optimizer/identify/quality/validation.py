@@ -10,7 +10,8 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm
-from joulepath.optimizer.identify.fits.fitting import FitResult, motor_torque
+from joulepath.optimizer.identify.arm.logged_torque import logged_torque
+from joulepath.optimizer.identify.fits.fitting import FitResult
 from joulepath.optimizer.identify.quality.curves import curves_of
 from joulepath.optimizer.identify.quality.interval import Spread, energy_sd
 from joulepath.optimizer.identify.results import PowerErrors, Prediction, TorqueErrors, Validation
@@ -71,7 +72,8 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         threshold: smallest speed of a moving joint [rad/s].
     """
     parts = [
-        (motor_torque(arm, rows), arm.torque(rows), rows.v, rows.weight) for arm, rows in folds
+        (logged_torque(arm, rows), arm.measured_torque(rows), rows.v, rows.weight)
+        for arm, rows in folds
     ]
     measured, predicted, v, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
     use = np.isfinite(measured).all(axis=1)
@@ -84,7 +86,8 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
             100 * np.sqrt((chosen * error**2).sum(axis=0)) / np.where(size > 0, size, np.nan)
         )
 
-    arm = folds[0][0]
+    # sensors behind the gears do not see the currents
+    arm, of_motors = folds[0][0], not folds[0][1].link_side
     copper = arm.power_parameters.copper / arm.torque_constant**2
     work, predicted_work = (
         float(weight @ (each * v).sum(axis=1)) for each in (measured, predicted)
@@ -97,7 +100,7 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         relative=relative(moving),
         relative_all=relative(np.ones_like(v)),
         shaft_energy=100 * abs(predicted_work / work - 1) if work else np.nan,
-        copper_energy=100 * abs(predicted_loss / loss - 1) if loss else np.nan,
+        copper_energy=100 * abs(predicted_loss / loss - 1) if of_motors and loss else np.nan,
     )
 
 

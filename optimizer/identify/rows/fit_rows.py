@@ -72,7 +72,8 @@ class Rows:
     link_torques: Array
     """Rigid-body torques (n, nq) of the links alone [N·m]."""
     effort: Array
-    """Motor torques (n, nq) [N·m], or motor currents [A] if `current`."""
+    """Torques (n, nq) [N·m], of the links if `link_side` and otherwise of the motors; or motor
+    currents [A] if `current`."""
     power: Array
     """Power on the arm's bus (n,) [W]."""
     temperature: Array
@@ -93,6 +94,8 @@ class Rows:
     """Time that a row stands for (n,) [s]."""
     current: bool
     """Whether `effort` is a current."""
+    link_side: bool = False
+    """Whether `effort` was measured behind the gears, without rotors and the motors' friction."""
     regressor: Array | None = None
     """Regressor (n, nq, 10 nq) of the links' torques; None where the inertials count as known."""
     wrench_regressor: Array | None = None
@@ -105,7 +108,7 @@ class Rows:
             for name, value in self.__dict__.items()
             if isinstance(value, np.ndarray)
         }
-        return Rows(**parts, current=self.current)
+        return Rows(**parts, current=self.current, link_side=self.link_side)
 
     @property
     def groups(self) -> IntArray:
@@ -141,6 +144,13 @@ def rows_of(
         raise InvalidProblem(
             "logs", f"The efforts of the logs must mean the same, not {' and '.join(meanings)}."
         )
+    sides = sorted({log.torque_side for log in logs if log.effort_meaning == "torque"})
+    if len(sides) > 1:
+        raise InvalidProblem(
+            "logs",
+            "The torques of the logs must be of the same side of the gears, not of motors and "
+            "links: identify from each side by itself.",
+        )
     stride = _stride(logs, ROWS.max_regressor_rows if regressor else ROWS.max_rows)
     pieces, moves, number = [], 0, 0
     for number, log in enumerate(logs):
@@ -156,7 +166,7 @@ def rows_of(
     # popped one by one, and not copied if there is one piece only: regressors are large
     joined = {name: _joined([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
     joined["group"] = groups_of_motions(joined["q"], joined["v"], joined["move"], joined["rest"])
-    return Rows(**joined, current=meanings == ["current"])
+    return Rows(**joined, current=meanings == ["current"], link_side=sides == ["link"])
 
 
 def _wrench(robot: Robot, log: Log, rows: dict[str, Array]) -> dict[str, Array]:

@@ -18,9 +18,9 @@ from joulepath.optimizer.dynamics.link_regressor import (
     rigid_torques,
 )
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
+from joulepath.optimizer.identify.arm.logged_torque import motor_torque
 from joulepath.optimizer.identify.choices import Method, Term
 from joulepath.optimizer.identify.errors import MethodNotApplicable
-from joulepath.optimizer.identify.fits.fitting import motor_torque
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove

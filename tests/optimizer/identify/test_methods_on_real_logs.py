@@ -11,7 +11,8 @@ import numpy as np
 
 from benchmarks.identification_logs import tx40, ur3e
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.fits.fitting import fit_rows, motor_torque
+from joulepath.optimizer.identify.arm.logged_torque import motor_torque
+from joulepath.optimizer.identify.fits.fitting import fit_rows
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log

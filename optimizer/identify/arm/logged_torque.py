@@ -1,0 +1,19 @@
+"""Torques of a log, from its torques or from its currents."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
+from joulepath.optimizer.identify.rows.fit_rows import Rows
+
+
+def logged_torque(arm: FittedArm, rows: Rows) -> Array:
+    """Logged torques (n, nq) [N·m] of motors or links, NaN if not logged."""
+    return rows.effort * arm.torque_constant if rows.current else rows.effort
+
+
+def motor_torque(arm: FittedArm, rows: Rows) -> Array:
+    """Logged motor torques (n, nq) [N·m], NaN if not logged or measured behind the gears."""
+    return np.full_like(rows.v, np.nan) if rows.link_side else logged_torque(arm, rows)

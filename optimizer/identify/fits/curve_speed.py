@@ -1,0 +1,119 @@
+"""Speeds at which the curved term of friction bends.
+
+The torque is not linear in this speed, so the best of some candidates is taken for each joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
+from joulepath.optimizer.identify.fits.block import JointBlock, joint_block, weighted_solution
+from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
+from joulepath.optimizer.identify.rows.clusters import Clusters
+from joulepath.optimizer.identify.rows.fit_rows import Rows
+
+
+@dataclass(frozen=True)
+class CurveSpeedSettings:
+    """Candidates for the speed of the curved term."""
+
+    smallest: float = 0.05
+    """Smallest candidate [rad/s]."""
+    largest: float = 3.0
+    """Largest candidate [rad/s]."""
+    count: int = 12
+    """Number of candidates, evenly spaced in the logarithm."""
+
+
+CURVE_SPEED = CurveSpeedSettings()
+
+
+def curve_speeds(
+    robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
+) -> Array | None:
+    """Best speeds (nq,) [rad/s] of the curved terms; None if these are not fitted.
+
+    Args:
+        robot: the robot with its own figures.
+        rows: rows of the logs.
+        torque: torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows.
+        options: requested figures; coupled joints share a speed.
+    """
+    if "curved" not in options.terms or "friction" not in options.targets:
+        return None
+    found = np.array(robot.friction.speed)
+    candidates = np.geomspace(CURVE_SPEED.smallest, CURVE_SPEED.largest, CURVE_SPEED.count)
+    for joints in coupled_joints(robot.nq, options.couplings):
+        errors = [
+            _squared_error(
+                joint_block(
+                    robot, rows, torque, clusters, options, joints, np.full(robot.nq, speed)
+                ),
+                clusters,
+                options,
+            )
+            for speed in candidates.tolist()
+        ]
+        if max(errors) > min(errors):
+            found[joints] = candidates[int(np.argmin(errors))]
+    return found
+
+
+def _squared_error(block: JointBlock, clusters: Clusters, options: IdentificationOptions) -> float:
+    found, _ = weighted_solution(block, clusters, options)
+    residuals = block.values - block.columns @ found
+    return float(residuals @ residuals)
+
+
+def coupled_joints(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
+    """Sets of joints that couplings tie together; single joints otherwise."""
+    graph = np.eye(nq)
+    for coupling in couplings:
+        graph[np.ix_(coupling.joints, coupling.joints)] = 1
+    labels = connected_components(graph, directed=False)[1]
+    return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
+
+
+def with_speeds(
+    robot: Robot, speeds: Array | None, fit: Callable[[Array | None], Estimate]
+) -> Estimate:
+    """Fit with the speeds of the curved terms as further figures.
+
+    A curved term that is kept at the robot's own value bends at the robot's own speed.
+
+    Args:
+        robot: the robot with its own figures.
+        speeds: speeds (nq,) [rad/s]; None if the curved terms are not fitted.
+        fit: fit for given speeds (nq,).
+    """
+    while True:
+        found = fit(speeds)
+        if speeds is None:
+            return found
+        curved = [
+            (joint, bool(reason))
+            for (name, joint), reason in zip(found.names, found.reasons, strict=True)
+            if name == "curved" and joint is not None
+        ]
+        own = robot.friction.speed
+        kept = [joint for joint, is_kept in curved if is_kept and speeds[joint] != own[joint]]
+        if not kept:
+            joints = [joint for joint, is_kept in curved if not is_kept]
+            return join_estimates([found, _speeds_of(joints, speeds, len(found.replicates))])
+        speeds = speeds.copy()
+        speeds[kept] = own[kept]
+
+
+def _speeds_of(joints: list[int], speeds: Array, clusters: int) -> Estimate:
+    """Speeds [rad/s] of some joints, whose errors are part of those of the curved terms."""
+    names: tuple[Name, ...] = tuple(("speed", joint) for joint in joints)
+    value = speeds[joints]
+    none = np.zeros((len(value),) * 2)
+    return Estimate(names, value, np.tile(value, (clusters, 1)), ("",) * len(value), none)

@@ -1,0 +1,115 @@
+"""Terms that logs determine, and terms that keep the robot's own value.
+
+A term keeps the robot's own value if the logs do not determine it, and only as long as they do not
+contradict that value: a poor estimate is better than a value that the logs reject.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.identify.estimates.estimate import Estimate
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    jackknife,
+    leave_one_out,
+)
+
+
+@dataclass(frozen=True)
+class DeterminedSettings:
+    """When a term counts as determined."""
+
+    max_relative_sd: float = 0.3
+    """Standard deviation of a figure over its value, above which the figure is not identified."""
+    rejecting_sds: float = 4.0
+    """Standard deviations from an estimate, from which on the logs reject the robot's own value."""
+
+
+DETERMINED = DeterminedSettings()
+NOT_MOVING = "The joint hardly moves in these logs."
+UNCERTAIN = "Its standard deviation is {:.0%} of its value."
+LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
+AT_BOUND = "The fit puts it at its bound, 0."
+REJECTED = (
+    "{} The robot's own value, {:.3g}, is {:.0f} standard deviations away, so that it is not kept: "
+    "check the links, the torque constants and the payload."
+)
+
+
+def reason_of(value: float, sd: float) -> str:
+    """Reason for not counting a figure as identified; empty if it is."""
+    if value == 0:
+        return AT_BOUND
+    relative = sd / abs(value)
+    return "" if relative <= DETERMINED.max_relative_sd else UNCERTAIN.format(relative)
+
+
+def with_reasons(found: Estimate, judged: Iterable[int]) -> Estimate:
+    """The estimate with a reason for each of the `judged` figures that is not identified."""
+    deviations, reasons = np.sqrt(np.diag(found.covariance)), [*found.reasons]
+    for k in judged:
+        reasons[k] = reasons[k] or reason_of(float(found.value[k]), float(deviations[k]))
+    return replace(found, reasons=tuple(reasons))
+
+
+@dataclass(frozen=True, eq=False)
+class Unbounded:
+    """Solution with p unknowns in which the bounds of single unknowns are lifted."""
+
+    value: Array
+    """Values (p,) with the bound of the unknown lifted, those of all others as they are."""
+    replicates: Array
+    """Values (G, p) without one group each, around the bounded values."""
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations (p,)."""
+        return np.asarray(np.sqrt(np.diag(jackknife(self.replicates))))
+
+
+def unbounded(
+    grouped: GroupedEquations,
+    value: Array,
+    inside: Mask,
+    bounded: Mask,
+    gradient: Array,
+    prior: Array | None = None,
+) -> Unbounded:
+    """Lift the bounds of the unknowns that are at them, one at a time.
+
+    Args:
+        grouped: normal equations of the G groups.
+        value: bounded solution (p,).
+        inside: unknowns (p,) that are estimated and not at a bound.
+        bounded: unknowns (p,) at their bound; all others are known.
+        gradient: gradient (p,) of the sum of squares at the solution.
+        prior: precision (p, p) of a prior.
+    """
+    lifted, replicates = value.copy(), leave_one_out(grouped, value, inside, prior)
+    total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
+    for k in np.flatnonzero(bounded):
+        free = inside.copy()
+        free[k] = True
+        at = np.flatnonzero(free)
+        place = int(np.searchsorted(at, k))
+        scale = np.sqrt(np.maximum(np.diag(total)[at], 1e-300))
+        inverse = np.linalg.pinv(total[np.ix_(at, at)] / np.outer(scale, scale), hermitian=True)
+        step = -inverse[:, place] / scale * (gradient[k] / scale[place])
+        moved = value.copy()
+        moved[at] += step
+        lifted[k] = moved[k]
+        replicates[:, k] = value[k] + leave_one_out(grouped, moved, free, prior)[:, k] - moved[k]
+    return Unbounded(lifted, replicates)
+
+
+def rejections(solution: Unbounded, own: Array) -> Array:
+    """Distances (p,) of the robot's own values (p,) from a solution, in standard deviations; 0
+    where the solution does not reject them."""
+    sd = np.where(solution.sd > 0, solution.sd, np.inf)
+    distance = np.abs(own - solution.value) / sd
+    return np.where(distance > DETERMINED.rejecting_sds, distance, 0.0)

@@ -1,0 +1,180 @@
+"""Torques that were measured at the motors or behind the gears, of arms whose figures are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Robot
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identify.errors import MethodNotApplicable
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import read_log
+from joulepath.optimizer.identify.logs.recorded import measured
+from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.problem.arm import Arm
+from tests.identification_logs import (
+    GRAVITY,
+    SILENT,
+    Recording,
+    Truth,
+    csv_of,
+    recorded,
+    rigid_torques,
+    truth_of,
+)
+
+PANDA = load_robot("panda")
+WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
+# N·m of the bearings and the reading at rest of torque sensors behind the gears
+BEARING, OFFSET = 0.3, 0.4
+# kg, of links that weigh more than the robot's own
+HEAVIER = 1.1
+
+
+def behind_the_gears(robot: Robot, truth: Truth, recording: Recording, noise: float = 0.02) -> Log:
+    """The recording with torques as sensors behind the gears measure them."""
+    random = np.random.default_rng(0)
+    rigid = rigid_torques(robot, truth, recording.q, recording.v, recording.a)
+    seen = rigid + BEARING * np.tanh(recording.v / 0.01) + OFFSET
+    log = replace(recording, torque=seen + random.normal(0, noise, seen.shape)).log("torque")
+    return replace(log, torque_side="link", power=None)
+
+
+@pytest.fixture(scope="module")
+def heavier() -> tuple[Robot, Log]:
+    """A Panda whose links weigh a tenth more than the robot's own, and its log."""
+    none = np.zeros((3, 3))
+    scale = np.full(PANDA.nq, HEAVIER)
+    real = replace(PANDA, model=PANDA.loaded_model(0.0, none[0], none, GRAVITY, scale))
+    truth = truth_of(PANDA)
+    return real, behind_the_gears(real, truth, recorded(real, truth, moves=14))
+
+
+def test_torques_behind_the_gears_identify_links_and_keep_the_drives(
+    heavier: tuple[Robot, Log],
+) -> None:
+    real, log = heavier
+    found = identify(PANDA, [log], IdentificationOptions())
+    by_name = {(each.figure, each.joint): each for each in found.parameters}
+    for joint in range(PANDA.nq):
+        for figure in ("coulomb", "viscous", "rotor_inertia"):
+            kept = by_name[figure, joint]
+            assert not kept.identified and "behind the gears" in kept.why
+            assert kept.value == kept.previous
+    offsets = [by_name["offset", joint].value for joint in (1, 3)]
+    assert offsets == pytest.approx([OFFSET] * 2, abs=0.1)
+    errors = found.validation
+    assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
+    loaded = [1, 3]
+    assert (errors.fitted.torque.rmse[loaded] < 0.1 * errors.own.torque.rmse[loaded]).all()
+    assert np.isnan(errors.fitted.torque.copper_energy)
+
+    document = found.document("2026-01-31")
+    assert "drives" not in document and "friction_laws" not in document
+    assert document["inertials"]["mass"]["trust"] == "B"
+    written = load_robot("panda", figures=document)
+    assert written.friction.name == PANDA.friction.name
+    q = np.random.default_rng(3).uniform(-1, 1, (5, PANDA.nq))
+    still = np.zeros_like(q)
+    truth = truth_of(PANDA)
+    weight = rigid_torques(real, truth, q, still, still)
+    near = rigid_torques(written, truth, q, still, still)
+    own = rigid_torques(PANDA, truth, q, still, still)
+    assert np.abs(near - weight).max() < 0.15 * np.abs(own - weight).max()
+
+
+def test_advice_asks_for_what_the_links_do_not_tell(heavier: tuple[Robot, Log]) -> None:
+    advice = identify(PANDA, [heavier[1]], WITHOUT_SPLIT).advice
+    assert advice is not None and advice.figure in ("idle_power", "coulomb", "copper")
+    assert 0 < advice.share <= 1 and "power" in advice.do
+
+
+def test_power_tells_the_friction_that_torques_behind_the_gears_do_not() -> None:
+    truth = truth_of(PANDA, 3)
+    recording = recorded(PANDA, truth, moves=14, seed=3)
+    log = replace(behind_the_gears(PANDA, truth, recording), power=recording.log().power)
+    found = identify(PANDA, [log])
+    names = {each.figure for each in found.parameters if each.identified}
+    assert "coulomb" in names and "link_mass_scale" not in names
+    assert found.validation is not None
+    fitted, own = found.validation.fitted.power, found.validation.own.power
+    assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
+
+
+def test_torques_of_the_same_robots_motors_identify_its_friction() -> None:
+    truth = truth_of(PANDA, 1)
+    log = replace(recorded(PANDA, truth, moves=14, seed=1).log("torque"), power=None)
+    found = identify(PANDA, [log], WITHOUT_SPLIT)
+    coulomb = [each for each in found.parameters if each.figure == "coulomb"]
+    assert all(each.identified for each in coulomb)
+    for each in coulomb:
+        assert each.joint is not None
+        assert each.value == pytest.approx(truth.coulomb[each.joint], rel=0.1)
+
+
+def test_keeping_the_links_or_asking_for_friction_is_refused_with_the_cause(
+    heavier: tuple[Robot, Log],
+) -> None:
+    log = heavier[1]
+    with pytest.raises(InvalidProblem, match="behind the gears") as caught:
+        identify(PANDA, [log], replace(WITHOUT_SPLIT, refit=False))
+    assert caught.value.field == "inertials"
+    with pytest.raises(MethodNotApplicable, match="behind the gears"):
+        identify(PANDA, [log], replace(WITHOUT_SPLIT, method="threshold_velocity"))
+    with pytest.raises(InvalidProblem, match="same side"):
+        identify(PANDA, [log, replace(log, torque_side="motor")], WITHOUT_SPLIT)
+    with pytest.raises(InvalidProblem, match="Currents"):
+        replace(log, effort_meaning="current")
+
+
+@pytest.mark.parametrize("method", ["base_parameters", "essential_parameters"])
+def test_base_parameters_behind_the_gears_have_no_rotors(
+    heavier: tuple[Robot, Log], method: str
+) -> None:
+    options = replace(WITHOUT_SPLIT, method=method)
+    found = identify(PANDA, [heavier[1]], options)
+    assert found.structure.base == 43
+    assert not any("Ia" in each.figure for each in found.parameters)
+    assert "friction_laws" not in found.document("2026-01-31")
+
+
+def test_the_reader_takes_the_side_of_the_robots_limits_or_as_told() -> None:
+    truth = truth_of(PANDA)
+    recording = recorded(PANDA, truth, moves=3, noise=SILENT)
+    body = csv_of(recording, effort="torque", without="P")
+    assert read_log(body, PANDA, LogOptions(effort="torque")).log.torque_side == "link"
+    told = read_log(body, PANDA, LogOptions(effort="torque", torque_side="motor"))
+    assert told.log.torque_side == "motor" and told.report.effort is not None
+    assert told.report.effort.torque_side == "motor"
+    currents = csv_of(recording, effort="current", without="P")
+    assert read_log(currents, PANDA, LogOptions(effort="current")).log.torque_side == "motor"
+
+
+def test_measured_energy_is_the_same_from_either_side() -> None:
+    """Of an arm with the robot's own friction and rotors: its sensors do not see these."""
+    truth = replace(
+        truth_of(PANDA),
+        coulomb=PANDA.friction.coulomb,
+        viscous=PANDA.friction.viscous,
+        load=np.zeros(PANDA.nq),
+        offset=np.zeros(PANDA.nq),
+        rotor_inertia=PANDA.drives.rotor_inertia,
+    )
+    recording = recorded(PANDA, truth, moves=2, noise=SILENT)
+    motor = recording.log("torque")
+    rigid = rigid_torques(PANDA, truth, recording.q, recording.v, recording.a)
+    link = replace(motor, effort=rigid, torque_side="link")
+    arm = Arm(robot=PANDA)
+    one, other = (
+        sum(each.by_efforts or 0.0 for each in measured(log, arm)) for log in (motor, link)
+    )
+    assert other == pytest.approx(one, rel=1e-9)
+    assert one > 1.1 * sum(
+        each.by_efforts or 0.0 for each in measured(replace(link, torque_side="motor"), arm)
+    )

@@ -1,0 +1,217 @@
+"""Figures that are written into a document and read again are those of the fit."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.dynamics.link_regressor import rigid_torques
+from joulepath.optimizer.dynamics.losses import breakdown
+from joulepath.optimizer.identify.choices import Term
+from joulepath.optimizer.identify.identify import Identification, identify
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
+from joulepath.optimizer.problem.arm import Arm
+from tests.identification_logs import Recording, recorded, truth_of, with_current
+
+ROBOT = load_robot("ur10e")
+# relative; a few roundings of sums of some ten terms
+EXACT = 1e-12
+# of links: their inertias are written about the centre of mass, and moved back
+MOVED = 1e-9
+CURVED: tuple[Term, ...] = ("coulomb", "viscous", "curved", "load", "offset")
+
+
+def log_of(robot: Robot = ROBOT, bend: float = 0.3, still: int | None = 5, **parts: Any) -> Log:
+    """A log of a unit whose friction is curved, with a joint that hardly moves."""
+    truth = truth_of(robot, 4)
+    recording: Recording = recorded(robot, truth, moves=10, seed=4)
+    curve = truth.coulomb * np.arcsinh(recording.exact_v / bend)
+    log = with_current(recording, recording.current + curve / truth.torque_constant).log()
+    if still is not None:
+        q, v, a = (np.array(each) for each in (log.q, log.v, log.a))
+        q[:, still], v[:, still], a[:, still] = q[0, still], 0.0, 0.0
+        log = replace(log, q=q, v=v, a=a)
+    return replace(log, **parts)
+
+
+def written(found: Identification) -> Robot:
+    """The robot with the figures of the document, as a file holds them."""
+    return load_robot(
+        found.robot.name, figures=json.loads(json.dumps(found.document("2026-01-31")))
+    )
+
+
+def torques(robot: Robot, rows: Rows) -> tuple[Array, Array]:
+    """Torques (n, nq) [N·m] of bodies, and of motors, by the robot's figures."""
+    rigid = rigid_torques(robot.model, rows.q, rows.v, rows.a)
+    motor = rigid + robot.drives.rotor_inertia * rows.a + robot.friction.torque(rows.v, rigid)
+    return rigid, motor
+
+
+def check(found: Identification, log: Log, tolerance: float = EXACT) -> None:
+    rows = rows_of(found.robot, [log], regressor=found.options.needs_regressor)
+    arm, robot = found.fitted.arm, written(found)
+    rigid, motor = torques(robot, rows)
+    fitted = arm.torque(rows) - arm.offset
+    scale = np.abs(fitted).max()
+    np.testing.assert_allclose(motor, fitted, rtol=0, atol=tolerance * scale)
+    np.testing.assert_array_equal(robot.drives.torque_constant, arm.torque_constant)
+    if np.isfinite(rows.power).any():
+        # offsets belong to the sensors, and are no figures
+        power = replace(arm, offset=np.zeros(robot.nq)).power(rows)[0]
+        for row in range(0, len(power), 97):
+            at = slice(row, row + 1)
+            tau = rigid[at] + robot.drives.rotor_inertia * rows.a[at]
+            energy = breakdown(np.ones(1), rows.v[at], rows.a[at], tau, 0.0, Arm(robot=robot))
+            assert energy.electrical.total == pytest.approx(power[row], rel=10 * tolerance)
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        ("coulomb",),
+        ("coulomb", "viscous"),
+        ("viscous", "offset"),
+        ("coulomb", "curved"),
+        ("coulomb", "viscous", "load", "offset"),
+        CURVED,
+    ],
+)
+def test_a_law_of_any_terms_is_written_as_it_was_fitted(terms: tuple[Term, ...]) -> None:
+    log = log_of(power=None)
+    check(identify(ROBOT, [log], IdentificationOptions(terms=terms, held_out=0.0)), log)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"fit": ("friction",)},
+        {"fit": ("rotor",)},
+        {"fit": ("friction", "rotor", "torque_constant"), "terms": CURVED},
+        {"knee": 0.02},
+        {"estimator": "irls", "terms": CURVED},
+        {"method": "threshold_velocity"},
+    ],
+)
+def test_figures_of_any_options_are_written_as_they_were_fitted(options: dict[str, Any]) -> None:
+    log = log_of()
+    check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0, **options)), log)
+
+
+def test_figures_of_power_alone_are_written_as_they_were_fitted() -> None:
+    log = log_of(effort=None, effort_meaning=None)
+    check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0)), log, MOVED)
+
+
+@pytest.mark.parametrize("terms", [("coulomb", "viscous", "offset"), CURVED])
+def test_refitted_links_are_written_as_they_were_fitted(terms: tuple[Term, ...]) -> None:
+    log = log_of()
+    options = IdentificationOptions(held_out=0.0, refit=True, terms=terms)
+    check(identify(ROBOT, [log], options), log, MOVED)
+
+
+def test_losses_that_the_power_does_not_separate_are_not_counted_twice() -> None:
+    """Of a robot whose inverters have constant and quadratic losses of their own."""
+    nq = ROBOT.nq
+    drives = replace(
+        ROBOT.drives, inverter_constant=np.full(nq, 2.0), inverter_quadratic=np.full(nq, 0.05)
+    )
+    figures = dict(ROBOT.figures)
+    figures["drives"] = figures["drives"] | {
+        name: figures["drives"][name] | {"value": getattr(drives, name).tolist()}
+        for name in ("inverter_constant", "inverter_quadratic")
+    }
+    lossy = replace(ROBOT, drives=drives, figures=figures)
+    log = log_of()
+    found = identify(lossy, [log], IdentificationOptions(held_out=0.0))
+    document = found.document("2026-01-31")
+    idle = document["electronics"]["idle_power"]["value"]
+    constants = document.get("drives", {}).get("inverter_constant", {}).get("value", [2.0] * nq)
+    assert idle + sum(constants) == pytest.approx(found.fitted.arm.power_parameters.idle)
+
+
+def test_the_bend_of_a_curved_law_is_the_best_one_and_is_written() -> None:
+    bend = 0.3
+    log = log_of(bend=bend, still=None, power=None)
+    options = IdentificationOptions(terms=CURVED, held_out=0.0)
+    for refit in (False, True):
+        found = identify(ROBOT, [log], replace(options, refit=refit))
+        law = written(found).friction
+        told = [
+            each.joint for each in found.parameters if each.figure == "curved" and each.identified
+        ]
+        assert len(told) >= 3
+        # the candidates are apart by a factor of 1.45
+        assert law.speed[told] == pytest.approx([bend] * len(told), rel=0.5)
+        assert (law.speed[told] != ROBOT.friction.speed[told]).all()
+
+
+def test_what_was_not_identified_keeps_the_robots_value_and_letter() -> None:
+    log = log_of(power=None)
+    for options in ({}, {"refit": True}, {"method": "base_parameters"}):
+        found = identify(ROBOT, [log], IdentificationOptions(held_out=0.0, **options))
+        for each in found.parameters:
+            figures = ("coulomb", "viscous", "load", "rotor_inertia")
+            if not each.identified and each.figure in figures:
+                assert each.value == each.previous, (options, each)
+        document, robot = found.document("2026-01-31"), written(found)
+        law = document["friction_laws"]["identified"]
+        own = ROBOT.figures["friction_laws"][ROBOT.friction.name]
+        # joint 6 does not move
+        for part in ("coulomb", "viscous", "curved"):
+            assert getattr(robot.friction, part)[5] == getattr(ROBOT.friction, part)[5]
+        letters = [law["coulomb"]["trust"], own["coulomb"]["trust"]]
+        assert letters[0] == max("B", letters[1], key="ABCTE".index)
+        assert "keep the robot's own" in law["coulomb"]["note"]
+        names = document["covariance"]["names"]
+        assert "friction_laws.identified.coulomb.5" not in names
+
+
+def test_nothing_is_written_of_what_stays_the_robots_own() -> None:
+    found = identify(
+        ROBOT, [log_of(power=None)], IdentificationOptions(fit=("friction",), held_out=0.0)
+    )
+    assert set(found.document("2026-01-31")) & {"drives", "electronics", "inertials"} == set()
+
+
+def test_a_rotor_at_its_bound_stays_there_with_a_warning_if_the_log_rejects_the_robots_own() -> (
+    None
+):
+    """Of an arm without rotors, whose robot has them: the noise drives the fit below 0."""
+    truth = replace(truth_of(ROBOT), rotor_inertia=np.full(ROBOT.nq, -0.02))
+    log = replace(recorded(ROBOT, truth, moves=14).log(), power=None)
+    for options in ({}, {"refit": True}):
+        found = identify(ROBOT, [log], IdentificationOptions(held_out=0.0, **options))
+        rotors = [each for each in found.parameters if each.figure == "rotor_inertia"]
+        assert all(each.previous > 0 for each in rotors)
+        at_bound = [each for each in rotors if each.value == 0]
+        assert len(at_bound) >= 2
+        for each in at_bound:
+            assert each.identified and each.sd > 0 and "bound" in each.why
+            joint = (each.joint or 0) + 1
+            assert any(f"rotor_inertia of joint {joint}" in text for text in found.warnings)
+        worse = replace(found.fitted.arm, rotor_inertia=ROBOT.drives.rotor_inertia)
+        rows = rows_of(ROBOT, [log], regressor=found.options.needs_regressor)
+        measured = rows.effort * ROBOT.drives.torque_constant
+        errors = [np.square(measured - arm.torque(rows)).sum() for arm in (found.fitted.arm, worse)]
+        assert errors[0] < 0.5 * errors[1]
+
+
+def test_a_figure_at_its_bound_keeps_the_robots_own_if_the_log_allows_it() -> None:
+    small = replace(ROBOT, drives=replace(ROBOT.drives, rotor_inertia=np.full(ROBOT.nq, 1e-4)))
+    truth = replace(truth_of(ROBOT), rotor_inertia=np.full(ROBOT.nq, -1e-3))
+    log = replace(recorded(ROBOT, truth, moves=14).log(), power=None)
+    found = identify(small, [log], IdentificationOptions(held_out=0.0))
+    kept = [
+        each for each in found.parameters if each.figure == "rotor_inertia" and not each.identified
+    ]
+    assert len(kept) >= 3 and all(each.value == each.previous == 1e-4 for each in kept)
+    assert not found.warnings
