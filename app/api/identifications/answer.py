@@ -38,7 +38,7 @@ class FoundPayload:
     mass_sd: Kilograms
     """Standard deviation of the mass."""
     com: Position
-    """Centre of mass in the flange frame."""
+    """Centre of mass in the flange frame; 0 for a mass that is 0 within its deviation."""
     com_sd: Position
     """Standard deviation of the centre of mass."""
     why: str

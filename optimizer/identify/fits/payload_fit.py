@@ -38,7 +38,11 @@ TERMS = ("coulomb", "viscous", "load", "curved", "offset", "rotor_inertia")
 FIGURE_NAMES: tuple[Name, ...] = tuple(
     (f"payload_{part}", None) for part in ("mass", "com_x", "com_y", "com_z")
 )
-NO_DIFFERENCE = "The log with the payload does not differ from the others by a load."
+UNKNOWN_MASS = (
+    "The standard deviation of the mass is {:.2g} kg: log poses in which the arm is stretched out "
+    "and folded, with the payload and without it."
+)
+NO_CENTRE = "The mass is 0 within its deviation, so that it has no centre."
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,9 @@ class PayloadFitSettings:
     """Prior standard deviation of a term of friction over the torque limit [SI unit per N·m]."""
     min_curve_speed: float = 0.05
     """Smallest speed of the curved friction term [rad/s]."""
+    max_sd: float = 0.05
+    """Standard deviation of a mass over the rated payload, up to which a mass near 0 is known
+    [1]."""
     min_mass: float = 1e-3
     """Mass below which a torque sensor or a current does not show a payload [kg]."""
     max_poses: int = 500
@@ -80,7 +87,8 @@ class IdentifiedPayload:
     covariance: Array
     """Covariance (4, 4) of mass and centre of mass."""
     body: Array
-    """Parameters (10,) in the frame of the last joint; 0 if not identified."""
+    """Parameters (10,) in the frame of the last joint; 0 if not identified, and for a mass that is
+    0 within its deviation."""
     why: str
     """Reason for not identifying it, or empty."""
 
@@ -89,9 +97,13 @@ class IdentifiedPayload:
         own = [stated.mass, *stated.com.tolist()]
         values = [self.mass, *self.com.tolist()]
         deviations = np.sqrt(np.diag(self.covariance)).tolist()
+        of_centre = self.why or ("" if self.body.any() else NO_CENTRE)
+        reasons = [self.why, *[of_centre] * 3]
         return tuple(
-            IdentifiedParameter(*name, value, sd, previous, not self.why, self.why)
-            for name, value, sd, previous in zip(FIGURE_NAMES, values, deviations, own, strict=True)
+            IdentifiedParameter(*name, value, sd, previous, not why, why)
+            for name, value, sd, previous, why in zip(
+                FIGURE_NAMES, values, deviations, own, reasons, strict=True
+            )
         )
 
 
@@ -258,9 +270,14 @@ def _payload_of_body(
             "the log with the payload last, and give the `payload` of the others.",
         )
     if not max(sd, min_mass) <= DETERMINED.max_relative_sd * mass:
-        unknown = np.diag([sd**2, 0.0, 0.0, 0.0])
+        known = sd <= PAYLOAD_FIT.max_sd * robot.rated_payload
         return IdentifiedPayload(
-            log, 0.0, np.zeros(3), unknown, np.zeros(PARAMETERS_PER_BODY), NO_DIFFERENCE
+            log=log,
+            mass=max(mass, 0.0) if known else 0.0,
+            com=np.zeros(3),
+            covariance=np.diag([sd**2, 0.0, 0.0, 0.0]),
+            body=np.zeros(PARAMETERS_PER_BODY),
+            why="" if known else UNKNOWN_MASS.format(sd),
         )
     com = flange.rotation.T @ (body[1:4] / mass - flange.translation)
     slope = np.zeros((4, 4))

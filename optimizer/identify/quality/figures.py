@@ -98,10 +98,10 @@ def _values(robot: Robot, fitted: FitResult, options: IdentificationOptions) -> 
     """Values of all figures with a fitted part, by name."""
     arm = fitted.arm
     names_fitted = {figure for figure, _ in fitted.estimate.names}
-    names = [name for name in ("rotor_inertia", "torque_constant") if name in names_fitted]
+    names: list[str] = [*{"rotor_inertia", "torque_constant"} & names_fitted]
     if names_fitted & set(DRY):
         names += LAW
-    values = {name: np.array(getattr(arm, name)) for name in names}
+    values: dict[str, Array] = {name: np.array(getattr(arm, name)) for name in names}
     if "idle_power" in names_fitted:
         values |= _powers(robot, arm)
     if LINK_MASS_SCALE in names_fitted:

@@ -86,22 +86,41 @@ def test_a_payload_needs_two_logs_that_differ_by_it() -> None:
         found_in(loaded, without)
     with pytest.raises(InvalidProblem, match="two logs"):
         found_in(loaded)
-    for alike in (
-        [without, without],
-        [replace(loaded, payload=PAYLOAD), without],
-        [without, log_of(NOTHING, 0, NOTHING, 9)],
-    ):
-        with pytest.raises(NotExcited) as caught:
-            found_in(*alike)
-        assert caught.value.parameters[0] == "payload_mass"
-        assert caught.value.advice["parameters"] == ["inertials", "rotor", "friction"]
+    alike = [turned(log_of(NOTHING, 0, NOTHING, motions)) for motions in (0, 9)]
+    with pytest.raises(NotExcited) as caught:
+        found_in(*alike)
+    assert caught.value.parameters[0] == "payload_mass"
+    assert caught.value.advice["parameters"] == ["inertials", "rotor", "friction"]
+
+
+def turned(log: Log) -> Log:
+    """The log of an arm that turns about its upright axis alone, where no weight acts."""
+    first = np.arange(ROBOT.nq) == 0
+    motion = {name: np.where(first, getattr(log, name), 0.0) for name in ("q", "v", "a")}
+    return replace(log, **motion, effort=np.where(first, np.asarray(log.effort), 0.01))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_nothing_carried_is_found_with_its_deviation(seed: int) -> None:
+    """Whether the last log says so or not, and where the others carried something, too."""
+    without = log_of(NOTHING, seed, NOTHING)
+    pairs = (
+        [without, log_of(NOTHING, seed, PAYLOAD, 9)],
+        [log_of(PAYLOAD, seed, PAYLOAD, 50), without],
+    )
+    for logs in pairs:
+        found = identify(ROBOT, logs, ASKED)
+        carried = found.payload
+        assert carried is not None and not carried.why and not carried.body.any()
+        sd = float(np.sqrt(carried.covariance[0, 0]))
+        assert 0 <= carried.mass <= FAR * sd and 0 < sd <= 0.03
+        told = {each.figure: each.identified for each in found.parameters}
+        assert told["payload_mass"] and not told["payload_com_x"] and told["coulomb"]
 
 
 def test_a_payload_that_is_not_told_is_none_and_the_rest_is_found() -> None:
-    without = log_of(NOTHING, 0, NOTHING)
-    found = identify(
-        ROBOT, [without, without], IdentificationOptions(fit=("friction", "payload"), held_out=0.0)
-    )
+    logs = [turned(log_of(NOTHING, 0, NOTHING, motions)) for motions in (0, 9)]
+    found = identify(ROBOT, logs, IdentificationOptions(fit=("friction", "payload"), held_out=0.0))
     told = {each.figure for each in found.parameters if each.identified}
     assert "coulomb" in told and not any(each.startswith("payload") for each in told)
     assert found.payload is not None and found.payload.mass == 0 and found.payload.why
