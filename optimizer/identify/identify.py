@@ -196,7 +196,7 @@ def identify(
         PayloadUnknown: torque constants are requested, and the payload is not known.
         NothingHeldOut: the logs have fewer than two different motions.
     """
-    logs, options = prepare(logs, options or IdentificationOptions())
+    logs, options = prepare(robot, logs, options or IdentificationOptions())
     with progress_bar("Identifying", tell, progress) as tell:
         return _identified(robot, logs, options, tell)
 

@@ -51,6 +51,9 @@ class IdentificationOptions:
     refit: bool | None = None
     """Whether to fit the inertials of the links, too; None: only to torques that were measured
     behind the gears, which identify nothing else."""
+    constants: bool | None = None
+    """Whether to fit torque constants, too, where they are not requested; None: to the currents of
+    logs with a known payload, if the masses of the robot's links have a source."""
     method: Method = "automatic"
     period: float | None = None
     """Period of the motion for the method `periodic` [s]."""
@@ -119,4 +122,5 @@ class IdentificationOptions:
         """Fitted figures: a payload is fitted only together with friction and rotors."""
         given = tuple(self.fit)
         together: tuple[Target, ...] = ("friction", "rotor") if "payload" in given else ()
+        together += ("torque_constant",) if self.constants else ()
         return (*given, *(each for each in together if each not in given))

@@ -62,8 +62,9 @@ class IdentifyRequest(Request):
     )
     fit: Annotated[list[Target], Field(min_length=1, max_length=5)] = described(
         "What is found. Power is added by itself where the logs have it; asking for it refuses "
-        "logs without. `payload`: mass and centre of mass of what the last of `logs` carried and "
-        "the others did not; friction and rotors are found with it.",
+        "logs without. `torque_constant` is added by itself where the logs have currents and a "
+        "known payload, and the links are kept. `payload`: mass and centre of mass of what the "
+        "last of `logs` carried and the others did not; friction and rotors are found with it.",
         None,
         ["friction", "rotor"],
         default=["friction", "rotor"],

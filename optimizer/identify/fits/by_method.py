@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath.models.robot import Robot
+from joulepath.models.trust import trust_letters
+from joulepath.models.uncertainty.ranges import ENGINEERING
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.logged_torque import motor_torque
 from joulepath.optimizer.identify.errors import MethodNotApplicable
@@ -25,11 +27,12 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
 def prepare(
-    logs: Sequence[Log], options: IdentificationOptions
+    robot: Robot, logs: Sequence[Log], options: IdentificationOptions
 ) -> tuple[list[Log], IdentificationOptions]:
     """Logs and options in the form that the method of the options needs.
 
-    Links are refitted to torques behind the gears, unless the options keep them.
+    Links are refitted to torques behind the gears, unless the options keep them. Torque constants
+    are fitted to the currents that hold known links with a known payload.
 
     Raises:
         MethodNotApplicable: the logs lack a channel or a property that the method needs.
@@ -42,6 +45,8 @@ def prepare(
         keeps = options.method != "automatic" or "payload" in options.fit
         refit = not keeps and any(_behind_gears(log) for log in logs)
         options = replace(options, refit=refit)
+    if options.constants is None:
+        options = replace(options, constants=_constants_are_told(robot, logs, options))
     if options.method == "motor_current":
         return [*logs], replace(
             options, fit=tuple(dict.fromkeys((*options.fit, "torque_constant")))
@@ -73,6 +78,22 @@ def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> F
             )
             fitted = fit_rows(robot, at_reference(rows, fitted.arm, warm), options)
     return fitted
+
+
+def _constants_are_told(robot: Robot, logs: Sequence[Log], options: IdentificationOptions) -> bool:
+    """Whether torque constants are fitted without being requested."""
+    links = trust_letters(
+        {name: robot.figures["inertials"][name] for name in ("mass", "center_of_mass")}
+    )
+    return (
+        options.method == "automatic"
+        and "friction" in options.fit
+        and not {"torque_constant", "payload"} & set(options.fit)
+        and not (options.refit or options.couplings)
+        and all(log.effort_meaning == "current" and log.payload_known for log in logs)
+        # links that nobody measured are known less well than the constants
+        and ENGINEERING not in links
+    )
 
 
 def _behind_gears(log: Log) -> bool:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, PayloadUnknown
-from joulepath.optimizer.identify.fits.block import terms_of
+from joulepath.optimizer.identify.fits.block import SCALE, terms_of
 from joulepath.optimizer.identify.fits.payload_fit import joints_without_gravity
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
@@ -63,7 +64,9 @@ def check_logs(
     if "power" in options.fit and not power:
         raise NoPowerChannel
     if options.held_out and rows.rest.all():
-        raise not_excited(terms_of(options), logs, options)
+        terms = terms_of(replace(options, constants=False))
+        names = ["torque_constant" if term == SCALE else term for term in terms]
+        raise not_excited(names, logs, options)
     efforts = bool(np.isfinite(rows.effort).any())
     if not power and not efforts and options.method != "base_wrench":
         raise not_excited(options.fit, logs, options)

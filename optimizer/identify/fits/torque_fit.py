@@ -88,7 +88,7 @@ def fit_torques(
             for joints in coupled_joints(robot.nq, options.couplings)
         ]
         found = join_estimates([_fit_block(robot, each, clusters, options) for each in blocks])
-        constants = "torque_constant" in options.fit
+        constants = "torque_constant" in options.targets
         return _with_torque_constants(robot, found) if constants else found
 
     return with_speeds(robot, curve_speeds(robot, rows, torque, clusters, options), fit)

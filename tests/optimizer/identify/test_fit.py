@@ -354,6 +354,28 @@ def test_torque_constants_follow_from_gravity() -> None:
     assert abs(coulomb.value - truth.coulomb[1]) <= FAR * coulomb.sd
 
 
+def test_torque_constants_are_found_by_themselves_where_the_payload_is_known() -> None:
+    truth = truth_of(ROBOT, 2)
+    real = truth.torque_constant * np.array([1.0, 1.06, 0.95, 1.04, 1.0, 1.0])
+    log = without_power(recorded(ROBOT, replace(truth, torque_constant=real), moves=14).log())
+    letters = dict(ROBOT.figures)
+    mass = letters["inertials"]["mass"] | {"trust": "E"}
+    letters["inertials"] = letters["inertials"] | {"mass": mass}
+    constants = [
+        identify(robot, [given], options).fitted.arm.torque_constant
+        for robot, given, options in (
+            (ROBOT, log, WITHOUT_SPLIT),
+            (ROBOT, replace(log, payload_known=False), WITHOUT_SPLIT),
+            (replace(ROBOT, figures=letters), log, WITHOUT_SPLIT),
+            (ROBOT, log, replace(WITHOUT_SPLIT, constants=False)),
+            (ROBOT, log, replace(WITHOUT_SPLIT, refit=True)),
+        )
+    ]
+    told, *kept = constants
+    assert told[list(LOADED)] == pytest.approx(real[list(LOADED)], rel=0.02)
+    assert all((each == ROBOT.drives.torque_constant).all() for each in kept)
+
+
 def test_torque_constants_are_asked_of_currents_only() -> None:
     log = without_power(recorded(ROBOT, truth_of(ROBOT), moves=2).log("torque"))
     with pytest.raises(InvalidProblem, match="currents"):

@@ -177,7 +177,9 @@ def test_what_was_not_identified_keeps_the_robots_value_and_letter() -> None:
 
 def test_nothing_is_written_of_what_stays_the_robots_own() -> None:
     found = identify(
-        ROBOT, [log_of(power=None)], IdentificationOptions(fit=("friction",), held_out=0.0)
+        ROBOT,
+        [log_of(power=None)],
+        IdentificationOptions(fit=("friction",), constants=False, held_out=0.0),
     )
     assert set(found.document("2026-01-31")) & {"drives", "electronics", "inertials"} == set()
 
