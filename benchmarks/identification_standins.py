@@ -43,12 +43,13 @@ def day_of(
     robot: Robot,
     truth: Truth,
     seed: int,
-    friction: float,
+    friction: float | Array,
     moves: int,
     payload: Payload | None = None,
     noise: Noise | None = None,
 ) -> Recording:
-    """What an arm records on a day with so many times its friction, perhaps with a payload."""
+    """What an arm records on a day with so many times its friction, of all joints or of each (nq,),
+    perhaps with a payload."""
     random = np.random.default_rng([seed, 7])
     parts = {name: getattr(truth, name) * friction for name in ("coulomb", "viscous", "load")}
     today = replace(truth, **parts, knee=2e-3, payload=payload or Payload())

@@ -3,8 +3,8 @@
 A document has the form of the robot's `figures.yaml`; `robot` is the name of the robot. An
 identified figure has `sd` beside its value. At the top level, `covariance` has the names and the
 matrix of all identified parameters, `session_sd` [1] is the relative deviation of friction from day
-to day, and `move_sd` [W] the mean power of model errors in a motion. Only the figures in
-`REPLACEABLE` may differ from the robot's own figures.
+to day, of all joints together or of each by itself, and `move_sd` [W] the mean power of model
+errors in a motion. Only the figures in `REPLACEABLE` may differ from the robot's own figures.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ class Covariance:
 
     names: tuple[str, ...]
     matrix: Array
-    session_sd: float
+    session_sd: Array
+    """Of all joints together (), or of each joint independently (nq,)."""
     move_sd: float
 
     def place_of(self, name: str, law: str) -> tuple[str, int] | None:
@@ -118,7 +119,7 @@ def covariance_of(figures: dict[str, Any]) -> Covariance | None:
     return Covariance(
         tuple(given["names"]),
         np.array(given["matrix"], dtype=float),
-        float(figures.get("session_sd", 0.0)),
+        np.array(figures.get("session_sd", 0.0), dtype=float),
         float(figures.get("move_sd", 0.0)),
     )
 
@@ -283,10 +284,11 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
     result: dict[str, Any] = {}
     for name, most in (("session_sd", 1.0), ("move_sd", 1e5)):
         if document.get(name) is not None:
-            value = float(numbers(name, document[name], ()))
-            if not 0 <= value <= most:
+            of_joints = name == "session_sd" and isinstance(document[name], list)
+            value = numbers(name, document[name], (nq,) if of_joints else ())
+            if not ((value >= 0) & (value <= most)).all():
                 raise InvalidFigures(name, f"must be from 0 to {most:g}.")
-            result[name] = value
+            result[name] = value.tolist()
     given = document.get("covariance")
     if given is None:
         return result

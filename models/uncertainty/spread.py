@@ -226,13 +226,15 @@ class _Sources:
             column[:] = self._normal()
         return normal @ root.T, covariance
 
-    def _session(self, session_sd: float, identified: Places) -> Array:
-        """Draws (n, p) of the friction on another day: one factor for all identified joints."""
+    def _session(self, session_sd: Array, identified: Places) -> Array:
+        """Draws (n, p) of the friction on another day: one factor for all identified joints, or an
+        independent one for each."""
         nq, result = self.robot.nq, np.zeros((DRAWS, self._size))
-        factor = session_sd * self._normal()
+        count = nq if session_sd.ndim else 1
+        factor = session_sd * np.stack([self._normal() for _ in range(count)], axis=1)
         known = 1 - self._unknown((*_DRY, LOAD), identified)
         for name in (*_DRY, LOAD):
-            result[:, place(name, nq)] = factor[:, None] * known * self._nominal[place(name, nq)]
+            result[:, place(name, nq)] = factor * known * self._nominal[place(name, nq)]
         return result
 
 

@@ -91,7 +91,7 @@ def document_of(
             "names": [_path(*figures.parameters[k]) for k in listed],
             "matrix": _symmetric(figures.covariance[np.ix_(listed, listed)]).tolist(),
         }
-    return document | {"session_sd": figures.session_sd, "move_sd": figures.move_sd}
+    return document | {"session_sd": figures.session_sd.tolist(), "move_sd": figures.move_sd}
 
 
 def _figure(

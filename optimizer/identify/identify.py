@@ -285,7 +285,7 @@ def _fold(
     payload = _payload(robot, seen, options, last)
     seen = seen if payload is None else with_payload(seen, payload)
     fitted = fit_by_method(robot, seen, options)
-    spread = replace(spread_of(fitted, seen), session_sd=0.0)
+    spread = replace(spread_of(fitted, seen), session_sd=np.zeros(robot.nq))
     del seen  # rows are large
     unseen = rows.take(held_out)
     return Fold(fitted, spread, unseen if payload is None else with_payload(unseen, payload))

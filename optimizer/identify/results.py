@@ -125,9 +125,10 @@ class Validation:
     constant: PowerErrors | None
     """Errors of a constant power; null without power."""
     coverage: Ratio | None
-    """Share of the moves with a measured energy between P5 and P95; null without power."""
+    """Share of the moves with a measured energy between P5 and P95. Without a logged power, the
+    energy is that by the currents or torques of the motors; null without these, too."""
     half_width: Percent | None
-    """Mean of half the interval from P5 to P95; null without power."""
+    """Mean of half the interval from P5 to P95; null where `coverage` is."""
     curves: Annotated[Curves, Internal]
     """The moves, as predicted by the fit without them."""
 
@@ -229,8 +230,8 @@ class IdentifiedFigures:
     """Standard deviations (p,)."""
     covariance: Array
     """Covariance (p, p)."""
-    session_sd: float
-    """Relative standard deviation of friction from day to day [1]."""
+    session_sd: Array
+    """Relative standard deviations of the friction of each joint (nq,) from day to day [1]."""
     move_sd: float
     """Standard deviation of the mean power of a move, not expressed by the model [W]."""
     logs: tuple[str, ...]

@@ -52,8 +52,9 @@ class FiguresDetail(FiguresSummary):
     covariance: Covariance | None = part(
         "Covariance of the identified parameters; null: none was identified."
     )
-    session_sd: float | None = described(
-        "Relative standard deviation of friction from one day to another; null: not known.",
+    session_sd: float | list[float] | None = described(
+        "Relative standard deviation of friction from one day to another, of all joints together "
+        "or of each joint by itself; null: not known.",
         "1",
         0.03,
     )

@@ -11,6 +11,7 @@ from joulepath.app.schemas.examples.figures import COVARIANCE, DRIVES, FIGURES_I
 from joulepath.app.schemas.examples.values import CREATED
 
 Section = dict[str, Any]
+_Share = Annotated[float, Field(ge=0, le=1)]
 NAMES = (
     "Paths of the parameters, with the index of the joint where a figure has one value each: "
     "`friction_laws.LAW.coulomb.0`, `drives.copper.2`, `electronics.idle_power`, `inertials.mx.1`."
@@ -52,8 +53,12 @@ class FiguresDocument(Request):
         COVARIANCE,
         default=None,
     )
-    session_sd: Annotated[float, Field(ge=0, le=1)] | None = described(
-        "Relative standard deviation of friction from one day to another.", "1", 0.03, default=None
+    session_sd: _Share | Annotated[list[_Share], Field(max_length=16)] | None = described(
+        "Relative standard deviation of friction from one day to another, of all joints together "
+        "or of each joint by itself.",
+        "1",
+        0.03,
+        default=None,
     )
     move_sd: Annotated[float, Field(ge=0, le=1e5)] | None = described(
         "Standard deviation of what the model cannot express of a motion, as a mean power.",

@@ -94,6 +94,16 @@ def friction_torque(parts: TorqueParts) -> Array:
     return parts.dry + parts.viscous + parts.load * np.abs(parts.rigid) * parts.smooth_sign
 
 
+def power_of_torque(
+    figures: PowerParameters, v: Array, torque: Array, torque_constant: Array, regeneration: float
+) -> Array:
+    """Power (n,) [W] on the bus for motor torques (n, nq) [N·m] at speeds v (n, nq) [rad/s]."""
+    i = torque / torque_constant
+    joints = torque * v + figures.copper * i**2 + figures.inverter * np.abs(i)
+    net = figures.idle + joints.sum(axis=1)
+    return np.asarray(np.where(net >= 0, 1.0, regeneration) * net)
+
+
 def bus_power(
     figures: PowerParameters, parts: TorqueParts, torque_constant: Array, regeneration: float
 ) -> tuple[Array, Array]:

@@ -34,6 +34,8 @@ from joulepath.optimizer.identify.rows.clusters import Clusters, clusters_of, ef
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 from joulepath.optimizer.problem.arm import Payload
 
+MOMENTS = 4
+"""Mass and first moments, which come first among the parameters of a body."""
 TERMS = ("coulomb", "viscous", "load", "curved", "offset", "rotor_inertia")
 FIGURE_NAMES: tuple[Name, ...] = tuple(
     (f"payload_{part}", None) for part in ("mass", "com_x", "com_y", "com_z")
@@ -62,6 +64,9 @@ class PayloadFitSettings:
     """Prior standard deviation of a term of friction over the torque limit [SI unit per N·m]."""
     min_curve_speed: float = 0.05
     """Smallest speed of the curved friction term [rad/s]."""
+    max_sd_ratio: float = 5.0
+    """Standard deviation of the mass without a joint over that with all joints, up to which the
+    joints are compared [1]."""
     max_sd: float = 0.05
     """Standard deviation of a mass over the rated payload, up to which a mass near 0 is known
     [1]."""
@@ -163,13 +168,41 @@ def fit_payload(
         body = value[links : links + PARAMETERS_PER_BODY]
     replicates = leave_one_out(grouped, value, np.ones(len(value), dtype=bool), prior)
     inverse = np.linalg.inv(gram)
-    return _payload_of_body(
-        robot,
-        log,
-        body,
-        replicates[:, links : links + PARAMETERS_PER_BODY],
-        (inverse @ prior @ inverse)[links:, links:],
-    )
+    first = slice(links, links + MOMENTS)
+    spread = jackknife(replicates[:, first]) + (inverse @ prior @ inverse)[first, first]
+    spread += _disagreement(gram, moment, parts, variance)[first, first]
+    return _payload_of_body(robot, log, body, spread)
+
+
+def _disagreement(
+    gram: Array,
+    moment: Array,
+    parts: Sequence[tuple[list[int], Array, Array, IntArray]],
+    variance: Array,
+) -> Array:
+    """Covariance (p, p) due to what is wrong with single joints, such as their torque constants or
+    the centres of their links.
+
+    It is the jackknife over the joints. A joint is left out only if the others determine the mass
+    nearly as well as all joints together.
+
+    Args:
+        gram: normal matrix (p, p) of all joints and the prior.
+        moment: right-hand side (p,).
+        parts: positions of the terms of each joint, its columns, torques and clusters.
+        variance: variance (nq,) of the rows of each joint.
+    """
+    mass, found = PARAMETERS_PER_BODY * len(parts), np.linalg.solve(gram, moment)
+    sd = float(np.sqrt(np.linalg.inv(gram)[mass, mass]))
+    total, count = np.zeros_like(gram), len(parts)
+    for joint, (at, left, right, _) in enumerate(parts):
+        others, rest = gram.copy(), moment.copy()
+        others[np.ix_(at, at)] -= left.T @ left / variance[joint]
+        rest[at] -= left.T @ right / variance[joint]
+        if np.linalg.inv(others)[mass, mass] <= (PAYLOAD_FIT.max_sd_ratio * sd) ** 2:
+            change = np.linalg.solve(others, rest) - found
+            total += (count - 1) / count * np.outer(change, change)
+    return total
 
 
 def _equations(
@@ -246,22 +279,18 @@ def _prior_precision(robot: Robot) -> Array:
     return np.asarray(np.concatenate(deviations) ** -2.0)
 
 
-def _payload_of_body(
-    robot: Robot, log: int, body: Array, replicates: Array, prior_covariance: Array
-) -> IdentifiedPayload:
+def _payload_of_body(robot: Robot, log: int, body: Array, spread: Array) -> IdentifiedPayload:
     """The payload from its parameters.
 
     Args:
         robot: the robot.
         log: number of the log with the payload.
         body: parameters (10,) in the frame of the last joint.
-        replicates: parameters (G, 10) without one cluster each.
-        prior_covariance: covariance (10, 10) due to the prior.
+        spread: covariance (4, 4) of mass and first moments.
     """
     min_mass = PAYLOAD_FIT.min_mass
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     mass = float(body[0])
-    spread = jackknife(replicates[:, :4]) + prior_covariance[:4, :4]
     sd = float(np.sqrt(spread[0, 0]))
     if mass < -max(3 * sd, min_mass):
         raise InvalidProblem(

@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 from joulepath.models.robot import Array
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
-from joulepath.optimizer.identify.arm.logged_torque import motor_torque
+from joulepath.optimizer.identify.arm.logged_torque import measured_power, motor_torque
 from joulepath.optimizer.identify.estimates.grouped import jackknife
 from joulepath.optimizer.identify.fits.fitting import FitResult
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -26,11 +26,11 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 class IntervalSettings:
     """Settings of the interval of a predicted energy."""
 
-    default_session_sd: float = 0.03
-    """Relative standard deviation of friction from day to day if there are few logs [1]: 2 to 4 %
-    in twelve logs of a UR10e over two months."""
+    min_session_sd: float = 0.025
+    """Smallest relative standard deviation of the friction of a joint from day to day [1]: 2 to 3 %
+    in twelve logs of a UR10e over two months, and few logs may happen to be alike."""
     min_sessions: int = 3
-    """Logs below which the default is taken."""
+    """Logs below which the deviation is not measured."""
     min_own_share: float = 0.1
     """Smallest share of the moves' own errors in the square of their mean errors [1]."""
     median_square: float = 0.455
@@ -46,23 +46,27 @@ class Spread:
 
     move_sd: float
     """Standard deviation of the mean power of a move [W]."""
-    session_sd: float
-    """Relative standard deviation of friction between days [1]."""
+    session_sd: Array
+    """Relative standard deviations of the friction of each joint (nq,) between days [1], which are
+    independent."""
 
 
 def energy_sd(fitted: FitResult, spread: Spread, rows: Rows) -> tuple[float, float]:
     """Predicted energy of rows and its standard deviation [J]."""
     energy = fitted.arm.energy(rows)
     time = float(rows.weight.sum())
-    session = spread.session_sd * (without_friction(fitted.arm).energy(rows) - energy)
-    variance = figures_variance(fitted, rows) + (time * spread.move_sd) ** 2 + session**2
+    variance = figures_variance(fitted, rows) + (time * spread.move_sd) ** 2
+    for joint in np.flatnonzero(spread.session_sd).tolist():
+        lost = energy - without_friction(fitted.arm, joint).energy(rows)
+        variance += (float(spread.session_sd[joint]) * lost) ** 2
     return energy, float(np.sqrt(variance))
 
 
-def without_friction(arm: FittedArm) -> FittedArm:
-    """The arm without friction."""
-    zero = np.zeros_like(arm.coulomb)
-    return replace(arm, coulomb=zero, viscous=zero, load=zero, curved=zero, couplings=())
+def without_friction(arm: FittedArm, joint: int) -> FittedArm:
+    """The arm without the friction of one joint."""
+    others = np.arange(len(arm.coulomb)) != joint
+    parts = {name: getattr(arm, name) * others for name in ("coulomb", "viscous", "load", "curved")}
+    return replace(arm, **parts)
 
 
 def figures_variance(fitted: FitResult, rows: Rows) -> float:
@@ -82,7 +86,7 @@ def figures_variance(fitted: FitResult, rows: Rows) -> float:
 
 def spread_of(fitted: FitResult, rows: Rows) -> Spread:
     """Spread of the moves and sessions of the fitted rows."""
-    return Spread(_move_sd(fitted, rows), session_sd(session_factors(fitted, rows)))
+    return Spread(_move_sd(fitted, rows), session_sd(joint_factors(fitted, rows)))
 
 
 def _move_sd(fitted: FitResult, rows: Rows) -> float:
@@ -90,17 +94,19 @@ def _move_sd(fitted: FitResult, rows: Rows) -> float:
 
     Each move is predicted by the arm fitted without its cluster.
     """
-    use = np.isfinite(rows.power) & ~rows.rest
+    measured = measured_power(fitted.arm, rows)
+    use = np.isfinite(measured) & ~rows.rest
     squares, explained = list[float](), list[float]()
     for cluster in np.unique(fitted.clusters.of_row[use]):
         in_cluster = use & (fitted.clusters.of_row == cluster)
         for move in np.unique(rows.move[in_cluster]):
-            part = rows.take(in_cluster & (rows.move == move))
+            chosen = in_cluster & (rows.move == move)
+            part = rows.take(chosen)
             time = float(part.weight.sum())
             predicted, slope = fitted.arms_without_cluster[cluster].power(part)
             gradient = part.weight @ slope
             increase = float(gradient @ fitted.covariance_increase[cluster] @ gradient)
-            squares.append((float(part.weight @ (part.power - predicted)) / time) ** 2)
+            squares.append((float(part.weight @ (measured[chosen] - predicted)) / time) ** 2)
             explained.append((figures_variance(fitted, part) + increase) / time**2)
     if not squares:
         return 0.0
@@ -132,21 +138,45 @@ def own_variance(squares: Array, explained: Array) -> float:
 def session_factors(fitted: FitResult, rows: Rows) -> tuple[float, ...]:
     """Friction of each log over the fitted friction, from torques of the motors; empty without
     these."""
-    effort = motor_torque(fitted.arm, rows)
-    friction = fitted.arm.friction_torque(rows) - fitted.arm.offset
-    rest = effort - fitted.arm.link_torque(rows) - fitted.arm.offset
-    use = np.isfinite(effort)
-    factors = list[float]()
-    for log in np.unique(rows.log):
-        chosen = use & (rows.log == log)[:, None]
-        square = float((friction[chosen] ** 2).sum())
-        if square > 0:
-            factors.append(float((friction[chosen] * rest[chosen]).sum() / square))
-    return tuple(factors)
+    product, square = _friction_products(fitted, rows)
+    total = square.sum(axis=1)
+    return tuple((product.sum(axis=1)[total > 0] / total[total > 0]).tolist())
 
 
-def session_sd(factors: tuple[float, ...]) -> float:
-    """Relative standard deviation of friction between logs; a default for few logs."""
-    if len(factors) < INTERVAL.min_sessions:
-        return INTERVAL.default_session_sd
-    return float(np.std(factors, ddof=1))
+def joint_factors(fitted: FitResult, rows: Rows) -> Array:
+    """Friction of each log and joint (logs, nq) over the fitted friction; NaN where a joint does
+    not move, or no torques of motors were logged."""
+    product, square = _friction_products(fitted, rows)
+    return np.divide(product, square, out=np.full_like(product, np.nan), where=square > 0)
+
+
+def _friction_products(fitted: FitResult, rows: Rows) -> tuple[Array, Array]:
+    """Product of measured and fitted friction, and square of the latter, of each log and joint
+    (logs, nq) [N²·m²]."""
+    torque, arm = motor_torque(fitted.arm, rows), fitted.arm
+    friction = arm.friction_torque(rows) - arm.offset
+    rest = torque - arm.link_torque(rows) - arm.offset
+    known = np.isfinite(torque)
+    logs = [(rows.log == log)[:, None] & known for log in np.unique(rows.log)]
+    product = [np.where(use, friction * rest, 0.0).sum(axis=0) for use in logs]
+    square = [np.where(use, friction**2, 0.0).sum(axis=0) for use in logs]
+    return np.array(product), np.array(square)
+
+
+def session_sd(factors: Array) -> Array:
+    """Relative standard deviations (nq,) of the friction of a day against that of some logs.
+
+    The mean of n logs has an error of its own, 1/n of the variance of a day. Few logs are a small
+    sample: the deviation is widened to that of Student's distribution.
+
+    Args:
+        factors: friction of each log and joint (logs, nq), NaN where it was not measured.
+    """
+    known = np.isfinite(factors)
+    logs = known.sum(axis=0)
+    found = np.full(factors.shape[1], INTERVAL.min_session_sd)
+    for joint in np.flatnonzero(logs >= INTERVAL.min_sessions).tolist():
+        spread = float(np.std(factors[known[:, joint], joint], ddof=1))
+        wider = float(stdtrit(logs[joint] - 1, 0.95)) / P95
+        found[joint] = max(found[joint], wider * spread)
+    return np.asarray(found * np.sqrt(1 + 1 / np.maximum(logs, 1)))

@@ -10,7 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm
-from joulepath.optimizer.identify.arm.logged_torque import logged_torque
+from joulepath.optimizer.identify.arm.logged_torque import logged_torque, measured_power
 from joulepath.optimizer.identify.fits.fitting import FitResult
 from joulepath.optimizer.identify.quality.curves import curves_of
 from joulepath.optimizer.identify.quality.interval import Spread, energy_sd
@@ -135,14 +135,17 @@ def coverage(fold: Fold) -> tuple[Array, Array]:
     """Intervals of the energies of the moves of a fold.
 
     Returns:
-        Whether each move's measured energy lies between P5 and P95 (moves,), and half the width of
-        the interval (moves,) [%].
+        Whether the measured energy of each move, by the logged power or else by the torques, lies
+        between P5 and P95 (moves,), and half the width of the interval (moves,) [%].
     """
     inside, half_widths = list[bool](), list[float]()
-    rows = fold.rows.take(~fold.rows.rest & np.isfinite(fold.rows.power))
+    measured = measured_power(fold.fitted.arm, fold.rows)
+    use = ~fold.rows.rest & np.isfinite(measured)
+    rows, measured = fold.rows.take(use), measured[use]
     for move in np.unique(rows.move):
         part = rows.take(rows.move == move)
         energy, sd = energy_sd(fold.fitted, fold.spread, part)
-        inside.append(abs(float(part.weight @ part.power) - energy) <= P95 * sd)
+        drawn = float(part.weight @ measured[rows.move == move])
+        inside.append(abs(drawn - energy) <= P95 * sd)
         half_widths.append(100 * P95 * sd / energy)
     return np.array(inside), np.array(half_widths)

@@ -67,6 +67,23 @@ def test_errors_of_the_links_do_not_become_payload() -> None:
     check(found)
 
 
+def test_torque_constants_that_differ_make_the_mass_less_certain() -> None:
+    """Of joints whose motors give up to 4 % more or less torque than the robot's figures say."""
+    wrong = np.array([1.0, 1.04, 0.97, 1.03, 1.0, 1.0])
+    off, certain = (
+        list[float](),
+        found_in(log_of(NOTHING, 0, NOTHING), log_of(PAYLOAD, 0, NOTHING, 50)),
+    )
+    for seed in range(4):
+        logs = [log_of(NOTHING, seed, NOTHING, seed), log_of(PAYLOAD, seed, NOTHING, seed + 50)]
+        logs = [replace(log, effort=np.asarray(log.effort) * wrong) for log in logs]
+        carried = found_in(*logs)
+        sd = float(np.sqrt(carried.covariance[0, 0]))
+        assert sd > 2 * np.sqrt(certain.covariance[0, 0])
+        off.append((carried.mass - PAYLOAD.mass) / sd)
+    assert np.sqrt(np.mean(np.square(off))) < 2
+
+
 def test_what_the_log_says_of_its_payload_does_not_count() -> None:
     without, logs = (
         log_of(NOTHING, 0, NOTHING),

@@ -11,6 +11,9 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
+from joulepath.models.uncertainty.document import InvalidFigures
+from joulepath.models.uncertainty.parameters import place
+from joulepath.models.uncertainty.spread import spread_of as drawn
 from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
     jackknife,
@@ -18,7 +21,8 @@ from joulepath.optimizer.identify.estimates.grouped import (
     residual_replicates,
 )
 from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.quality.interval import own_variance
+from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.quality.interval import INTERVAL, own_variance, session_sd
 from tests.identification_logs import off_the_model, recorded, truth_of
 
 GROUPS, SIZE = 12, 30
@@ -92,3 +96,52 @@ def test_energies_lie_in_their_interval_as_often_as_it_says(channels: str, effec
         shares.append(validation.coverage)
     # 0.85 to 0.95, with two standard deviations of forty arms
     assert 0.80 < np.mean(shares) < 0.97
+
+
+def test_friction_of_other_days_is_known_joint_by_joint_and_never_too_well() -> None:
+    """Few logs happen to be alike; many whose joints differ say how much."""
+    alike = session_sd(np.ones((6, 2)))
+    assert alike == pytest.approx(np.full(2, INTERVAL.min_session_sd * np.sqrt(7 / 6)))
+    one, few = session_sd(np.ones((1, 2))), session_sd(np.ones((2, 2)))
+    assert (one > few).all() and (few > alike).all()
+    random, found = np.random.default_rng(0), list[Array]()
+    for _ in range(200):
+        found.append(session_sd(random.normal(1.0, [0.01, 0.08], (8, 2))))
+    assert np.median(found, axis=0)[0] == pytest.approx(INTERVAL.min_session_sd, rel=0.1)
+    assert 0.08 < np.median(found, axis=0)[1] < 0.11
+    assert np.isfinite(session_sd(np.array([[np.nan, 1.0]] * 4))).all()
+
+
+def test_moves_left_out_tell_what_the_model_lacks_where_only_currents_are_logged() -> None:
+    """Of an arm each of whose moves has a friction of its own, in all joints alike."""
+    robot = load_robot("ur10e")
+    truth = truth_of(robot, 2)
+    plain = replace(recorded(robot, truth, moves=16, seed=2).log(), power=None)
+    random, effort = np.random.default_rng(3), np.array(plain.effort)
+    sign = np.sign(np.where(np.abs(plain.v) > 1e-2, plain.v, 0.0))
+    for move in plain.moves:
+        part = slice(move.start, move.end)
+        drag = 0.3 * random.normal() * truth.coulomb / truth.torque_constant
+        effort[part] += drag * sign[part]
+    spread, odd = (identify(robot, [log]) for log in (plain, replace(plain, effort=effort)))
+    assert 0 < 5 * spread.spread.move_sd < odd.spread.move_sd
+    for found in (spread, odd):
+        assert found.validation is not None and found.validation.coverage is not None
+        assert found.validation.half_width is not None
+    assert odd.validation is not None and odd.validation.coverage is not None
+    assert odd.validation.coverage >= 0.6
+
+
+def test_a_document_may_have_the_friction_of_other_days_joint_by_joint() -> None:
+    robot = load_robot("ur10e")
+    log = replace(recorded(robot, truth_of(robot), moves=8).log(), power=None)
+    document = identify(robot, [log], IdentificationOptions(held_out=0.0)).document("2026-01-31")
+    assert len(document["session_sd"]) == robot.nq
+    spread = drawn(load_robot("ur10e", figures=document), "identified")
+    session = spread.covariances["session"][place("coulomb", 6), place("coulomb", 6)]
+    own = load_robot("ur10e", figures=document).friction.coulomb * document["session_sd"]
+    assert np.sqrt(np.diag(session)) == pytest.approx(own, rel=0.05)
+    assert np.abs(session - np.diag(np.diag(session))).max() < 0.1 * np.diag(session).max()
+    wrong = document | {"session_sd": [0.03] * 5}
+    with pytest.raises(InvalidFigures, match="session_sd"):
+        load_robot("ur10e", figures=wrong)

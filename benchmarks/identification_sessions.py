@@ -1,0 +1,95 @@
+"""How often energies of other days lie between their P5 and P95, by the number of logs of the fit.
+
+No power is logged: the measured energy of a move is that of its currents.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.gate import Gate
+from benchmarks.identification_standins import day_of, log_of
+from benchmarks.public_logs import ur10e_days
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Robot
+from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.options import IdentificationOptions
+from tests.identification_logs import truth_of
+
+NUMBERS = (1, 2, 6)
+# simulated arms, days of each, those of the fits first, and moves of a day
+UNITS, DAYS, MOVES = 6, 10, 8
+# of the friction of each joint, by itself
+DAY_SD = 0.025
+# draws of the logs of a fit among the real ones
+DRAWS = 12
+WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
+# of the 90 % that the interval promises
+LEAST, MOST = 0.87, 0.97
+
+
+def sessions(_: Path | None, __: int) -> list[Gate]:
+    """Simulated arms whose joints have other friction on each day, each by itself."""
+    robot = load_robot("ur10e")
+    units = [_days_of_unit(robot, unit) for unit in range(UNITS)]
+    return [
+        _gate(
+            f"sessions, {UNITS} simulated arms, {number} logs",
+            [_coverage(robot, days[:number], days[max(NUMBERS) :]) for days in units],
+        )
+        for number in NUMBERS
+    ]
+
+
+def _days_of_unit(robot: Robot, unit: int) -> list[Log]:
+    truth, random = truth_of(robot, unit), np.random.default_rng([unit, 5])
+    return [
+        log_of(
+            robot,
+            day_of(
+                robot, truth, 700 + DAYS * unit + day, random.normal(1.0, DAY_SD, robot.nq), MOVES
+            ),
+        )
+        for day in range(DAYS)
+    ]
+
+
+def ur10e_sessions(place: Path | None, _: int) -> list[Gate]:
+    """Real days of a UR10e: fits to random logs, and all logs of the days without one of them."""
+    assert place is not None
+    robot, days = ur10e_days(place)
+    return [
+        _gate(
+            f"sessions of a real UR10e, {number} logs",
+            [_coverage(robot, *parts) for parts in _draws(days, number)],
+        )
+        for number in NUMBERS
+    ]
+
+
+def _draws(days: dict[str, list[Log]], number: int) -> Iterator[tuple[list[Log], list[Log]]]:
+    """Random logs, and all logs of the other days."""
+    random, every = np.random.default_rng(number), [(day, log) for day in days for log in days[day]]
+    for _ in range(DRAWS):
+        chosen = [every[k] for k in random.choice(len(every), number, replace=False)]
+        seen = {day for day, _ in chosen}
+        rest = [log for day, log in every if day not in seen]
+        if rest:
+            yield [log for _, log in chosen], rest
+
+
+def _coverage(robot: Robot, fitted: list[Log], others: list[Log]) -> tuple[float, int]:
+    """Share of the moves of other logs within their interval, and the number of these moves."""
+    found = identify(robot, fitted, WITHOUT_SPLIT).validate(others)
+    assert found.coverage is not None
+    return found.coverage, found.moves
+
+
+def _gate(title: str, covered: list[tuple[float, int]]) -> Gate:
+    shares, moves = zip(*covered, strict=True)
+    share = float(np.average(shares, weights=moves))
+    return Gate(f"{title}: moves of other days between P5 and P95", share, LEAST, MOST)

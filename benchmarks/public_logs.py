@@ -1,0 +1,57 @@
+"""Public logs of arms, from clones of their repositories beside the other real logs.
+
+In the folder `logs` that `benchmarks.identification_logs.folder` finds:
+
+- `dynamic_calibration` (github.com/shamilmamedov/dynamic_calibration, no licence stated): a UR10e
+  on seven days of two months, with motor currents, without and with payloads.
+"""
+
+from __future__ import annotations
+
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Robot
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.logs.log_options import LogOptions
+from joulepath.optimizer.identify.logs.reading import read_log
+from joulepath.optimizer.problem.arm import Payload
+
+UR10E_DAYS: dict[str, tuple[str, ...]] = {
+    "19_12_23": ("free",),
+    "20_01_31": ("unload",),
+    "20_02_05": ("20sec_12harm", "20sec_8harm"),
+    "20_02_06": ("20sec_10harm", "20sec_5harm"),
+    "20_02_10": ("20sec_7harm", "30sec_12harm"),
+    "20_02_12": ("40sec_12harm", "50sec_12harm"),
+    "20_02_19": ("14harm50sec", "15harm50sec"),
+}
+"""Logs without payload, by day."""
+# rad and rad/s, of rows that the recorder garbled
+POSSIBLE_Q, POSSIBLE_V = 7.0, 4.0
+
+
+def ur10e_days(place: Path) -> tuple[Robot, dict[str, list[Log]]]:
+    """Logs of a UR10e without payload, by day."""
+    files = place / "dynamic_calibration" / "dataset_ur10e" / "identification_data"
+    robot = load_robot("ur10e")
+    return robot, {
+        day: [ur10e_log(robot, next(files.glob(f"ur-{day}*{name}.csv"))) for name in names]
+        for day, names in UR10E_DAYS.items()
+    }
+
+
+def ur10e_log(robot: Robot, file: Path) -> Log:
+    """One of these logs: columns without header, time, q, v and current of each joint first."""
+    rows = np.loadtxt(file, delimiter=",", usecols=range(1 + 3 * robot.nq))
+    q, v = np.abs(rows[:, 1:7]).max(axis=1), np.abs(rows[:, 7:13]).max(axis=1)
+    garbled = np.flatnonzero((q > POSSIBLE_Q) | (v > POSSIBLE_V))
+    rows = rows[garbled.max(initial=-1) + 1 :]
+    text = StringIO()
+    text.write(",".join(["t", *(f"{part}{k}" for part in "qvi" for k in range(1, 7))]) + "\n")
+    np.savetxt(text, rows, delimiter=",", fmt="%.9g")
+    options = LogOptions(effort="current", name=file.stem, payload=Payload())
+    return read_log(text.getvalue().encode(), robot, options).log
