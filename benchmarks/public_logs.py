@@ -2,6 +2,10 @@
 
 In the folder `logs` that `benchmarks.identification_logs.folder` finds:
 
+- `FrankaEmikaPandaDynModel` (github.com/marcocognetti/FrankaEmikaPandaDynModel, GPL-3): a Panda,
+  with the torques of its sensors behind the gears.
+- `inverse-dynamics-solver` (github.com/unisa-acg/inverse-dynamics-solver, BSD-3): another Panda, as
+  a bag of ROS 2.
 - `dynamic_calibration` (github.com/shamilmamedov/dynamic_calibration, no licence stated): a UR10e
   on seven days of two months, with motor currents, without and with payloads.
 """
@@ -55,3 +59,31 @@ def ur10e_log(robot: Robot, file: Path) -> Log:
     np.savetxt(text, rows, delimiter=",", fmt="%.9g")
     options = LogOptions(effort="current", name=file.stem, payload=Payload())
     return read_log(text.getvalue().encode(), robot, options).log
+
+
+def panda_by_inria(place: Path) -> Log:
+    """A Panda over 21 s at 1 kHz, from text files with one value in a line."""
+    files = place / "FrankaEmikaPandaDynModel" / "matlab" / "data" / "Exciting_Traj"
+    files = files / "Trajectory_1" / "rbt_log"
+    robot = load_robot("panda")
+    time = np.loadtxt(files / "exciting_traj_time.txt")
+    q, v, torque = (
+        np.loadtxt(files / f"exciting_traj_{name}.txt").reshape(-1, robot.nq)
+        for name in ("positions", "velocity", "torques")
+    )
+    rows = min(map(len, (time, q, v, torque)))
+    text = StringIO()
+    joints = range(1, robot.nq + 1)
+    text.write(",".join(["t", *(f"{p}{k}" for p in ("q", "v", "tau") for k in joints)]) + "\n")
+    table = np.column_stack([time[:rows], q[:rows], v[:rows], torque[:rows]])
+    np.savetxt(text, table, delimiter=",", fmt="%.9g")
+    options = LogOptions(effort="torque", payload=Payload())
+    return read_log(text.getvalue().encode(), robot, options).log
+
+
+def panda_by_unisa(place: Path) -> Log:
+    """Another Panda over 24 s at 30 Hz."""
+    folder = place / "inverse-dynamics-solver" / "franka_inria_inverse_dynamics_solver"
+    options = LogOptions(effort="torque", payload=Payload())
+    file = folder / "bagfiles" / "panda_exciting_trajectory.db3"
+    return read_log(file, load_robot("panda"), options).log

@@ -26,6 +26,7 @@ from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import recorded, truth_of
+from tests.impossible_links import with_impossible_link
 
 ROUNDING = 1e-9
 # Gautier and Khalil's numbers for arms of these forms, without rotors and with them
@@ -86,7 +87,7 @@ def test_nearness_is_a_distance_for_every_robot(name: str) -> None:
 
 
 def test_links_whose_published_parameters_are_no_real_bodies_are_refitted() -> None:
-    robot = load_robot("panda")
+    robot = with_impossible_link(load_robot("panda"))
     least = np.linalg.eigvalsh(pseudo_inertias(body_parameters(robot.model)))[:, 0]
     assert least.min() < -1e-4
     found = identify(
