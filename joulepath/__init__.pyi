@@ -62,6 +62,7 @@ from .optimizer.identify.logs.reading import LogReading, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
 from .optimizer.identify.results import Advice, IdentifiedParameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
+from .optimizer.kinematics.errors import OrientationNotHeld
 from .optimizer.motion.spline import Spline
 from .optimizer.optimize import optimize
 from .optimizer.optimize_many import Optimized, optimize_many
@@ -236,6 +237,7 @@ __all__ = [
     "NothingHeldOut",
     "Obstacle",
     "Optimized",
+    "OrientationNotHeld",
     "Outcome",
     "OutsideLimits",
     "PathInfeasible",

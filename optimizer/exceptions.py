@@ -1,8 +1,8 @@
 """Errors of the library with their data.
 
 This module has the base classes and the errors shared by several rooms. Errors of a single room are
-declared there: `search.errors`, `cycle.errors`, `export.errors`, `excitation.errors`,
-`identify.errors` and `identify.logs.log_errors`.
+declared there: `kinematics.errors`, `search.errors`, `cycle.errors`, `export.errors`,
+`excitation.errors`, `identify.errors` and `identify.logs.log_errors`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""Public entry point: `inverse_kinematics(arm, pose)` finds all configurations of a pose."""
+"""Public entry point: `inverse_kinematics(arm, pose)` finds the configurations of a pose."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Annotated, Any, overload
 
 import numpy as np
@@ -14,12 +15,22 @@ from joulepath.optimizer.collision.model import ClosestPair, collision_model
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.declared import PerJoint, Radians, Ratio, Unit
 from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
+from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.tolerant_inverse import tolerant_configurations
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.result import Result, Rows, per_joint
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.search.ends import label_of
+
+FREE_SAMPLES = 32
+"""Largest number of configurations, up to full turns, of an orientation that is free in part: twice
+the number of branches of a full pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +51,9 @@ class IKSolution:
     """Parts of the branch that are singular here: the configuration is on both branches of such a
     part."""
     free: tuple[str, ...]
-    """Joints that can move together while the TCP keeps its pose; empty if the configuration is
-    isolated. Then infinitely many configurations reach the pose, and `solutions` has some of them,
-    evenly spread."""
+    """Joints that can move together while the TCP keeps its pose, within an orientation that is
+    free in part; empty if the configuration is isolated. Otherwise infinitely many configurations
+    reach the pose, and `solutions` has some of them."""
     collides: bool = field(init=False)
     """Whether `nearest.distance` is negative."""
     nearest: ClosestPair | None
@@ -58,7 +69,8 @@ class IKSolutions(Result, Sequence[IKSolution]):
     """All configurations found for a pose, as a sequence.
 
     `complete`: whether every branch is among the configurations. Otherwise the inverse kinematics
-    of the robot is not proven to find all, and some may be missing.
+    of the robot is not proven to find all, and some may be missing. For an orientation that is free
+    in part, this is never proven.
     """
 
     solutions: tuple[IKSolution, ...]
@@ -109,7 +121,7 @@ class IKSolutions(Result, Sequence[IKSolution]):
 @one_thread()
 def inverse_kinematics(
     arm: Arm | Robot,
-    pose: Pose,
+    pose: Pose | ConeOrientedPose,
     windings: bool = True,
     deadline: float = np.inf,
     clock: Clock = time.perf_counter,
@@ -117,11 +129,13 @@ def inverse_kinematics(
     """Find all configurations within the position limits that put the TCP at a pose.
 
     If infinitely many configurations reach the pose, as with seven joints, the result has evenly
-    spread samples of every self-motion.
+    spread samples of every self-motion. If the orientation is free in part, the configurations are
+    found by a search within the limits, for an arm of any number of joints: all of them if they are
+    isolated, as with five joints and a free rotation about an axis, or else samples.
 
     Args:
         arm: arm with its TCP, limits, tool, payload and scene; a robot stands for a bare arm.
-        pose: pose of the TCP in the robot's base frame.
+        pose: pose of the TCP in the robot's base frame, whose orientation may be free in part.
         windings: whether to include every full turn of a joint within the limits; otherwise there
             is one solution per branch, nearest to zero.
         deadline: wall time after which the computation is given up [s].
@@ -131,9 +145,10 @@ def inverse_kinematics(
         The configurations, grouped by branch, nearest to zero first.
 
     Raises:
-        InvalidProblem: there is no inverse kinematics for the robot.
+        InvalidProblem: there is no inverse kinematics of full poses for the robot.
         UnreachablePose: no configuration within the limits reaches the pose.
         NoConfigurationFound: a search found no configuration of the pose.
+        OrientationNotHeld: an arm with fewer than six joints does not hold the full pose.
         SingularPose: the pose is reached only on a self-motion of unknown form.
         DeadlineExceeded: the deadline passed first.
     """
@@ -145,19 +160,21 @@ def inverse_kinematics(
         raise DeadlineExceeded([]) from None
 
 
-def _found(arm: Arm, pose: Pose, windings: bool) -> IKSolutions:
-    kinematics = required_inverse_kinematics(arm.robot, "pose")
-    found = kinematics.solve(pose.T, arm.T_flange_tcp, arm.active_limits, windings, "goal")
+def _found(arm: Arm, pose: Pose | ConeOrientedPose, windings: bool) -> IKSolutions:
+    if isinstance(pose, ConeOrientedPose):
+        found, complete = _of_free_orientation(arm, pose, windings), False
+    else:
+        kinematics = required_inverse_kinematics(arm.robot, "pose")
+        solved = kinematics.solve(pose.T, arm.T_flange_tcp, arm.active_limits, windings, "goal")
+        found, complete = [_solution(arm, each) for each in solved], kinematics.complete
     checkpoint()
-    pairs = collision_model(arm).closest_pairs([each.q for each in found]) if arm.collisions else []
-    nearest: list[ClosestPair | None] = [*pairs]
-    if not pairs:
-        nearest = [None] * len(found)
-    solutions = tuple(_solution(arm, *each) for each in zip(found, nearest, strict=True))
-    return IKSolutions(solutions, kinematics.complete)
+    if arm.collisions:
+        pairs = collision_model(arm).closest_pairs([each.q for each in found])
+        found = [replace(each, nearest=pair) for each, pair in zip(found, pairs, strict=True)]
+    return IKSolutions(tuple(found), complete)
 
 
-def _solution(arm: Arm, found: LimitedSolution, nearest: ClosestPair | None) -> IKSolution:
+def _solution(arm: Arm, found: LimitedSolution) -> IKSolution:
     free = found.self_motion.free if found.self_motion else ()
     return IKSolution(
         label=str(found.label),
@@ -166,5 +183,35 @@ def _solution(arm: Arm, found: LimitedSolution, nearest: ClosestPair | None) -> 
         smallest_singular_value=found.smallest_singular_value,
         singular=found.singular,
         free=tuple(arm.robot.joint_names[joint] for joint in free),
-        nearest=nearest,
+        nearest=None,
     )
+
+
+def _of_free_orientation(arm: Arm, pose: ConeOrientedPose, windings: bool) -> list[IKSolution]:
+    """Solutions of a pose whose orientation is free in part; isolated ones with their full
+    turns.
+    """
+    limits, chain, names = arm.active_limits, Chain.of(arm.robot.model), arm.robot.joint_names
+    found = tolerant_configurations(arm, pose, FREE_SAMPLES)
+    smallest = np.linalg.svd(chain.flange_and_jacobian(found)[1], compute_uv=False)[:, -1]
+    solutions = list[IKSolution]()
+    for q, free, least in zip(
+        found, GoalManifold.of(arm, pose).free_joints(found), smallest.tolist(), strict=True
+    ):
+        turns = full_turn_alternatives(q, limits.q_min, limits.q_max)
+        every = product(*(turns if windings and not free else [each[:1] for each in turns]))
+        label = label_of(arm.robot, q)
+        for turned in map(np.array, every):
+            distance = float(np.minimum(turned - limits.q_min, limits.q_max - turned).min())
+            solutions.append(
+                IKSolution(
+                    label=label,
+                    q=turned,
+                    limit_distance=distance,
+                    smallest_singular_value=least,
+                    singular=(),
+                    free=tuple(names[joint] for joint in free),
+                    nearest=None,
+                )
+            )
+    return solutions

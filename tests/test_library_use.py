@@ -67,6 +67,7 @@ ERRORS = {
     "NotCertified",
     "NotExcited",
     "NothingHeldOut",
+    "OrientationNotHeld",
     "OutsideLimits",
     "PathInfeasible",
     "ServiceUnreachable",

@@ -24,15 +24,13 @@ from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import within_cone
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import Target, members
-
-SIX_JOINTS = 6
-"""Number of joints up to which the configurations of a pose are isolated."""
 
 
 def all_branches_known(problem: Problem) -> bool:
@@ -73,7 +71,7 @@ def bound_of_missed_branches(
         goals = _covered(prepared, [pair.goal for pair in candidates], problem.goal)
         if starts is not None and goals is not None:
             return bound_between_curves(prepared, starts, goals, deadline, enough)
-    if _poses(problem.start) and problem.arm.robot.nq > SIX_JOINTS:
+    if _poses(problem.start) and problem.arm.robot.nq > POSE_FREEDOMS:
         return _bound_of_any(prepared)
     return _bound_by_boxes(prepared, candidates, deadline)
 

@@ -171,7 +171,7 @@ def _first_cycle(
 
     Its bound holds for all orientations. Without time for it, the cycle without full turns.
     """
-    all_around = {name: turns_all_around(stop) for name, stop in free.items()}
+    all_around = {name: turns_all_around(cycle.arm, stop) for name, stop in free.items()}
     # many orientations need nearly the same energy: a proof that none is better would take long
     cycle = replace(cycle, approximate=any(stop.path is None for stop in free.values()))
     settings = FREE_ORIENTATIONS

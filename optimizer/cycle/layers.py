@@ -12,6 +12,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
+from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
@@ -48,8 +50,9 @@ class Layer:
         turns: full turns from the joint positions of its end, shape (n, nq).
         complete: whether no branch of any pose can be missing.
         sampled_poses: whether the poses are samples of infinitely many.
-        free_pose: pose with a free orientation that the sampled poses belong to; all of its
-            configurations count for a bound. None if the layer has no such pose.
+        free_pose: pose with a free orientation that the sampled poses, or a pose with unknown
+            branches, belong to; all of its configurations count for a bound. None if the layer has
+            no such pose.
         fixed_pose: the pose of `free_pose` with its angle, if the angle is given.
         traces: trace of the path that leads to every end, as the arm follows it; empty without a
             path.
@@ -127,7 +130,17 @@ def layer_of(
     kinematics = inverse_kinematics_for(cycle.arm.robot)
     given = all(isinstance(member, np.ndarray) for member in members(problem.goal))
     complete = given or (kinematics is not None and kinematics.complete)
-    return Layer(name, feasible, positions, end, turns, complete)
+    free = None if complete else _about_last_axis(cycle.arm, problem.goal)
+    return Layer(name, feasible, positions, end, turns, complete, free_pose=free)
+
+
+def _about_last_axis(arm: Arm, target: Target) -> ConeOrientedPose | None:
+    """A single pose with a free rotation about the direction of the last joint's axis; None for
+    other targets, and for redundant arms, whose configurations no boxes enclose in time.
+    """
+    if not isinstance(target, Pose) or arm.robot.nq > POSE_FREEDOMS:
+        return None
+    return ConeOrientedPose.about(target, T_last_tcp(arm)[2, :3])
 
 
 def arms_at(cycle: Cycle, place: str) -> list[Arm]:

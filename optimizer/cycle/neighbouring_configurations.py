@@ -19,6 +19,7 @@ from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
 from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -26,7 +27,6 @@ from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.sliding import POSE_FREEDOMS
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,10 @@ from joulepath.optimizer.kinematics.orientation_tolerance import (
     nearest_orientation,
     sample_orientations,
 )
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.kinematics.tolerant_inverse import tolerant_configurations
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.pose import Pose
@@ -41,10 +45,14 @@ class ToolTurnSettings:
 TOOL_TURNS = ToolTurnSettings()
 
 
-def turns_all_around(stop: Stop) -> list[Turns]:
-    """Turns at a stop over all orientations.
+def turns_all_around(arm: Arm, stop: Stop) -> list[Turns]:
+    """Turns at a stop over all orientations, or over those that an arm with few joints can hold.
 
     If both ends of a path are free, the tool keeps its angle on the path.
+
+    Raises:
+        UnreachablePose: the position of the stop is beyond an arm with few joints.
+        NoConfigurationFound: an arm with few joints was not found to reach the stop.
     """
     (start, _), none = stop.free_ends, np.zeros(3)
     if stop.path is not None:
@@ -52,6 +60,11 @@ def turns_all_around(stop: Stop) -> list[Turns]:
         turns = [angle * axis for angle in TOOL_TURNS.angles]
         return [(turn, none) if start else (none, turn) for turn in turns]
     assert isinstance(stop.target, ConeOrientedPose)
+    if arm.robot.nq < POSE_FREEDOMS:
+        place, count = f"stops/{stop.name}", TOOL_TURNS.orientations
+        held = tcp_pose(arm, tolerant_configurations(arm, stop.target, count, place))
+        (reference,) = sample_orientations(stop.target, 1)
+        return [(np.asarray(pin.log3(reference.T @ T[:3, :3])), none) for T in held]
     if stop.target.freedom == 1:
         return [(angle * stop.target.axis, none) for angle in TOOL_TURNS.angles]
     reference, *others = sample_orientations(stop.target, TOOL_TURNS.orientations)

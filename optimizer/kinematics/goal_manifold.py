@@ -33,6 +33,12 @@ class GoalManifoldSettings:
     """Damping relative to the largest entry of the normal matrix; it keeps steps short next to a
     singularity.
     """
+    held: float = 1e-9
+    """Singular value of the constraints, relative to the largest, above which a direction of the
+    joints is held.
+    """
+    moving: float = 1e-6
+    """Share of a joint in a unit motion of all joints above which it moves."""
     parallel: float = 1e-12
     """Sine of the tilt below which the tilt axis is undetermined."""
     approach_steps: int = 14
@@ -90,6 +96,17 @@ class GoalManifold:
             q = np.clip(q + _shortened(move, SETTINGS.longest_newton_step), self.q_min, self.q_max)
         error, _ = self._error_and_rows(q)
         return q, np.asarray(np.abs(error).max(axis=1) < SETTINGS.tolerance)
+
+    def free_joints(self, q: Array) -> list[tuple[int, ...]]:
+        """Joints that can move together while the pose is held, for each q (n, nq) [rad] on the
+        manifold; none where the configuration is isolated.
+        """
+        _, size, modes = np.linalg.svd(self._error_and_rows(q)[1])
+        fixed = (size > SETTINGS.held * size[:, :1]).sum(axis=1)
+        moving = [
+            np.abs(rows[k:]).max(axis=0, initial=0.0) for rows, k in zip(modes, fixed, strict=True)
+        ]
+        return [tuple(np.flatnonzero(each > SETTINGS.moving).tolist()) for each in moving]
 
     def nearest(self, q: Array, to: Array, weights: Array) -> tuple[Array, Mask]:
         """Moves configurations along the manifold towards target configurations.

@@ -10,7 +10,9 @@ convention (`ur_closed_form`), the closed form of arms with three parallel or me
 (`decomposition`), and Newton's method from many starts (`multi_start`), which may miss branches.
 Seven joints hold every pose on self-motions and use the closed form of arms with a spherical
 shoulder (`redundant_arm`), or self-motions traced point by point (`traced_arm`), some of which may
-be missed. Any other arm has no inverse kinematics and takes joint positions as targets.
+be missed. Fewer joints are searched for the poses that they can hold (`few_joints`); poses of
+partly free orientation need no inverse kinematics (`goal_manifold`). An arm of more joints has no
+inverse kinematics and takes joint positions as targets.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution, Princip
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
+from joulepath.optimizer.kinematics.six.few_joints import FewJoints
 from joulepath.optimizer.kinematics.six.multi_start import MultiStart
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.problem.branches import BranchLabel
@@ -97,7 +100,8 @@ def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """Inverse kinematics of a robot, built once; None for an arm without one."""
     model = robot.model
     exact = URClosedForm.of(model) or DecomposedArm.of(model) or RedundantArm.of(model)
-    solver = exact or MultiStart.of(model) or TracedArm.of(model)
+    searched = FewJoints.of(model) or MultiStart.of(model) or TracedArm.of(model)
+    solver = exact or searched
     return None if solver is None else ConfirmedInverseKinematics(robot, solver)
 
 

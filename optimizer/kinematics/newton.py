@@ -100,7 +100,7 @@ def _damped_steps(jacobian: Array, error: Array, damping: Array) -> Array:
     """
     u, s, vt = np.linalg.svd(jacobian)
     weight = s / (s * s + damping[:, None] + 1e-300)
-    in_modes = (u.transpose(0, 2, 1) @ error[:, :, None])[:, :, 0] * weight
+    in_modes = (u[:, :, : s.shape[1]].transpose(0, 2, 1) @ error[:, :, None])[:, :, 0] * weight
     step = (in_modes[:, None, :] @ vt[:, : s.shape[1]])[:, 0]
     largest = np.maximum(np.abs(step).max(axis=1), 1e-300)
     return np.asarray(step * np.minimum(1.0, NEWTON.longest_step / largest)[:, None])

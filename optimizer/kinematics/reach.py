@@ -7,10 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
+from joulepath.optimizer.exceptions import (
+    NoConfigurationFound,
+    SingularPose,
+    UnreachablePose,
+)
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.kinematics.newton import solved
+
+POSE_FREEDOMS = 6
+"""Degrees of freedom of a pose: number of joints that it fixes."""
 
 
 @dataclass(frozen=True)
@@ -93,14 +101,10 @@ def out_of_reach(
         target: name of the pose in the message.
         complete: whether every configuration would have been found.
     """
-    if distance is None and (beyond := chain.beyond_length(T)) > 0:
-        hint = "give it in metres, not millimetres, or " if beyond > REACH.like_millimetres else ""
-        return UnreachablePose(
-            target,
-            None,
-            f"The {target} pose is {beyond:.4g} m beyond the stretched arm: {hint}move the "
-            "position closer to the robot.",
-        )
+    if distance is None and (beyond := beyond_the_arm(chain, T, target)) is not None:
+        return beyond
+    if chain.nq < POSE_FREEDOMS:
+        return OrientationNotHeld(target, within_limits=False, joints=chain.nq)
     if distance is None and not complete:
         return NoConfigurationFound(target, within_limits=False)
     if distance is None:
@@ -118,4 +122,24 @@ def out_of_reach(
         distance,
         f"The {target} pose is {distance:.4g} m out of reach in this orientation: {hint}move the "
         "position closer to the robot's workspace, or change the orientation.",
+    )
+
+
+def beyond_the_arm(chain: Chain, T: Array, target: str) -> UnreachablePose | None:
+    """Error for a flange pose T (4, 4) farther than the stretched chain reaches; None for others.
+
+    Args:
+        chain: chain of the arm.
+        T: flange pose (4, 4).
+        target: name of the pose in the message.
+    """
+    beyond = chain.beyond_length(T)
+    if beyond <= 0:
+        return None
+    hint = "give it in metres, not millimetres, or " if beyond > REACH.like_millimetres else ""
+    return UnreachablePose(
+        target,
+        None,
+        f"The {target} pose is {beyond:.4g} m beyond the stretched arm: {hint}move the position "
+        "closer to the robot.",
     )

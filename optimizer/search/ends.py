@@ -20,6 +20,8 @@ from joulepath.optimizer.kinematics.inverse import (
     required_inverse_kinematics,
 )
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations, within_cone
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
+from joulepath.optimizer.kinematics.tolerant_inverse import tolerant_configurations
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
@@ -144,12 +146,7 @@ def _ends_of(
     if problem.branch is not None:
         solutions = [s for s in solutions if problem.branch.allows(s.label, s.singular)]
     if not solutions:
-        raise UnreachablePose(
-            name,
-            None,
-            f"The branch asked for does not reach the {name} pose: leave `branch` out to try them "
-            "all.",
-        )
+        raise _branch_unreachable(name)
     return [
         EndConfiguration(
             str(s.label),
@@ -168,6 +165,8 @@ def _ends_of_samples(
 ) -> list[EndConfiguration]:
     """The end configurations of orientations sampled evenly within the cones of pose and tool."""
     pose = within_cone(prepared.arm, pose, SAMPLING.cone_share)
+    if prepared.arm.robot.nq < POSE_FREEDOMS:
+        return _ends_of_few_joints(prepared, name, pose, index, samples)
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | NoConfigurationFound | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, SAMPLING.least_orientations)
@@ -199,4 +198,36 @@ def _ends_of_samples(
         f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to "
         "the robot's "
         "workspace, widen limits.position or leave `branch` out.",
+    )
+
+
+def _ends_of_few_joints(
+    prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, samples: int
+) -> list[EndConfiguration]:
+    """The end configurations of an arm that holds few of the orientations of a cone."""
+    arm, wanted = prepared.arm, prepared.problem.branch
+    limits, kinematics = arm.active_limits, required_inverse_kinematics(arm.robot, name)
+    found = [(kinematics.label(q), q) for q in tolerant_configurations(arm, pose, samples, name)]
+    ends = [
+        EndConfiguration(
+            str(label),
+            q,
+            full_turn_alternatives(q, limits.q_min, limits.q_max),
+            fixed=False,
+            target=index,
+            tolerance=pose,
+        )
+        for label, q in found
+        if wanted is None or wanted.allows(label)
+    ]
+    if not ends:
+        raise _branch_unreachable(name)
+    return ends
+
+
+def _branch_unreachable(name: str) -> UnreachablePose:
+    return UnreachablePose(
+        name,
+        None,
+        f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all.",
     )

@@ -12,6 +12,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.held_pose import HeldPose
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -21,8 +22,6 @@ from joulepath.optimizer.search.sampled_ends import with_ends
 from joulepath.optimizer.solve.methods import method_of
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
-POSE_FREEDOMS = 6
-"""Degrees of freedom of a pose: number of joints that it fixes."""
 CURVE_TOLERANCE = 1e-6
 """Displacement [rad] from a curve below which a posture is on the curve."""
 

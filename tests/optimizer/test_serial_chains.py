@@ -112,7 +112,8 @@ def test_joints_to_joints(robot: Robot, objective: str) -> None:
         assert (peak <= getattr(robot.limits, name) * (1 + HELD)).all()
     assert solution.trajectory.q[0] == pytest.approx(asked.start, abs=HELD)
     assert solution.trajectory.q[-1] == pytest.approx(asked.goal, abs=HELD)
-    assert {solution.start.label, solution.goal.label} == {"given"}
+    labels = {solution.start.label, solution.goal.label}
+    assert labels == {"given"} if robot.nq > 7 else labels <= {"branch 1", "branch 2"}
     assert all(each.saving > -SUMMED for each in solution.baselines if each.within_limits)
 
 
@@ -150,9 +151,8 @@ POSE, FREE = Pose(np.eye(4)), ConeOrientedPose([0.3, 0.1, 0.4])
 
 @pytest.mark.parametrize(("end", "target"), [("start", POSE), ("goal", POSE), ("goal", FREE)])
 @pytest.mark.parametrize("several", [False, True])
-def test_a_pose_needs_inverse_kinematics(
-    robot: Robot, end: str, target: Any, several: bool
-) -> None:
+def test_a_pose_needs_inverse_kinematics(end: str, target: Any, several: bool) -> None:
+    robot = serial_chain(8)
     with pytest.raises(InvalidProblem, match="give joint positions") as refusal:
         optimize(problem(robot, **{end: AnyOf((move(robot.nq)[0], target)) if several else target}))
     assert refusal.value.field == end

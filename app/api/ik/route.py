@@ -9,11 +9,10 @@ from joulepath.app.api.ik.task import IKAnswer, IKRequest, IKTask
 from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import WantedFormat, deadline_of
-from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
+from joulepath.app.api.shared.problem_lists import POSE_PROBLEMS, WORKER_PROBLEMS
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.optimizer.exceptions import NoConfigurationFound, SingularPose, UnreachablePose
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 _CSV = "q1,q2,q3,q4,q5,q6\n0.0,-1.57,1.57,-1.57,-1.57,0.0\n"
@@ -25,7 +24,7 @@ _CSV = "q1,q2,q3,q4,q5,q6\n0.0,-1.57,1.57,-1.57,-1.57,0.0\n"
     response_model=model_of(IKAnswer),
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _CSV}}},
-        **problem_responses(*WORKER_PROBLEMS, UnreachablePose, NoConfigurationFound, SingularPose),
+        **problem_responses(*WORKER_PROBLEMS, *POSE_PROBLEMS),
     },
 )
 async def solve(

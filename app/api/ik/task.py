@@ -9,13 +9,14 @@ from typing import Literal
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.convert.arm import robot_named
-from joulepath.app.convert.pose import to_base_pose
+from joulepath.app.convert.request import to_target_pose
 from joulepath.app.convert.scene import to_attachment, to_scene
 from joulepath.app.convert.tool import to_tcp, to_tool
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.schemas.common import BasePose, described
+from joulepath.app.schemas.common import described
 from joulepath.app.schemas.examples.values import BOX
+from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.scene import CarriedBody, CellRequest
 from joulepath.models.robot import Robot
 from joulepath.optimizer.deadline import Deadline
@@ -27,8 +28,9 @@ from joulepath.optimizer.problem.problem import DURATIONS
 class IKRequest(CellRequest):
     """A pose of the TCP."""
 
-    pose: BasePose = described(
-        "Pose of the TCP in the robot's base frame, or in its `frame`.",
+    pose: TargetPose = described(
+        "Pose of the TCP in the robot's base frame, or in its `frame`. Its orientation may be free "
+        "in part.",
         None,
         {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
     )
@@ -62,8 +64,8 @@ class IKAnswer(Answer):
     solutions: tuple[IKSolution, ...]
     """One entry per configuration."""
     complete: bool
-    """Whether the solutions contain every branch. False for an arm without a complete inverse: some
-    may be missing."""
+    """Whether the solutions contain every branch. False for an arm without a complete inverse, and
+    for an orientation that is free in part: some may be missing."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class IKTask:
         request, end = self.request, Deadline.after(deadline)
         with until(end):
             robot = robot_named(request.robot)
-            arm, pose = to_ik_arm(request, robot), to_base_pose(request.pose, robot)
+            arm, pose = to_ik_arm(request, robot), to_target_pose(request.pose, robot)
         found = inverse_kinematics(arm, pose, request.windings, end.left)
         if self.wanted == "csv":
             return TaskResult.of_csv(_table(found, robot.nq))

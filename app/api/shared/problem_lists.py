@@ -20,6 +20,7 @@ from joulepath.optimizer.exceptions import (
     UnreachablePose,
     UnreachableTargets,
 )
+from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.search.errors import (
     DurationTooShort,
     GoalInCollision,
@@ -55,12 +56,18 @@ ADDING_PROBLEMS: tuple[type[DeclaredError], ...] = (
 )
 """Of every request that adds a robot."""
 
+POSE_PROBLEMS: tuple[type[DeclaredError], ...] = (
+    UnreachablePose,
+    NoConfigurationFound,
+    OrientationNotHeld,
+    SingularPose,
+)
+"""Of a pose that the arm should reach."""
+
 MOTION_PROBLEMS: tuple[type[DeclaredError], ...] = (
     *WORKER_PROBLEMS,
     UnknownFigures,
-    UnreachablePose,
-    NoConfigurationFound,
-    SingularPose,
+    *POSE_PROBLEMS,
     UnreachableTargets,
     OutsideLimits,
     StartInCollision,
@@ -75,9 +82,7 @@ MOTION_PROBLEMS: tuple[type[DeclaredError], ...] = (
 CYCLE_PROBLEMS: tuple[type[DeclaredError], ...] = (
     *WORKER_PROBLEMS,
     UnknownFigures,
-    UnreachablePose,
-    NoConfigurationFound,
-    SingularPose,
+    *POSE_PROBLEMS,
     UnreachableTargets,
     OutsideLimits,
     StartInCollision,

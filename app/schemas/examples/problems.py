@@ -34,6 +34,7 @@ from joulepath.optimizer.identify.errors import (
     PayloadUnknown,
 )
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.result.candidates import (
     CandidateReport,
     CandidateStatus,
@@ -87,6 +88,7 @@ _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
         UnknownTool(["franka_hand", "onrobot_rg2", "robotiq_2f_85"]),
         UnreachablePose("goal", 0.12, _OUT_OF_REACH),
         NoConfigurationFound("goal", within_limits=False),
+        OrientationNotHeld("goal", within_limits=False, joints=5),
         SingularPose("goal", 1e-9),
         UnreachableTargets("goal", [UnreachableTarget("goal", 0, _OUT_OF_REACH)]),
         NoTrajectory([_CANDIDATE]),

@@ -11,7 +11,7 @@ So J δ = e - r, with e the error of the middle, is a linear system with a bound
 For any matrix P, with M = P J, M_jj δ_j = (P e)_j - (P r)_j - Σ_{k≠j} M_jk δ_k gives an interval
 for δ_j (the Krawczyk operator without its restriction to square systems; Neumaier, Interval methods
 for systems of equations, 1990, chapter 5). A box with an empty interval holds no configuration that
-reaches the pose.
+reaches the pose. A joint that moves neither the TCP nor the tool's axis has h = 0 in these bounds.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ class PoseBoxes:
             J (b, m, nq), the error (b, m) of the middles, and a bound (b, m) of the remainder of
             each row.
         """
-        arms = at.tcp[:, None] - at.origins
+        arms, half = at.tcp[:, None] - at.origins, np.where(self.free, 0.0, half)
         J = np.cross(at.axes, arms).transpose(0, 2, 1)
         error = self.pose.position - at.tcp
         slack = np.repeat(second_order(self.levers, half)[:, None], 3, axis=1)

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import SingularPose
 from joulepath.optimizer.kinematics.angles import wrapped
@@ -118,9 +118,10 @@ class MultiStart:
     def _solve(self, matrix: bytes) -> Array:
         T = np.frombuffer(matrix).reshape(4, 4)
         if self._chain.beyond_length(T) > REACH.beyond:
-            return np.zeros((0, 6))
-        rng, found, idle = np.random.default_rng(0), np.zeros((0, 6)), 0
-        starts = rng.uniform(-np.pi, np.pi, (MULTI_START.round_size, 6))
+            return np.zeros((0, self._chain.nq))
+        shape = (MULTI_START.round_size, self._chain.nq)
+        rng, found, idle = np.random.default_rng(0), np.zeros((0, self._chain.nq)), 0
+        starts = rng.uniform(-np.pi, np.pi, shape)
         for _ in range(MULTI_START.rounds):
             checkpoint()
             fresh = self._joined(found, starts, T)
@@ -130,10 +131,7 @@ class MultiStart:
                 found = fresh
                 break
             starts = np.vstack(
-                [
-                    rng.uniform(-np.pi, np.pi, (MULTI_START.round_size, 6)),
-                    self._beside(fresh[len(found) :]),
-                ]
+                [rng.uniform(-np.pi, np.pi, shape), self._beside(fresh[len(found) :])]
             )
             found = fresh
         singular = self._smallest(found)
@@ -154,11 +152,17 @@ class MultiStart:
         slow = np.flatnonzero((residual >= MULTI_START.solved) & (residual < REACH.near))
         if len(slow):
             q[slow], residual[slow] = solved(self._chain, q[slow], T)
-        singular = self._smallest(q) < REACH.singular
-        done = (residual < MULTI_START.solved) | ((residual < REACH.beyond) & singular)
+        done = self._is_reached(residual, self._smallest(q))
         q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
         smallest = self._smallest(q)
         return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), residual[done]), smallest)])
+
+    def _is_reached(self, residual: Array, smallest: Array) -> Mask:
+        """Which configurations (n,) reach the pose, by their pose errors (n,) [m, rad] and smallest
+        singular values (n,); singular ones may be at the edge of the workspace.
+        """
+        at_edge = (residual < REACH.beyond) & (smallest < REACH.singular)
+        return np.asarray((residual < MULTI_START.solved) | at_edge)
 
     def _at_fold(self, found: Array, T: Array) -> Array:
         """The exact ones of more solutions (n, 6) [rad] than an arm has branches.

@@ -210,7 +210,7 @@ def test_not_ready(tmp_path: Any) -> None:
 
 
 def test_a_pose_for_an_arm_without_inverse_kinematics(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("joulepath.app.api.ik.task.robot_named", lambda _: serial_chain(3))
+    monkeypatch.setattr("joulepath.app.api.ik.task.robot_named", lambda _: serial_chain(8))
     (error,) = problem_of_ik({"position": [0.4, -0.2, 0.3], "quaternion": DOWN})["errors"]
     assert error["loc"] == ["body", "pose"] and "give joint positions" in error["msg"]
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import UnreachableTargets
+from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_validation import POSE, refused
@@ -74,9 +77,18 @@ def test_chooses_the_orientation(client: TestClient, orientation: Any) -> None:
     assert 0 <= content["energy"]["lower_bound"] <= content["energy"]["electrical"]["total"]
 
 
-def test_other_endpoints_want_the_whole_pose(client: TestClient) -> None:
+def test_inverse_kinematics_of_an_orientation_that_is_free_in_part(client: TestClient) -> None:
+    about = {"free_about": [0, 0, 1], "rpy": [np.pi, 0, 0]}
+    answer = client.post("/ik", json=loose(about) | {"windings": False}).json()
+    assert not answer["complete"] and 8 < len(answer["solutions"]) <= 32
+    kinematics = required_inverse_kinematics(load_robot("ur5e"), "pose")
+    for found in answer["solutions"]:
+        assert "wrist_3_joint" in found["free"]
+        assert found["label"] == str(kinematics.label(np.array(found["q"])))
+
+
+def test_a_tool_and_a_start_want_the_whole_pose(client: TestClient) -> None:
     pose = loose("free")["pose"]
-    assert ["body", "pose"] in [error["loc"] for error in refused(client, {"pose": pose}, "/ik")]
     assert ["body", "tcp"] in [error["loc"] for error in refused(client, move(tcp=pose))]
     for start in (loose("free"), {"any_of": [{"q": NEAR}, loose("free")]}):
         (error,) = refused(client, move(start=start))

@@ -76,7 +76,9 @@ def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _chain(asked: Cycle) -> FreeEndsChain:
     tried = {
-        stop.name: tool_turns.turns_all_around(stop) for stop in asked.stops if any(stop.free_ends)
+        stop.name: tool_turns.turns_all_around(asked.arm, stop)
+        for stop in asked.stops
+        if any(stop.free_ends)
     }
     first = tool_turns.with_turns(asked, tried, bounded=True)
     chain = FreeEndsChain.of(first, CycleSearch(first, time.perf_counter).legs)

@@ -1,0 +1,58 @@
+"""Inverse kinematics of an arm with fewer than six joints, for the poses that it can hold.
+
+Such an arm reaches few of the poses at a position: those whose orientation its joints happen to
+allow, as a palletiser that turns its tool about the vertical. Newton's method from many starts
+finds them, as in `multi_start`, whose limit of sixteen branches holds as well: an arm with fewer
+joints is one of six whose others are fixed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from joulepath.models.robot import Array, Mask
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.reach import REACH
+from joulepath.optimizer.kinematics.six.multi_start import MULTI_START, MultiStart
+from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
+
+POSITIONING_JOINTS = 3
+"""Number of joints that place a point."""
+
+
+class FewJoints(MultiStart):
+    """`PoseSolver` of an arm with one to five joints; a pose may be off by `REACH.beyond`.
+
+    Without this tolerance, a pose that is rounded in the last digit would have an orientation that
+    the arm does not have.
+    """
+
+    @classmethod
+    def of(cls, model: pin.Model) -> FewJoints | None:
+        """Inverse kinematics of a Pinocchio model with a frame `flange`; None for six joints or
+        more.
+        """
+        return cls(Chain.of(model)) if model.nq < 6 else None
+
+    def label(self, q: Array) -> NumberedBranch:
+        """Branch of a configuration (nq,) [rad]: 1, or 2 if the first three joints move the flange
+        in directions of negative orientation.
+
+        It changes only where these joints are singular.
+        """
+        if self._chain.nq < POSITIONING_JOINTS:
+            return NumberedBranch(1)
+        jacobian = self._chain.flange_and_jacobian(q[None])[1][0]
+        volume = np.linalg.det(jacobian[:3, :POSITIONING_JOINTS])
+        return NumberedBranch(2 if volume < -MULTI_START.solved else 1)
+
+    def solve(self, T: Array) -> tuple[Array, list[BranchLabel]]:
+        """Configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and their
+        labels, see `MultiStart.solve`.
+        """
+        q = self.configurations(T)
+        return q, [self.label(each) for each in q]
+
+    def _is_reached(self, residual: Array, smallest: Array) -> Mask:
+        return np.asarray(residual < REACH.beyond)
