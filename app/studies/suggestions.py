@@ -17,6 +17,7 @@ from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
+from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tcp import rotated_poses
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import DURATIONS
@@ -96,7 +97,9 @@ def proposals(base: Base) -> list[Proposal]:
     takes_poses = inverse_kinematics_for(arm.robot) is not None
     here, *tilted = _poses(arm, base.q_goal, [np.zeros(3), *_TILTS])
     pose = [_same_pose(base, here)] if takes_poses and "q" in base.request["goal"] else []
-    turned = _orientation(base, here, tilted) if takes_poses else ()
+    # with fewer joints, hardly another orientation can be held
+    turns = takes_poses and arm.robot.nq >= POSE_FREEDOMS
+    turned = _orientation(base, here, tilted) if turns else ()
     return [*_method(base), *_duration(base), *pose, *_branch(base), *turned, *_payload(base)]
 
 
