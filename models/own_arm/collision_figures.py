@@ -72,7 +72,7 @@ def collision_figures(
         )
     if shapes.missing:
         warnings.append(
-            "Meshes that were not given, or are no STL or OBJ, count as nothing: "
+            "Meshes that were not given, or are no STL, OBJ or COLLADA file, count as nothing: "
             f"{_listed(shapes.missing)}."
         )
     if shapes.unknown:

@@ -15,7 +15,6 @@ from joulepath.models.own_arm.mesh_files import corners
 from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import listed, name_of
-from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import SIZES
 from joulepath.models.uploads.limits import Checkpoint
 
@@ -200,17 +199,3 @@ def _write(link: Element, body: pin.Inertia) -> None:
     rows, columns = np.triu_indices(3)
     values = body.inertia[rows, columns].tolist()
     SubElement(inertial, "inertia", dict(zip(TENSOR, map(repr, values), strict=True)))
-
-
-def nearest_possible(inertia: Array) -> Array:
-    """The nearest inertia (3, 3) [kg·m²] of a body to a tensor, in the Frobenius norm of its
-    distribution of mass.
-
-    The second moments of the mass, trace(I)/2 - I, must not be negative along any axis (Traversaro
-    et al., "Identification of fully physical consistent inertial parameters using optimization on
-    manifolds", 2016): negative ones become zero.
-    """
-    symmetric = (inertia + inertia.T) / 2
-    moments, axes = np.linalg.eigh(np.trace(symmetric) / 2 * np.eye(3) - symmetric)
-    second = (axes * np.maximum(moments, 0.0)) @ axes.T
-    return np.asarray(np.trace(second) * np.eye(3) - second)

@@ -12,13 +12,14 @@ import numpy as np
 
 from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
 from joulepath.models.robot import Array
+from joulepath.models.uploads.collada import collada_corners
 from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
 from joulepath.models.uploads.mesh import read_mesh
 from joulepath.models.uploads.mesh_text import MeshSize
 from joulepath.models.uploads.xml_tree import xml_tree
 
 # supported kinds; a link with other meshes has a capsule from joint to joint
-KINDS = ("stl", "obj")
+KINDS = ("stl", "obj", "dae")
 _PIECE = 1 << 20
 """Bytes unpacked between two checkpoints."""
 
@@ -85,7 +86,8 @@ def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:
 def corners(
     meshes: Mapping[str, bytes], reference: str, checkpoint: Checkpoint = unwatched
 ) -> Array | None:
-    """Corners (n, 3) of a mesh of the URDF, in its own units; None without its file.
+    """Corners (n, 3) of a mesh of the URDF, in its own units; None without its file. A COLLADA file
+    is in metres.
 
     Raises InvalidArm for an unreadable file, or several matching files.
     """
@@ -94,7 +96,10 @@ def corners(
         return None
     most = MeshSize()
     try:
-        found, _ = read_mesh(_kind(path), meshes[path], most, checkpoint)
+        if _kind(path) == "dae":
+            found = collada_corners(meshes[path], most, checkpoint)
+        else:
+            found, _ = read_mesh(_kind(path), meshes[path], most, checkpoint)
     except UnreadableFile as error:
         raise InvalidArm("meshes", f"{reference[: PLAUSIBLE.name]!r} {error}") from error
     if len(found) < 4 or not np.isfinite(found).all():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from joulepath.models.own_arm.description import (
     Motion,
 )
 from joulepath.models.own_arm.mesh_files import in_folder, in_zip
+from joulepath.models.own_arm.xacro_file import SUFFIX, expanded, package_folders
 
 # no conversion of types, no unknown fields
 for _part in (Collision, Description, Drives, Electronics, Motion):
@@ -30,7 +32,9 @@ def read_description(path: Path) -> Description:
     """The description in a YAML file.
 
     Its `urdf` is the path of the URDF, and `meshes` the path of a folder or zip with mesh files,
-    both relative to the file. Without `meshes`, the folder of the URDF is searched.
+    both relative to the file. Without `meshes`, the folder of the URDF is searched, the ROS package
+    that it belongs to, and the folder `packages`. A URDF whose name ends with .xacro is expanded
+    with the `arguments`.
 
     Raises:
         InvalidArm: the description is invalid; the error names the field.
@@ -38,7 +42,11 @@ def read_description(path: Path) -> Description:
     """
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        place = data.pop("meshes", None) if isinstance(data, dict) else None
+        is_mapping = isinstance(data, dict)
+        place, folder, arguments = (
+            data.pop(name, None) if is_mapping else None
+            for name in ("meshes", "packages", "arguments")
+        )
         # The strict validator accepts JSON lists as tuples.
         found = _DESCRIPTION.validate_json(json.dumps(data))
     except (yaml.YAMLError, UnicodeDecodeError, TypeError) as error:
@@ -50,7 +58,11 @@ def read_description(path: Path) -> Description:
         raise InvalidArm(
             "urdf", f"There is no file {urdf}: give the path of the URDF, relative to {path.name}."
         )
-    text = urdf.read_text(encoding="utf-8", errors="replace")
+    folders = [*_folder_of_packages(path.parent, folder), *package_folders(urdf)]
+    if urdf.suffix == SUFFIX:
+        text = expanded(urdf, _arguments(arguments), folders)
+    else:
+        text = urdf.read_text(encoding="utf-8", errors="replace")
     if found.srdf is not None:
         srdf = path.parent / found.srdf
         if not srdf.is_file():
@@ -59,13 +71,42 @@ def read_description(path: Path) -> Description:
                 f"There is no file {srdf}: give the path of the SRDF, relative to {path.name}.",
             )
         found = replace(found, srdf=srdf.read_text(encoding="utf-8", errors="replace"))
-    return replace(found, urdf=text, meshes=_meshes(path.parent, place, urdf.parent, text))
+    return replace(
+        found, urdf=text, meshes=_meshes(path.parent, place, [urdf.parent, *folders], text)
+    )
 
 
-def _meshes(folder: Path, place: Any, beside: Path, urdf: str) -> dict[str, bytes]:
-    """Mesh files at a path relative to the description, or beside the URDF without a path."""
+def _arguments(given: Any) -> dict[str, str]:
+    """Values of the arguments of a file with macros, as text."""
+    if not isinstance(given, dict | None):
+        raise InvalidArm("arguments", "arguments must have the values of <xacro:arg> by name.")
+    # xacro reads `true`, not Python's `True`
+    return {
+        str(name): str(value).lower() if isinstance(value, bool) else str(value)
+        for name, value in (given or {}).items()
+    }
+
+
+def _folder_of_packages(folder: Path, place: Any) -> list[Path]:
+    """The folder `packages` of a description, relative to it; none without one."""
     if place is None:
-        return in_folder(beside, urdf)
+        return []
+    if not isinstance(place, str) or not (folder / place).is_dir():
+        raise InvalidArm(
+            "packages", "packages must be the path of a folder, relative to the description."
+        )
+    return [folder / place]
+
+
+def _meshes(folder: Path, place: Any, near: Sequence[Path], urdf: str) -> dict[str, bytes]:
+    """Mesh files at a path relative to the description, or in folders near the URDF without a
+    path.
+    """
+    if place is None:
+        found = dict[str, bytes]()
+        for each in near:
+            found = in_folder(each, urdf) | found
+        return found
     if not isinstance(place, str) or not (folder / place).exists():
         raise InvalidArm(
             "meshes", "meshes must be the path of a folder or a zip, relative to the description."

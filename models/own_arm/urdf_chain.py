@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, Problems
-from joulepath.models.own_arm.estimated_masses import Estimate, add_inertials, nearest_possible
+from joulepath.models.own_arm.estimated_masses import Estimate, add_inertials
 from joulepath.models.own_arm.joint_facts import JointFacts
 from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
@@ -31,6 +31,7 @@ from joulepath.models.own_arm.urdf_tree import (
     refuse,
     restore_rounded,
 )
+from joulepath.models.possible_inertia import nearest_possible_inertia
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 
@@ -102,7 +103,8 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
                 )
     problems.raise_any()
     path = tree.path(base, description.tip)
-    held = _others(tree, path) if isinstance(locked, str) else given
+    others = _others(tree, path) if isinstance(locked, str) else given
+    held = _with_followers(tree, others, set(given))
     moving = [
         joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in held
     ]
@@ -134,7 +136,7 @@ def _mended(chain: Chain) -> tuple[str, ...]:
     changed = list[str]()
     for k, link in enumerate(chain.links, start=1):
         body = chain.model.inertias[k]
-        inertia = nearest_possible(body.inertia)
+        inertia = nearest_possible_inertia(body.inertia)
         if np.abs(inertia - body.inertia).max() > RULES.rounded * np.abs(body.inertia).max():
             chain.model.inertias[k] = pin.Inertia(body.mass, body.lever, inertia)
             changed.append(link)
@@ -154,6 +156,30 @@ def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:
     return held
 
 
+def _with_followers(tree: UrdfTree, held: Mapping[str, float], given: set[str]) -> dict[str, float]:
+    """Positions [rad] or [m] of held joints, and of those that mimic one: multiplier · its position
+    + offset. The positions of joints `given` by name stay.
+    """
+    positions, follows = dict(held), True
+    mimics = {
+        name: mimic
+        for name, joint in tree.joints.items()
+        if name not in given and (mimic := joint.find("mimic")) is not None
+    }
+    while follows:
+        follows = False
+        for name, mimic in list(mimics.items()):
+            leader = mimic.get("joint", "")
+            if leader in positions and leader not in mimics:
+                where = f"Joint {name!r} has a <mimic>"
+                factor = number(mimic, "multiplier", where, "1")
+                shift = number(mimic, "offset", where, "0")
+                positions[name] = factor * positions[leader] + shift
+                del mimics[name]
+                follows = True
+    return positions
+
+
 def _check_moving(joint: Element) -> None:
     """Raises InvalidArm unless a moving joint is revolute and has limits."""
     name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
@@ -164,7 +190,11 @@ def _check_moving(joint: Element) -> None:
             "`locked`.",
         )
     if joint.find("mimic") is not None:
-        refuse("urdf", f"Joint {name!r} mimics another one: give its position in `locked`.")
+        refuse(
+            "urdf",
+            f"Joint {name!r} mimics another one that moves, as in a parallelogram: such arms are "
+            "not followed. Give its position in `locked`, or that of the other one.",
+        )
     limit = joint.find("limit")
     if kind == "revolute" and (
         limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib

@@ -21,6 +21,9 @@ class UploadLimits:
     xml_bytes: int = 8 << 20
     """Bytes of one document; published arms have up to 0.5 MB. All attributes of an element are
     read before they are counted, in at most 1.5 s for a document of this size."""
+    collada_bytes: int = 32 << 20
+    """Bytes of one COLLADA file, nearly all of which are numbers; published ones of links have up
+    to 20 MB."""
     xml_depth: int = 100
     """Levels of nested elements; a URDF needs 5, and extensions of simulators some 10 more.
     Libraries copy and write the tree recursively and exhaust the stack at about 1,000."""

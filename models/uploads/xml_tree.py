@@ -13,13 +13,17 @@ from xml.parsers import expat
 from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile, unwatched
 
 
-def xml_tree(text: str, checkpoint: Checkpoint = unwatched) -> Element:
-    """The root element of an XML document. Raises UnreadableFile, also beyond LIMITS."""
+def xml_tree(
+    text: str, checkpoint: Checkpoint = unwatched, most: int = LIMITS.xml_bytes
+) -> Element:
+    """The root element of an XML document. Raises UnreadableFile, also beyond `most` bytes and
+    LIMITS.
+    """
     counted = _Counted()
     try:
         data = text.encode()
-        if len(data) > LIMITS.xml_bytes:
-            raise UnreadableFile(f"has more than {LIMITS.xml_bytes >> 20} MiB.")
+        if len(data) > most:
+            raise UnreadableFile(f"has more than {most >> 20} MiB.")
         for begin in range(0, len(data), LIMITS.xml_piece):
             checkpoint()
             counted.parser.Parse(data[begin : begin + LIMITS.xml_piece], False)

@@ -212,8 +212,8 @@ class OwnArm(Request):
         min_length=1,
     )
     meshes: str | None = described(
-        "Mesh files (STL, OBJ) that the URDF names, as a zip in base64. Null: a link whose shape "
-        "is a mesh has a capsule from joint to joint.",
+        "Mesh files (STL, OBJ, COLLADA) that the URDF names, as a zip in base64. Null: a link "
+        "whose shape is a mesh has a capsule from joint to joint.",
         None,
         "UEsFBgAAAAAAAAAAAAAAAAAAAAAAAA==",
         default=None,

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 from joulepath.models.own_arm.description import Description
-from joulepath.models.own_arm.estimated_masses import nearest_possible
 from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.possible_inertia import nearest_possible_inertia
 from tests.models.own_arm.arms import BLOCK, PLAIN, SHAPE, obj, refused, robot
 
 BOX = '<visual><origin xyz="0 0 0.1" rpy="0 0 1"/><geometry>{}</geometry></visual>'
@@ -115,10 +115,10 @@ def test_the_nearest_possible_inertia() -> None:
     for _ in range(200):
         points = rng.normal(size=(12, 3))
         body = sum(float(p @ p) * np.eye(3) - np.outer(p, p) for p in points)
-        assert nearest_possible(np.asarray(body)) == pytest.approx(np.asarray(body))
+        assert nearest_possible_inertia(np.asarray(body)) == pytest.approx(np.asarray(body))
         wild = rng.normal(size=(3, 3))
-        found = nearest_possible(wild + wild.T)
+        found = nearest_possible_inertia(wild + wild.T)
         least, middle, most = np.linalg.eigvalsh(found)
         assert least >= -1e-12 and most <= least + middle + 1e-12
         # mending twice changes nothing more
-        assert nearest_possible(found) == pytest.approx(found, abs=1e-12)
+        assert nearest_possible_inertia(found) == pytest.approx(found, abs=1e-12)

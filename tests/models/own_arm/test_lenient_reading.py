@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,8 @@ FINGERS = """
     <limit lower="0" upper="0.04" effort="20" velocity="0.1"/></joint>
   <link name="right"/>
 </robot>"""
+HEAVY = """<link name="right"><inertial><mass value="0.2"/>
+  <inertia ixx="1e-5" ixy="0" ixz="0" iyy="1e-5" iyz="0" izz="1e-5"/></inertial></link>"""
 GRIPPING = replace(PLAIN, urdf=PLAIN.urdf.replace("</robot>", FINGERS))
 BROKEN = (
     PLAIN.urdf.replace('lower="-2" upper="2"', 'lower="2" upper="2"')
@@ -63,6 +66,21 @@ def test_all_others_are_held_in_one_go() -> None:
     others = replace(GRIPPING, locked="others")
     assert own_figures("mine", others) == own_figures("mine", by_name)
     assert own_figures("mine", others)[0] != own_figures("mine", PLAIN)[0]
+
+
+def test_a_mimic_joint_follows_the_joint_that_is_held() -> None:
+    """At multiplier · position + offset, unless it is named itself."""
+    mimic = '<mimic joint="finger" multiplier="0.5" offset="0.01"/>'
+    gripping = replace(GRIPPING, urdf=GRIPPING.urdf.replace('<mimic joint="finger"/>', mimic))
+    heavy = replace(gripping, urdf=gripping.urdf.replace('<link name="right"/>', HEAVY))
+
+    def figures(**locked: float) -> dict[str, Any]:
+        return own_figures("mine", replace(heavy, locked=locked))[0]
+
+    assert figures(finger=0.03) == figures(finger=0.03, opposite=0.025)
+    assert figures(finger=0.03) != figures(finger=0.03, opposite=0.0)
+    others = own_figures("mine", replace(heavy, locked="others"))[0]
+    assert others == figures(finger=0.01, opposite=0.015)
 
 
 def test_the_refusal_names_all_loose_joints_and_how_to_hold_them() -> None:
