@@ -3,6 +3,7 @@ __version__: str
 from .app.client.client import Client
 from .app.client.errors import ServiceUnreachable
 from .app.exceptions.base import InvalidRequest, ServiceError
+from .models.mjcf import mjcf
 from .models.own_arm.description import InvalidArm
 from .models.registry import load_robot, robot_names
 from .models.robot import Limits, Robot
@@ -303,6 +304,7 @@ __all__ = [
     "inverse_kinematics",
     "load_robot",
     "load_tool",
+    "mjcf",
     "optimize",
     "optimize_many",
     "pareto",

@@ -29,6 +29,7 @@ FUNCTIONS = {
     "inverse_kinematics",
     "load_robot",
     "load_tool",
+    "mjcf",
     "optimize",
     "optimize_many",
     "pareto",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from joulepath.app.cli.answer import refused, write
+from joulepath.app.cli.answer import OUTPUT, refused, write
 from joulepath.app.cli.store import in_store
 from joulepath.app.cli.table import table
 
@@ -104,6 +104,43 @@ def remove(name: str) -> None:
         in_store(lambda store: store.write(partial(stored.delete, name=name, client=OPERATOR)))
     except (ServiceError, UnknownRobot) as error:
         raise refused(error) from None
+
+
+@robots.command(
+    epilog="""\b
+Examples:
+  joulepath robots mjcf ur5e --output ur5e.xml
+  joulepath robots mjcf my_arm.yaml --output my_arm.xml"""
+)
+@click.argument("robot")
+@OUTPUT
+def mjcf(robot: str, output: Path | None) -> None:
+    """Writes a robot as an MJCF file for MuJoCo.
+
+    ROBOT is the name of a robot, or the path of a YAML file that describes one. The file has rotor
+    inertias and friction, so that MuJoCo's torques are those of the answers.
+    """
+    from joulepath.app.exceptions.base import ServiceError
+    from joulepath.app.store import robots as stored
+    from joulepath.models.mjcf import mjcf as written
+    from joulepath.models.own_arm.description import InvalidArm
+    from joulepath.models.own_arm.robots import own_robot
+    from joulepath.models.registry import DESCRIPTIONS, load_robot, robot_names
+    from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
+
+    try:
+        if robot in robot_names() or robot.endswith(DESCRIPTIONS):
+            found = load_robot(robot)
+        else:
+            row = in_store(lambda store: store.read(partial(stored.get, name=robot)))
+            found = own_robot(robot, row.figures)
+    except InvalidArm as error:
+        raise refused(InvalidProblem(error.field, str(error))) from None
+    except OSError as error:
+        raise click.FileError(robot, error.strerror or str(error)) from None
+    except (ServiceError, UnknownRobot) as error:
+        raise refused(error) from None
+    write(written(found).encode(), output)
 
 
 def _table() -> str:

@@ -12,6 +12,7 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.access.client import Client
+from joulepath.app.api.robots.mjcf import MjcfTask
 from joulepath.app.api.robots.models import (
     Friction,
     FrictionLaw,
@@ -23,6 +24,7 @@ from joulepath.app.api.robots.pictures import MEDIA_TYPE, PictureTask, digest, k
 from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName
 from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.api.shared.dependencies import (
+    ServiceArmEngine,
     ServiceClient,
     ServiceClientEngine,
     ServiceSettings,
@@ -36,6 +38,7 @@ from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import NoMeshes, RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.entity_tag import is_known
+from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
@@ -154,6 +157,30 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
     if figures is None:
         figures = (await store.read(partial(robots.get, name=name))).figures
     return Response(urdf_of(name, figures), media_type="application/xml")
+
+
+@router.get(
+    "/{name}/mjcf",
+    summary="The MJCF of a robot, for MuJoCo",
+    response_class=Response,
+    responses={
+        200: {
+            "content": {"application/xml": {"schema": {"type": "string"}}},
+            "description": "The MJCF",
+        },
+        **problem_responses(
+            UnknownRobot, ShuttingDown, DeadlineExceeded, WorkerLost, StoreUnavailable
+        ),
+    },
+)
+async def mjcf(
+    request: Request, name: Name, settings: ServiceSettings, engine: ServiceArmEngine
+) -> Response:
+    """The chain of joints from `base` to `flange` with rotor inertias, friction, limits, torque
+    motors and the capsules of the links, for MuJoCo, whose torques are then those of the answers.
+    """
+    work = engine.run(MjcfTask(name, request.state.id), settings.max_deadline)
+    return result_response(await unless_disconnected(request, work))
 
 
 @router.get(

@@ -27,11 +27,15 @@ def test_a_robot_is_added_used_and_removed(here: Here, tmp_path: Path) -> None:
     assert (code, problem["type"]) == (1, "/problems/robot-exists")
     assert here.run("robots", "add", str(file), "--replace")[0] == 0
     assert b"\ncell_arm " in here.run("robots")[1]
+    written = here.run("robots", "mjcf", "cell_arm")[1]
+    assert b'<mujoco model="cell_arm">' in written
+    assert here.run("robots", "mjcf", str(file))[1] == written
     answer = run("optimize", "-", stdin=json.dumps(MOVE))
     assert answer.returncode == 0, answer.stderr
     assert json.loads(answer.stdout)["robot"] == "cell_arm"
     assert here.run("robots", "remove", "cell_arm")[0] == 0
-    for command in (("optimize", "-"), ("robots", "remove", "cell_arm")):
+    removing, writing = ("robots", "remove", "cell_arm"), ("robots", "mjcf", "cell_arm")
+    for command in (("optimize", "-"), removing, writing):
         code, problem = here.problem(*command, stdin=json.dumps(MOVE))
         assert (code, problem["type"]) == (2, "/problems/unknown-robot")
 

@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Iterator
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
@@ -16,7 +17,9 @@ from joulepath.app.api.robots.models import RobotDetail, RobotList
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, TooManyRobots
 from joulepath.app.schemas.examples.own_arm import ARM
+from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import UnknownRobot
+from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from tests.app.recorded import recorded_service
 from tests.app.requests import PATIENT
@@ -55,6 +58,18 @@ def test_a_robot_is_added_shown_and_deleted(client: TestClient) -> None:
     refused(client.delete("/robots/new_arm"), UnknownRobot)
 
 
+def test_the_mjcf_of_a_robot(mine: TestClient) -> None:
+    """Of an added robot and a bundled one; MuJoCo reads it."""
+    for name, joints in (("mine", ["shoulder", "elbow"]), ("ur5e", None)):
+        answer = mine.get(f"/robots/{name}/mjcf")
+        assert (answer.status_code, answer.headers["content-type"]) == (200, "application/xml")
+        model = mujoco.MjModel.from_xml_string(answer.text)
+        named = [model.joint(k).name for k in range(model.njnt)]
+        assert named == (joints or list(load_robot(name).joint_names))
+        assert (model.dof_armature > 0).all()
+    refused(mine.get("/robots/nobody/mjcf"), UnknownRobot)
+
+
 def test_the_robots_of_the_service_stay(client: TestClient) -> None:
     refused(client.post("/robots", json={"name": "ur5e", **ARM}), RobotExists)
     refused(client.put("/robots/ur5e", json=ARM), RobotExists)
@@ -83,14 +98,14 @@ def test_every_endpoint_knows_it(mine: TestClient) -> None:
     )
     assert of_csv.json()["total"]["energy"] == evaluated.json()["total"]["energy"]
     pose = {"position": [0.3, 0.0, 0.6], "quaternion": [0.0, 0.0, 0.0, 1.0]}
-    (error,) = refused(mine.post("/ik", json={"pose": pose, **MINE}), InvalidRequest)["errors"]
-    assert "give joint positions" in error["msg"]
+    refusal = refused(mine.post("/ik", json={"pose": pose, **MINE}), OrientationNotHeld)
+    assert refusal["joints"] == 2 and '"orientation": "free"' in refusal["detail"]
     study = mine.post("/studies", json={"name": "own", "threshold": 10.0, **MINE}).json()["id"]
     step = {"optimize": {"start": {"q": START}, "goal": {"q": GOAL}, **PATIENT}}
     assert mine.post(f"/studies/{study}/iterations", json=step).status_code == 201
     suggested = mine.get(f"/studies/{study}/suggest", params={"deadline": 60})
     assert suggested.status_code == 200
-    # a shorter motion may be impossible; what needs inverse kinematics is not suggested
+    # a shorter motion may be impossible; orientations that two joints do not hold are not suggested
     assert {each["problem"] for each in suggested.json()["not_computed"]} <= {"duration-too-short"}
     assert {each["step"] for each in suggested.json()["suggestions"]} >= {"duration"}
 

@@ -1,0 +1,146 @@
+"""The MJCF of a robot: its URDF's chain with what a URDF lacks, for simulations in MuJoCo.
+
+Rotor inertias are `armature`, Coulomb friction is `frictionloss`, and viscous friction `damping`.
+The torque of MuJoCo's inverse dynamics, without constraints, is therefore that of the links and
+rotors here, and the viscous friction. MuJoCo refuses inertias that no body can have: such a link
+gets the nearest possible one, which changes torques by some mN·m in published arms. The concave
+rise of friction in strain-wave gears, which MuJoCo does not have, is divided between `frictionloss`
+and `damping` by least squares over the speeds up to the limit; friction that grows with the load is
+left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+import pinocchio as pin
+
+from joulepath.models.possible_inertia import nearest_possible_inertia
+from joulepath.models.robot import Array, FrictionLaw, LinkCapsule, Robot
+from joulepath.models.urdf import FLANGE
+
+
+@dataclass(frozen=True)
+class MjcfSettings:
+    """Settings of the simulation that the file describes."""
+
+    timestep: float = 1e-3
+    """Time step [s]; the controllers of arms have 1 to 8 ms."""
+    speeds: int = 100
+    """Number of speeds at which friction is fitted."""
+    rounding: float = 1e-12
+    """Relative margin by which the greatest principal moment is below the sum of the others."""
+    ball: float = 1e-6
+    """Length of a capsule below which it is a ball [m]."""
+
+
+MJCF = MjcfSettings()
+
+
+def mjcf(robot: Robot) -> str:
+    """Write a robot as an MJCF file, with rotors, friction and torque motors.
+
+    Bodies, joints and motors have the names of the robot's links and joints. Every joint has its
+    position limits and, on its motor, its torque limit. The geoms are the capsules of the links.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        The text of the file; `mujoco.MjModel.from_xml_string` reads it.
+
+    Raises:
+        ValueError: a link has no mass, which MuJoCo would refuse.
+    """
+    for name, body in zip(robot.link_names[1:], list(robot.model.inertias)[1:], strict=True):
+        if not body.mass > 0:
+            raise ValueError(f"Link {name!r} has no mass: a simulated link needs one.")
+    root = Element("mujoco", model=robot.name)
+    SubElement(root, "compiler", angle="radian", autolimits="true")
+    gravity = _text(robot.gravity)
+    SubElement(
+        root, "option", gravity=gravity, timestep=repr(MJCF.timestep), integrator="implicitfast"
+    )
+    links = [SubElement(SubElement(root, "worldbody"), "body", name=robot.link_names[0])]
+    friction, damping = _friction(robot.friction, robot.limits.v_max)
+    for k, name in enumerate(robot.link_names[1:], start=1):
+        body = SubElement(links[-1], "body", name=name, **_pose(robot.model.jointPlacements[k]))
+        _inertial(body, robot.model.inertias[k])
+        SubElement(
+            body,
+            "joint",
+            name=robot.joint_names[k - 1],
+            type="hinge",
+            axis="0 0 1",
+            range=_text(np.array([robot.limits.q_min[k - 1], robot.limits.q_max[k - 1]])),
+            armature=repr(float(robot.drives.rotor_inertia[k - 1])),
+            frictionloss=repr(float(friction[k - 1])),
+            damping=repr(float(damping[k - 1])),
+        )
+        links.append(body)
+    for capsule in robot.capsules:
+        _geom(links[capsule.link], capsule)
+    SubElement(links[-1], "site", name=FLANGE, **_pose(pin.SE3(robot.T_last_flange)))
+    _contacts(root, robot)
+    motors = SubElement(root, "actuator")
+    for joint, most in zip(robot.joint_names, robot.limits.tau_max.tolist(), strict=True):
+        limit = _text(np.array([-most, most]))
+        SubElement(motors, "motor", name=joint, joint=joint, ctrlrange=limit)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def _inertial(body: Element, inertia: pin.Inertia) -> None:
+    tensor = nearest_possible_inertia(inertia.inertia)
+    moments, axes = np.linalg.eigh(tensor)
+    axes[:, 2] *= np.linalg.det(axes)
+    # the compiler takes no rounding for possible
+    moments[2] = min(moments[2], (1 - MJCF.rounding) * (moments[0] + moments[1]))
+    SubElement(
+        body,
+        "inertial",
+        mass=repr(float(inertia.mass)),
+        diaginertia=_text(moments),
+        **_pose(pin.SE3(axes, inertia.lever)),
+    )
+
+
+def _friction(law: FrictionLaw, v_max: Array) -> tuple[Array, Array]:
+    """Coulomb [N·m] and viscous [N·m·s/rad] friction (nq,) nearest to a law up to v_max (nq,)
+    [rad/s].
+    """
+    share = np.linspace(0.0, 1.0, MJCF.speeds + 1)[1:]
+    rise = np.arcsinh(share[:, None] * v_max / law.speed)
+    columns = np.column_stack([np.ones(MJCF.speeds), share])
+    step, slope = np.maximum(np.linalg.lstsq(columns, rise, rcond=None)[0], 0.0)
+    return law.coulomb + law.curved * step, law.viscous + law.curved * slope / v_max
+
+
+def _geom(link: Element, capsule: LinkCapsule) -> None:
+    start, end = capsule.axis
+    size: dict[str, Any] = {"size": repr(capsule.radius)}
+    if np.linalg.norm(end - start) < MJCF.ball:
+        SubElement(link, "geom", type="sphere", pos=_text(start), **size)
+    else:
+        SubElement(link, "geom", type="capsule", fromto=_text(capsule.axis.ravel()), **size)
+
+
+def _contacts(root: Element, robot: Robot) -> None:
+    """Excludes the pairs of links that never meet, or are next to each other."""
+    contact, names = SubElement(root, "contact"), robot.link_names
+    neighbours = {(k, k + 1) for k in range(robot.nq)}
+    for first, second in sorted(neighbours | robot.never_in_collision):
+        SubElement(contact, "exclude", body1=names[first], body2=names[second])
+
+
+def _pose(placement: pin.SE3) -> dict[str, Any]:
+    x, y, z, w = pin.Quaternion(placement.rotation).coeffs().tolist()
+    return {"pos": _text(placement.translation), "quat": _text(np.array([w, x, y, z]))}
+
+
+def _text(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,98 @@
+"""The MJCF of a robot: MuJoCo's torques are those of the library."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from joulepath import load_robot, mjcf
+from joulepath.models.possible_inertia import nearest_possible_inertia
+from joulepath.models.robot import Array, Robot
+from tests.models.own_arm.arms import RICH_ARM, robot
+from tests.selection import long_but
+
+# N·m: rounding of torques of some 500 N·m, and of inertias that MuJoCo would refuse
+TORQUE, MENDED = 1e-9, 0.02
+NAMES = ("ur5e", "panda", "ur30")
+
+
+@pytest.fixture(params=[*long_but(NAMES[:2], NAMES), "own"])
+def arm(request: pytest.FixtureRequest) -> Robot:
+    return robot(RICH_ARM) if request.param == "own" else load_robot(request.param)
+
+
+def torques(model: mujoco.MjModel, q: Array, v: Array, a: Array) -> Array:
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
+    mujoco.mj_inverse(model, data)
+    return np.array(data.qfrc_inverse)
+
+
+def test_torques_are_those_of_links_rotors_and_viscous_friction(arm: Robot) -> None:
+    """By MuJoCo's inverse dynamics and Pinocchio's, at random states."""
+    model, rng = mujoco.MjModel.from_xml_string(mjcf(arm)), np.random.default_rng(7)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    limits, own = arm.limits, arm.model.copy()
+    own.gravity.linear = arm.gravity
+    data = own.createData()
+    mended = max(
+        float(np.abs(nearest_possible_inertia(body.inertia) - body.inertia).max())
+        for body in list(own.inertias)[1:]
+    )
+    accuracy = TORQUE if mended < 1e-12 else MENDED
+    for _ in range(20):
+        q = rng.uniform(limits.q_min, limits.q_max)
+        v, a = (rng.uniform(-most, most) for most in (limits.v_max, limits.a_max))
+        expected = pin.rnea(own, data, q, v, a) + model.dof_damping * v
+        assert np.abs(torques(model, q, v, a) - expected).max() < accuracy
+
+
+def test_friction_is_that_of_the_law(arm: Robot) -> None:
+    """Exactly for Coulomb and viscous friction; within a few percent with a concave rise."""
+    model, law = mujoco.MjModel.from_xml_string(mjcf(arm)), arm.friction
+    v = np.linspace(0.1, 1.0, 10)[:, None] * arm.limits.v_max
+    ours = law.torque(v, np.zeros_like(v))
+    theirs = model.dof_frictionloss + model.dof_damping * v
+    share = 0.25 if law.curved.any() else 1e-3
+    assert np.abs(theirs - ours).max(axis=0) == pytest.approx(0.0, abs=share * ours.max())
+
+
+def test_limits_names_and_capsules(arm: Robot) -> None:
+    model = mujoco.MjModel.from_xml_string(mjcf(arm))
+    assert (model.jnt_range == np.column_stack([arm.limits.q_min, arm.limits.q_max])).all()
+    assert (model.actuator_ctrlrange[:, 1] == arm.limits.tau_max).all()
+    assert [model.joint(k).name for k in range(arm.nq)] == list(arm.joint_names)
+    assert model.ngeom == len(arm.capsules)
+    data, pinocchio = mujoco.MjData(model), arm.model.createData()
+    data.qpos[:] = (arm.limits.q_min + arm.limits.q_max) / 2 + 0.1
+    mujoco.mj_forward(model, data)
+    pin.framesForwardKinematics(arm.model, pinocchio, np.array(data.qpos))
+    flange = pinocchio.oMf[arm.model.getFrameId("flange")].translation
+    assert data.site("flange").xpos == pytest.approx(flange, abs=TORQUE)
+
+
+def test_a_link_without_mass_is_refused() -> None:
+    light = load_robot("ur5e")
+    model = light.model.copy()
+    model.inertias[3] = pin.Inertia.Zero()
+    with pytest.raises(ValueError, match="'forearm' has no mass"):
+        mjcf(replace(light, model=model))
+
+
+def test_an_impossible_inertia_is_mended() -> None:
+    """Otherwise MuJoCo would refuse the file; the torques stay nearly the same."""
+    bent = load_robot("ur5e")
+    model = bent.model.copy()
+    body = model.inertias[2]
+    moments = np.array([0.01, 0.01, 0.0208])
+    model.inertias[2] = pin.Inertia(body.mass, body.lever, np.diag(moments))
+    text = mjcf(replace(bent, model=model))
+    state = np.full(6, 0.3), np.full(6, 0.5), np.full(6, 1.0)
+    simulated = mujoco.MjModel.from_xml_string(text)
+    simulated.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    expected = pin.rnea(model, model.createData(), *state) + simulated.dof_damping * state[1]
+    assert np.abs(torques(simulated, *state) - expected).max() < MENDED
