@@ -48,6 +48,10 @@ class BasisSettings:
     """Length of a short knot span relative to the longest one [1]."""
     third_derivative_weight: float = 3e-3
     """Weight of the third derivative, relative to the positions, in a smooth fit."""
+    same_instant: float = 1e-9
+    """Distance below which two samples count as one: a spline through both has no derivatives, and
+    two switches of a fastest motion may differ by 1e-13.
+    """
     end_margin: float = 1e-3
     """Distance from an end of [0, 1] within which a switch is left out."""
     anchor_parts: tuple[int, int, int] = (2, 4, 4)
@@ -117,7 +121,7 @@ def smooth_fit(samples: Array, at: Array, knots: Array) -> Array:
     through them, at rest at both ends and exact there. Next to repeated knots, a fit to the
     positions alone has a third derivative many times as large as that of the samples.
     """
-    _, apart = np.unique(at, return_index=True)
+    _, apart = np.unique(np.round(at / BASIS.same_instant), return_index=True)
     motion = make_interp_spline(at[apart], samples[apart], k=DEGREE)
     # The samples may miss short spans.
     nodes, _ = quadrature(knots, 3)

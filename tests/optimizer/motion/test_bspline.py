@@ -307,9 +307,11 @@ def test_a_smooth_fit_keeps_positions_and_jerk_where_knots_are_repeated() -> Non
     assert np.abs(space.at_grid[2] @ alone).max() > 10 * peak
 
 
-def test_a_smooth_fit_takes_samples_at_the_same_instant() -> None:
+@pytest.mark.parametrize("apart", [0.0, 1e-13, 1e-10])
+def test_a_smooth_fit_takes_samples_at_the_same_instant(apart: float) -> None:
     space = SPACES["graded twice"]
-    at = np.sort(np.append(np.linspace(0.0, 1.0, 51), [0.5, 1.0]))
+    near = [0.5 + apart, 0.5 + 2 * apart, 0.5 + 3 * apart, 1.0 - apart]
+    at = np.sort(np.append(np.linspace(0.0, 1.0, 51), near))
     samples = quintic.fraction(at)[:, None]
     fitted = bspline.smooth_fit(samples, at, space.knots)
     # every space contains the quintic
