@@ -97,6 +97,12 @@ def add_inertials(
 
 def _refuse_without_effect(description: Description, known: float) -> None:
     """Refuses a total mass or a density where no mass is estimated, `known` [kg] being all."""
+    if not known > 0:
+        raise InvalidArm(
+            "meshes",
+            "No moving link has an <inertial>, or a shape that can be read: give the mesh files, "
+            "or an <inertial> in the URDF.",
+        )
     has = f"Every link with a shape has an <inertial>, {known:.4g} kg in all"
     if description.density is not None:
         raise InvalidArm("density", f"{has}: leave the density out.")

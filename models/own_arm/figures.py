@@ -4,6 +4,7 @@ arm."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
 _PLACEMENT = "x, y, z, roll, pitch, yaw"
+ALIGNED = 1e-6
+"""Distance [m] and sine of the angle between axes below which they are one line."""
 LEVEL = 1e-6
 """Deviation of gravity [m/s²] below which a base is upright: rounding of angles."""
 
@@ -51,7 +54,7 @@ def own_figures(
     """
     chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
-    warnings = _chain_warnings(chain)
+    warnings = [*_chain_warnings(chain), *_shared_axes(chain, upright)]
     problems = Problems()
     with problems.noted():
         inertials = _inertials(description, chain, upright, warnings)
@@ -114,6 +117,17 @@ def _chain_warnings(chain: Chain) -> list[str]:
             "stand, so that the axes are not at right angles. Write 1.5708 and 3.1416 if they are."
         )
     return warnings
+
+
+def _shared_axes(chain: Chain, upright: UprightChain) -> list[str]:
+    """Warnings of neighbouring joints that turn about one line."""
+    return [
+        f"Joints {first!r} and {second!r} turn about one line, whatever the configuration: an "
+        "<origin> or an <axis> of the URDF is likely wrong, or the second joint is no part of the "
+        "arm. Poses are then held on self-motions, and most are refused as singular."
+        for (first, second), T in zip(pairwise(chain.joints), upright.placements[1:], strict=True)
+        if np.hypot(*T.translation[:2]) < ALIGNED and np.hypot(*T.rotation[:2, 2]) < ALIGNED
+    ]
 
 
 def _link_names(chain: Chain) -> list[str]:

@@ -10,11 +10,8 @@ import numpy as np
 from joulepath.models.own_arm.description import Drives
 from joulepath.models.own_arm.robot_xml import number
 from joulepath.models.own_arm.rules import RULES
-from joulepath.models.own_arm.urdf_tree import listed, name_of, soft_range
+from joulepath.models.own_arm.urdf_tree import READ, listed, name_of, soft_range
 from joulepath.models.robot import Array
-
-READ = ("link", "joint", "material")
-"""Elements of a URDF that are read; a material has no physical meaning."""
 
 
 @dataclass(frozen=True)

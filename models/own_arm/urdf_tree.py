@@ -19,6 +19,9 @@ from joulepath.models.uploads.limits import Checkpoint
 DEFINITIONS = ("xacro:property", "xacro:arg", "xacro:macro")
 """Elements of xacro that add nothing to an arm that does not use them."""
 
+READ = ("link", "joint", "material")
+"""Elements of a URDF that are read; a material has no physical meaning."""
+
 CONTINUOUS = 2 * math.pi
 """Range of a continuous joint to either side [rad]: one turn."""
 
@@ -125,7 +128,9 @@ def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
     for unused in [each for each in root if each.tag in DEFINITIONS]:
         root.remove(unused)
     # Comments are not in the tree: generated files quote their macros there.
-    if any(_is_xacro(each) for each in root.iter()):
+    # A simulator's element may have an expression that its plug-in resolves.
+    used = [each for part in root if part.tag in READ for each in part.iter()]
+    if any(_is_macro(each) for each in root) or any(map(_has_macro, used)):
         refuse(
             "urdf", "This is xacro: make a URDF of it first, by `xacro arm.urdf.xacro > arm.urdf`."
         )
@@ -134,10 +139,15 @@ def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
     return root
 
 
-def _is_xacro(element: Element) -> bool:
-    """Whether an element still has a macro or an expression."""
-    texts = (*element.attrib.values(), element.text or "", element.tail or "")
-    return element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in texts)
+def _is_macro(element: Element) -> bool:
+    return element.tag.startswith("xacro:")
+
+
+def _has_macro(element: Element) -> bool:
+    """Whether an element is a macro, or has an expression in an attribute."""
+    return _is_macro(element) or any(
+        "${" in text or "$(" in text for text in element.attrib.values()
+    )
 
 
 def restore_rounded(joint: Element) -> float:

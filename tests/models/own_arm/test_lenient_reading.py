@@ -53,6 +53,12 @@ def test_the_arm_is_the_same_without_a_name_and_with_unused_xacro(opening: str) 
     assert (flange(robot(given), q) == flange(robot(PLAIN), q)).all()
 
 
+def test_an_expression_in_an_element_without_effect_is_no_xacro() -> None:
+    plugin = '<gazebo reference="${a}"><plugin><file>$(find arm)/a.yaml</file></plugin></gazebo>'
+    given = replace(PLAIN, urdf=PLAIN.urdf.replace("</robot>", f"{plugin}</robot>"))
+    assert own_figures("mine", given)[0] == own_figures("mine", PLAIN)[0]
+
+
 @pytest.mark.parametrize("used", ["${length}", "$(find arm)"])
 def test_xacro_in_use_is_refused(used: str) -> None:
     urdf = PLAIN.urdf.replace('xyz="0 0 0.4"', f'xyz="0 0 {used}"')

@@ -14,7 +14,7 @@ from joulepath.models.own_arm.holding_torques import HoldingTorques
 from joulepath.models.own_arm.urdf_chain import chain_of
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.urdf import urdf_of
-from tests.models.own_arm.arms import PLAIN, robot
+from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, robot
 
 CAUSES = (
     "is implausible",
@@ -23,6 +23,18 @@ CAUSES = (
     "is it a placeholder",
     "centre of mass is",
 )
+
+
+def test_joints_that_turn_about_one_line() -> None:
+    """As in a file whose exporter lost an axis."""
+    lost = RICH.replace(
+        '<origin xyz="0.05 0 0.3" rpy="1.5707963267948966 0.3 0"/><axis xyz="1 1 0.5"/>',
+        '<origin xyz="0 0 0.3"/><axis xyz="0 0 1"/>',
+    )
+    assert lost != RICH
+    found = own_figures("mine", replace(RICH_ARM, urdf=lost))[1]
+    assert any(each.startswith("Joints 'pan' and 'elbow' turn about one line") for each in found)
+    assert not any("one line" in each for each in own_figures("mine", RICH_ARM)[1])
 
 
 def doubts(description: Description) -> list[str]:
