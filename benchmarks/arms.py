@@ -3,19 +3,28 @@ reason that is true.
 
     python -m benchmarks.arms --count 10
     python -m benchmarks.arms --count 200 --robots panda gen3
+    python -m benchmarks.arms ~/ros/src/*_description/urdf/*.urdf --packages ~/ros/src
 
-Starts the service with its default settings and sends the same number of requests for each robot.
-Answers are checked as in `benchmarks.requests`. Both ends of a request are drawn free of
-collisions, so that there is one true reason to refuse it: that the motors cannot hold the arm
-there. The exit code is 1 if an answer or a refusal is wrong.
+Without files, it starts the service with its default settings and sends the same number of requests
+for each robot. Answers are checked as in `benchmarks.requests`. Both ends of a request are drawn
+free of collisions, so that there is one true reason to refuse it: that the motors cannot hold the
+arm there. The exit code is 1 if an answer or a refusal is wrong.
+
+With URDF files, or files with xacro macros, it prints one line per file: why it is refused, or its
+inverse kinematics and one certified motion from pose to pose, written for ROS 2; see `arm_files`.
+The exit code is then 1 if reading or
+solving ends in an error that no class declares.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+from benchmarks.arm_files import ArmOutcome, first_motion
 from benchmarks.checks import refusal_errors
 from benchmarks.command import parser, write_json
 from benchmarks.requests import Outcome, send_all
@@ -64,15 +73,43 @@ def of_robot(
     return row(name, send_all(service, tasks))
 
 
+def of_files(given: argparse.Namespace) -> int:
+    """Prints a line per URDF file, and the counts."""
+    outcomes = list[ArmOutcome]()
+    arguments = dict(each.split("=", 1) for each in given.arguments)
+    failed = 0
+    for file in given.files:
+        try:
+            outcomes.append(first_motion(file, given.packages, arguments, given.seed))
+            print(outcomes[-1], flush=True)
+        except Exception as error:
+            failed += 1
+            print(f"FAILED: {file}: {type(error).__name__}: {error}", flush=True)
+    read = sum(each.is_read for each in outcomes)
+    answered = sum(bool(each.status) for each in outcomes)
+    print(f"{read} of {len(given.files)} files read, {answered} answered, {failed} failed")
+    write_json(given.json, {"outcomes": outcomes})
+    return 1 if failed else 0
+
+
 def main() -> int:
     """Runs the requests and prints a line per robot."""
     arguments = parser(__doc__, seed=4)
+    arguments.add_argument("files", nargs="*", type=Path, help="URDF files, or files with macros")
+    arguments.add_argument(
+        "--packages", nargs="+", type=Path, default=[], help="folders with ROS packages"
+    )
+    arguments.add_argument(
+        "--arguments", nargs="+", default=[], metavar="NAME=VALUE", help="of files with macros"
+    )
     arguments.add_argument("--count", type=int, default=10, help="requests per robot (%(default)s)")
     arguments.add_argument(
         "--robots", nargs="+", choices=robot_names(), default=robot_names(), help="(all)"
     )
     arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
     given = arguments.parse_args()
+    if given.files:
+        return of_files(given)
     for name in given.robots:
         compile_kernel(load_robot(name))
     rows = []
