@@ -215,7 +215,7 @@ class Robot:
     @property
     def T_last_flange(self) -> Array:
         """Pose (4, 4) of the flange in the frame of the last link."""
-        return np.asarray(self.model.frames[self.model.getFrameId("flange")].placement.homogeneous)
+        return np.asarray(flange_placement(self.model).homogeneous)
 
     @property
     def friction(self) -> FrictionLaw:
@@ -251,11 +251,16 @@ class Robot:
             body = model.inertias[i]
             model.inertias[i] = pin.Inertia(scale * body.mass, body.lever, scale * body.inertia)
         last = model.njoints - 1
-        flange = model.frames[model.getFrameId("flange")].placement
+        flange = flange_placement(model)
         body = pin.Inertia(mass, np.asarray(com, dtype=float), np.asarray(inertia, dtype=float))
         model.inertias[last] = model.inertias[last] + flange.act(body)
         model.gravity.linear = np.asarray(gravity, dtype=float)
         return model
+
+
+def flange_placement(model: pin.Model) -> pin.SE3:
+    """Pose of the flange in the frame of the last link; a joint may have its name, too."""
+    return model.frames[model.getFrameId("flange", pin.FrameType.BODY)].placement
 
 
 def link_names(model: pin.Model) -> tuple[str, ...]:

@@ -312,9 +312,9 @@ def _for_pinocchio(root: Element) -> tuple[Element, float]:
         if joint.get("type") in (FIXED, "floating", "planar"):
             continue
         limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
-        limit.attrib.update(
-            {"lower": "0", "upper": "0", "effort": "0", "velocity": "0"} | limit.attrib
-        )
+        limit.attrib.update({"lower": "0", "upper": "0"} | limit.attrib)
+        # read by `joint_range`; a negative one would be refused
+        limit.attrib.update({"effort": "0", "velocity": "0"})
         if joint.get("type") == "continuous":
             joint.set("type", "revolute")
             limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})

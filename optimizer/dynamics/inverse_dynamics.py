@@ -9,6 +9,8 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
+from joulepath.models.robot import flange_placement
+
 _Z = ca.DM([0, 0, 1])
 
 
@@ -154,7 +156,7 @@ def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int
     mass, moment = scale * link_mass, scale * (link_mass * com)
     inertia = scale * _about_origin(link_mass, com, ca.SX(_tidy(body.inertia)))
     if i == model.njoints - 1:
-        flange = model.frames[model.getFrameId("flange")].placement
+        flange = flange_placement(model)
         R = _tidy(flange.rotation)
         load_com = R @ payload.com + _tidy(flange.translation)
         ixx, ixy, ixz, iyy, iyz, izz = ca.vertsplit(payload.inertia)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import joulepath.models.robot
-from joulepath.models.robot import Robot
+from joulepath.models.robot import Robot, flange_placement
 from joulepath.optimizer.dynamics import inverse_dynamics, kernel_expressions, kernel_source, losses
 from joulepath.optimizer.dynamics.kernel_expressions import SYMBOLICS, build
 from joulepath.optimizer.dynamics.kernel_source import PORTABLE, VectorUnit, source, widest_vectors
@@ -50,7 +50,7 @@ def digest(robot: Robot, vectors: VectorUnit) -> str:
         h.update(Path(path).read_bytes())
     h.update(repr((version("casadi"), COMPILER_FLAGS, vectors, os.uname().machine)).encode())
     h.update(repr(robot.has_load_friction).encode())
-    flange = robot.model.frames[robot.model.getFrameId("flange")].placement
+    flange = flange_placement(robot.model)
     constants = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
     constants += [body.toDynamicParameters() for body in robot.model.inertias]
     for constant in constants:

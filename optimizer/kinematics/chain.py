@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, flange_placement
 from joulepath.optimizer.kinematics.forward import joint_placements
 
 
@@ -42,7 +42,7 @@ class Chain:
     @classmethod
     def of(cls, model: pin.Model) -> Chain:
         """Chain of a Pinocchio model with a frame `flange`."""
-        flange = model.frames[model.getFrameId("flange")].placement
+        flange = flange_placement(model)
         return cls(joint_placements(model), np.asarray(flange.homogeneous))
 
     @property

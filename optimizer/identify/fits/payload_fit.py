@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array, Robot, flange_placement
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, rigid_torques
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.friction_columns import columns
@@ -289,7 +289,7 @@ def _payload_of_body(robot: Robot, log: int, body: Array, spread: Array) -> Iden
         spread: covariance (4, 4) of mass and first moments.
     """
     min_mass = PAYLOAD_FIT.min_mass
-    flange = robot.model.frames[robot.model.getFrameId("flange")].placement
+    flange = flange_placement(robot.model)
     mass = float(body[0])
     sd = float(np.sqrt(spread[0, 0]))
     if mass < -max(3 * sd, min_mass):

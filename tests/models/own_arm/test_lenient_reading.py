@@ -53,6 +53,16 @@ def test_the_arm_is_the_same_without_a_name_and_with_unused_xacro(opening: str) 
     assert (flange(robot(given), q) == flange(robot(PLAIN), q)).all()
 
 
+def test_a_joint_named_flange_and_negative_efforts() -> None:
+    """The sign of an effort has no meaning, and a name no other one than in the file."""
+    named = PLAIN.urdf.replace('"elbow"', '"flange"').replace('effort="40"', 'effort="-40"')
+    found, plain = robot(replace(PLAIN, urdf=named)), robot(PLAIN)
+    q = np.array([0.3, -0.7])
+    assert (flange(found, q) == flange(plain, q)).all()
+    assert found.joint_names[1] == "flange"
+    assert (found.limits.tau_max == plain.limits.tau_max).all()
+
+
 def test_an_expression_in_an_element_without_effect_is_no_xacro() -> None:
     plugin = '<gazebo reference="${a}"><plugin><file>$(find arm)/a.yaml</file></plugin></gazebo>'
     given = replace(PLAIN, urdf=PLAIN.urdf.replace("</robot>", f"{plugin}</robot>"))

@@ -39,7 +39,7 @@ def flange(robot: Robot, q: Array) -> Array:
     """Flange pose T_base_flange (4, 4) by Pinocchio."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, q)
-    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
+    return np.asarray(data.oMf[robot.model.getFrameId("flange", pin.BODY)].homogeneous)
 
 
 def solved(robot: Robot, q: Array) -> Solved:
