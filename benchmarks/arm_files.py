@@ -57,8 +57,9 @@ class Assumed:
     """Payload [kg]."""
     velocity: float = 2.0
     """Speed limit [rad/s]."""
-    torque: float = 100.0
-    """Torque limit [N·m] for a file without efforts."""
+    torque: float = 1e4
+    """Torque limit [N·m] for a file without efforts: a placeholder for all arms but the largest, so
+    that friction and rotors are ruled from the torques that the arm needs."""
     placeholder: float = 1.0
     """Effort up to which that of a joint is a placeholder [N·m]."""
     deadline: float = 30.0
