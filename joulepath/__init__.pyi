@@ -68,6 +68,17 @@ from .optimizer.motion.spline import Spline
 from .optimizer.optimize import optimize
 from .optimizer.optimize_many import Optimized, optimize_many
 from .optimizer.pareto import pareto
+from .optimizer.placement.errors import NoPlacement
+from .optimizer.placement.place import place
+from .optimizer.placement.placement import WeightedCycle
+from .optimizer.placement.placement_solution import (
+    MapPoint,
+    PlacedPose,
+    PlacedRound,
+    PlacementSolution,
+    Tolerance,
+)
+from .optimizer.placement.region import Group, Moved, Places, Region
 from .optimizer.plan_cycle import plan_cycle
 from .optimizer.problem.arm import Arm, Inverter, Payload
 from .optimizer.problem.branches import BranchFilter
@@ -193,6 +204,7 @@ __all__ = [
     "Front",
     "FrontSolver",
     "GoalInCollision",
+    "Group",
     "HalfSpace",
     "IKSolution",
     "IKSolutions",
@@ -222,14 +234,17 @@ __all__ = [
     "LogReading",
     "LogReport",
     "LogTooLarge",
+    "MapPoint",
     "McapOptions",
     "MechanicalEnergy",
     "Mesh",
     "MethodNotApplicable",
     "Move",
+    "Moved",
     "MoveitOptions",
     "NoCollisionFreeTrajectory",
     "NoConfigurationFound",
+    "NoPlacement",
     "NoPowerChannel",
     "NoSequence",
     "NoTrajectory",
@@ -244,6 +259,10 @@ __all__ = [
     "PathInfeasible",
     "Payload",
     "PayloadUnknown",
+    "PlacedPose",
+    "PlacedRound",
+    "PlacementSolution",
+    "Places",
     "PlannedBaseline",
     "PlannedMotion",
     "PlannedTorques",
@@ -254,6 +273,7 @@ __all__ = [
     "RapidOptions",
     "RecordedRows",
     "Recording",
+    "Region",
     "Replay",
     "ReplayedChange",
     "ReplayedRun",
@@ -280,6 +300,7 @@ __all__ = [
     "StopPath",
     "StorageUse",
     "TableOptions",
+    "Tolerance",
     "Tool",
     "ToolCone",
     "ToolPath",
@@ -295,6 +316,7 @@ __all__ = [
     "Validation",
     "Voxels",
     "Waypoints",
+    "WeightedCycle",
     "WhatIf",
     "capsule_between",
     "compare",
@@ -308,6 +330,7 @@ __all__ = [
     "optimize",
     "optimize_many",
     "pareto",
+    "place",
     "plan_cycle",
     "read_log",
     "replay",

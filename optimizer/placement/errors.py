@@ -1,0 +1,47 @@
+"""Errors of placements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from joulepath.optimizer.declared import Count
+from joulepath.optimizer.exceptions import JoulepathError
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReasonCounts:
+    """Number of places without cycles, by the reason."""
+
+    reach: Count
+    """A stop, or a path of one, is out of reach."""
+    collision: Count
+    """Every configuration at a stop is in collision, or no way past the obstacles was found."""
+    torque: Count
+    """A joint has too little torque to hold the load."""
+    time: Count
+    """The cycles take longer than their `time` allows."""
+    motion: Count
+    """No motion within the limits was found between two stops."""
+
+
+@dataclass(eq=False)
+class NoPlacement(JoulepathError):
+    """The cycles can be run at no place of the region that was tried, the nominal one included."""
+
+    title = "No place found"
+    remedy = (
+        "Widen the region, give a finer `resolution`, or see by `POST /cycle` what is wrong at the "
+        "nominal place."
+    )
+
+    reasons: ReasonCounts
+    """Why not, at all places that were tried."""
+    nominal: str
+    """What is wrong at the nominal place."""
+
+    def __str__(self) -> str:
+        tried = sum(vars(self.reasons).values())
+        return (
+            f"The cycles can be run at none of the {tried} places that were tried. At the nominal "
+            f"place: {self.nominal}"
+        )

@@ -1,0 +1,177 @@
+"""Public entry point: `place(cycle, region)` finds where to put the robot."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.deadline import Clock
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.placement.placement import Placement, WeightedCycle
+from joulepath.optimizer.placement.placement_search import PlacementSearch
+from joulepath.optimizer.placement.placement_solution import (
+    MapPoint,
+    PlacedPose,
+    PlacedRound,
+    PlacementSolution,
+    Tolerance,
+)
+from joulepath.optimizer.placement.region import Group, Moved, Places, Region
+from joulepath.optimizer.placement.rounds import Round
+from joulepath.optimizer.placement.space import Place, Space
+from joulepath.optimizer.presentation.progress_bar import progress_bar
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.progress import Tell, no_listener, only_news
+
+
+def place(
+    cycle: Cycle | Sequence[WeightedCycle],
+    region: Region | Places | None = None,
+    *,
+    moves: Literal["base"] | Group | Sequence[Moved] = "base",
+    base: Array | None = None,
+    resolution: float | None = None,
+    deadline: float = 120.0,
+    clock: Clock = time.perf_counter,
+    tell: Tell = no_listener,
+    progress: bool = True,
+) -> PlacementSolution:
+    """Find the place of the robot, or of stops and obstacles around it, at which cycles need the
+    least energy.
+
+    The nominal place is computed first, so that the answer never needs more than it. Places that
+    the arm cannot reach, and those with a bound above the best energy, take no time of those that
+    may be better.
+
+    Args:
+        cycle: the cycle, or several of one robot with how often each runs. Poses, obstacles,
+            directions and gravity are in the world.
+        region: where the base may be, or by how much the group may be moved; None with a list of
+            `moves`.
+        moves: "base", a group of stops and obstacles, or several bodies with a region each.
+        base: nominal pose of the robot base in the world, shape (4, 4); None for the identity, so
+            that poses in the base frame are poses in the world.
+        resolution: distance between the places of the map [m]; None for about 100 places.
+        deadline: limit of the wall time [s].
+        clock: function that returns the time [s].
+        tell: gets the progress: places of the map as candidates, and the best place so far.
+        progress: whether a bar may show the progress, as of `optimize`.
+
+    Returns:
+        Best and nominal place with their certified cycles, the map, tolerance and lower bound.
+
+    Raises:
+        InvalidProblem: a field is malformed, or the nominal place is not in the region.
+        NoPlacement: the cycles can be run at no place that was tried.
+        DeadlineExceeded: the deadline passed before any place was decided.
+    """
+    cycles = [WeightedCycle(cycle)] if isinstance(cycle, Cycle) else cycle
+    asked = Placement(
+        cycles=cycles,
+        moved=_moved(region, moves),
+        base=np.eye(4) if base is None else base,
+        resolution=resolution,
+        deadline=deadline,
+    )
+    return place_robot(asked, clock, tell, progress)
+
+
+def place_robot(
+    placement: Placement,
+    clock: Clock = time.perf_counter,
+    tell: Tell = no_listener,
+    progress: bool = True,
+) -> PlacementSolution:
+    """The solution of a placement; the arguments and errors are those of `place`."""
+    with one_thread(), progress_bar("Placing the robot", tell, progress) as tell:
+        began = clock()
+        search = PlacementSearch(placement, clock, only_news(tell))
+        search.run()
+        return _solution(search, clock() - began)
+
+
+def _moved(
+    region: Region | Places | None, moves: Literal["base"] | Group | Sequence[Moved]
+) -> Sequence[Moved]:
+    if isinstance(moves, Group | str):
+        if region is None:
+            raise InvalidProblem("region", "Say where the place may be: give a region.")
+        return [Moved(region, moves)]
+    if region is not None:
+        raise InvalidProblem(
+            "region", "Each of several bodies has a region of its own: leave region out."
+        )
+    return moves
+
+
+def _solution(search: PlacementSearch, wall_time: float) -> PlacementSolution:
+    space, best, nominal = search.space, search.best, search.nominal
+    assert best is not None
+    left_out = search.left_out
+    return PlacementSolution(
+        best=_placed(search, best),
+        nominal=None if nominal.energy is None else _placed(search, nominal),
+        nominal_reason=nominal.reason,
+        map=[_point(space, each) for each in search.map],
+        resolution=search.resolution,
+        tolerance=_tolerance(search),
+        lower_bound=search.lower_bound,
+        status="complete" if search.is_refined and not left_out else "cut_short",
+        evaluated=search.evaluated,
+        left_out=left_out,
+        wall_time=wall_time,
+        objective=space.placement.objective,
+    )
+
+
+def _placed(search: PlacementSearch, found: Round) -> PlacedRound:
+    assert found.energy is not None
+    return PlacedRound(
+        **_poses(search.space, found.place),
+        energy=found.energy,
+        duration=search.duration(found),
+        solutions=found.solutions,
+    )
+
+
+def _point(space: Space, found: Round) -> MapPoint:
+    return MapPoint(
+        **_poses(space, found.place),
+        energy=found.energy,
+        lower_bound=found.bound,
+        reason=found.reason,
+    )
+
+
+def _poses(space: Space, at: Place) -> dict[str, Any]:
+    groups = [
+        pose
+        for moved, pose in zip(space.placement.moved, at.poses, strict=True)
+        if isinstance(moved.moves, Group)
+    ]
+    return {
+        "base": placed_pose(space.base(at)),
+        "mount": space.mount(at),
+        "offsets": [placed_pose(pose) for pose in groups],
+    }
+
+
+def placed_pose(T: Array) -> PlacedPose:
+    """A pose (4, 4) as position and quaternion."""
+    quaternion = Rotation.from_matrix(T[:3, :3]).as_quat()
+    return PlacedPose(position=T[:3, 3].tolist(), quaternion=quaternion.tolist())
+
+
+def _tolerance(search: PlacementSearch) -> list[Tolerance] | None:
+    if search.tolerance is None:
+        return None
+    return [
+        Tolerance(body=axis.body, coordinate=axis.name, lower=float(lower), upper=float(upper))
+        for axis, (lower, upper) in zip(search.space.axes, search.tolerance, strict=True)
+    ]

@@ -1,0 +1,287 @@
+"""Search for the place of least energy: reach first, then bounds, then rounds, then refinement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import get_args
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.cycle.known_motions import KnownMotions
+from joulepath.optimizer.deadline import Clock, Deadline, end_if_stopped
+from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
+from joulepath.optimizer.placement.placement import Placement
+from joulepath.optimizer.placement.refinement import PATTERN, Box, refined
+from joulepath.optimizer.placement.region_bound import region_bound
+from joulepath.optimizer.placement.rounds import Reason, Round, Rounds
+from joulepath.optimizer.placement.space import Place, Space
+from joulepath.optimizer.placement.tolerances import tolerances
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell
+
+
+@dataclass(frozen=True)
+class PlacementSearchSettings:
+    """Settings of the search; the shares are of the deadline."""
+
+    nominal: float = 0.5
+    """Share until which the nominal place is computed."""
+    checked: float = 0.25
+    """Share of the time then left for checks of the map's places for reach and bound."""
+    promising: float = 0.6
+    """Share until which places are computed that may be better than the best one."""
+    refined: float = 0.8
+    """Share until which the best places are refined."""
+    mapped: float = 0.92
+    """Share until which the rest of the map is computed."""
+    measured: float = 0.97
+    """Share until which the tolerance is computed."""
+    usual_times: float = 6.0
+    """Multiple of the mean time of a round that any round may take, so that one place among
+    obstacles does not take the time of many."""
+    least_time: float = 1.0
+    """Time that any round may take [s]."""
+    starts: int = 3
+    """Most places of the map from which the search is refined."""
+    near_best: float = 0.05
+    """Share of the least energy above it up to which a place of the map is refined."""
+    same: float = 1e-6
+    """Relative difference of energies below which a bound excludes a better place."""
+
+
+SEARCH = PlacementSearchSettings()
+
+
+class PlacementSearch:
+    """Search for one placement.
+
+    Args:
+        placement: the request.
+        clock: function that returns the time [s].
+        tell: gets the progress: places of the map as candidates, and the best place so far.
+
+    Raises:
+        InvalidProblem: the nominal place is not in a region, or there are too many places.
+    """
+
+    def __init__(self, placement: Placement, clock: Clock, tell: Tell) -> None:
+        self.space, self.tell = Space.of(placement), tell
+        self.clock, self.deadline = clock, placement.deadline
+        self.end = Deadline.after(placement.deadline, clock)
+        self.rounds = Rounds(self.space, clock)
+        self.points, self.resolution = self.space.map()
+        self.map = [Round(place) for place in self.points]
+        self.lower_bound = region_bound(self.space)
+        self.spacing = self.space.spacing(self.resolution)
+        axes = self.space.axes
+        self.box = Box(
+            np.array([axis.low for axis in axes]),
+            np.array([axis.high for axis in axes]),
+            np.array([axis.scale for axis in axes]),
+        )
+        self.evaluated, self._times = 0, list[float]()
+        self._memo: dict[tuple[tuple[int, ...], bytes], Round] = {}
+        self._known = KnownMotions()
+        self.best: Round | None = None
+        self.nominal: Round
+        self.tolerance: Array | None = None
+        self.is_refined = False
+
+    def run(self) -> None:
+        """Fill the map, and find the best place.
+
+        Raises:
+            NoPlacement: there are cycles at no place.
+            DeadlineExceeded: the deadline passed before any place was decided.
+        """
+        self.tell(CandidatesFound(len(self.points)))
+        self.nominal = self._solved(self.space.nominal, self._until(SEARCH.nominal), compared=True)
+        self._check_points()
+        self._solve_points(self._until(SEARCH.promising), only_better=True)
+        if self.best is not None:
+            self._refine(self._until(SEARCH.refined))
+        self._solve_points(self._until(SEARCH.mapped), only_better=False)
+        if self.best is None:
+            raise self._no_place()
+        if not self.is_refined:
+            self._refine(self._until(SEARCH.refined))
+        self._measure(self._until(SEARCH.measured))
+        self._compare()
+
+    @property
+    def left_out(self) -> int:
+        """Number of places of the map without a decision."""
+        return sum(not each.is_decided for each in self.map)
+
+    def _until(self, share: float) -> Deadline:
+        """The instant at a share of the deadline."""
+        return self.end.earlier_by((1 - share) * self.deadline)
+
+    @property
+    def _least(self) -> float:
+        """Least energy found [J]; inf without one."""
+        return np.inf if self.best is None or self.best.energy is None else self.best.energy
+
+    def _may_be_better(self, found: Round) -> bool:
+        """Whether no bound excludes that a place is better than the best one."""
+        return found.bound is None or found.bound < self._least * (1 - SEARCH.same)
+
+    def _solved(self, place: Place, end: Deadline, compared: bool = False) -> Round:
+        """The rounds at a place, known ones or new ones; the best are kept."""
+        end_if_stopped()
+        key = place.choice, np.round(place.x, 9).tobytes()
+        if key in self._memo:
+            return self._memo[key]
+        if not compared and self._times:
+            usual = SEARCH.usual_times * float(np.mean(self._times))
+            end = end.within(max(SEARCH.least_time, usual))
+        known, began = KnownMotions(), self.clock()
+        found = self.rounds.solved(place, end, known, compared)
+        self.evaluated += 1
+        if found.is_decided:
+            self._times.append(self.clock() - began)
+            self._memo[key] = replace(found, solutions=(), error=None)
+        if found.energy is not None and found.energy < self._least:
+            self.best, self._known = found, known
+            self.tell(Improved(found.energy, self.duration(found), self.lower_bound))
+        return found
+
+    def duration(self, found: Round) -> float:
+        """Duration of the cycles at a place, times their weights [s]."""
+        return sum(
+            weight * each.duration
+            for weight, each in zip(self.rounds.weights, found.solutions, strict=True)
+        )
+
+    def _check_points(self) -> None:
+        """Check the places of the map for reach and bound, coarsely first."""
+        end = self.end.within(SEARCH.checked * self.end.left)
+        for k in _coarse_first(len(self.points)):
+            end_if_stopped()
+            if end.passed:
+                return
+            self.map[k] = self.rounds.checked(self.points[k], end)
+            if self.map[k].reason is not None:
+                self._tell_point(k)
+
+    def _solve_points(self, end: Deadline, only_better: bool) -> None:
+        """Compute the places of the map, the one with the least bound first."""
+        open_ = [k for k, each in enumerate(self.map) if not each.is_decided]
+        for k in sorted(open_, key=lambda k: self.map[k].bound or 0.0):
+            if end.passed:
+                return
+            if only_better and not self._may_be_better(self.map[k]):
+                continue
+            bound = self.map[k].bound
+            found = self._solved(self.points[k], end)
+            self.map[k] = replace(found, solutions=(), error=None)
+            if not found.is_decided:
+                self.map[k] = Round(self.points[k], bound=bound)
+                continue
+            self._tell_point(k)
+
+    def _tell_point(self, k: int) -> None:
+        found = self.map[k]
+        failed = found.energy is None
+        self.tell(CandidateTried(k, "failed" if failed else "solved", found.bound, found.energy))
+
+    def _refine(self, end: Deadline) -> None:
+        """Refine the best places of the map, and of all that were tried."""
+        if end.passed:
+            return
+        for start in self._starts():
+            choice = start.place.choice
+
+            def energy(x: Array, choice: tuple[int, ...] = choice) -> float | None:
+                return self._energy(self.space.place(choice, x), end)
+
+            assert start.energy is not None
+            step = PATTERN.first_step * self.spacing
+            _, ended = refined(energy, start.place.x, start.energy, self.box, step)
+            if not ended:
+                return
+        self.is_refined = True
+
+    def _starts(self) -> Iterator[Round]:
+        """Places to refine from: the best one, then others far from all before."""
+        taken = list[Place]()
+        found = [each for each in self._memo.values() if each.energy is not None]
+        for each in sorted(found, key=lambda each: each.energy or 0.0):
+            assert each.energy is not None
+            most = self._least + SEARCH.near_best * abs(self._least)
+            if len(taken) == SEARCH.starts or each.energy > most:
+                return
+            if any(self._is_near(each.place, other) for other in taken):
+                continue
+            taken.append(each.place)
+            yield each
+            assert self.best is not None
+            taken.append(self.best.place)
+
+    def _is_near(self, a: Place, b: Place) -> bool:
+        """Whether two places are neighbours on the map."""
+        same = a.choice == b.choice
+        return same and bool((np.abs(a.x - b.x) <= 1.5 * self.spacing).all())
+
+    def _energy(self, place: Place, end: Deadline) -> float | None:
+        """Energy at a place [J]: inf without cycles and where a bound excludes a better place.
+
+        Returns:
+            The energy; None if the time is up.
+        """
+        if end.passed:
+            return None
+        checked = self.rounds.checked(place, end)
+        if checked.reason is not None or not self._may_be_better(checked):
+            return np.inf
+        return self._energy_itself(place, end)
+
+    def _energy_itself(self, place: Place, end: Deadline) -> float | None:
+        """Energy at a place [J]: inf without cycles; None if the time is up."""
+        if end.passed:
+            return None
+        found = self._solved(place, end)
+        if not found.is_decided and end.left < 0:
+            return None
+        return np.inf if found.energy is None else found.energy
+
+    def _measure(self, end: Deadline) -> None:
+        """Find how precisely the best place must be kept."""
+        for _ in range(SEARCH.starts):
+            assert self.best is not None and self.best.energy is not None
+            place, least = self.best.place, self.best.energy
+
+            def energy(x: Array, choice: tuple[int, ...] = place.choice) -> float | None:
+                return self._energy_itself(self.space.place(choice, x), end)
+
+            self.tolerance = tolerances(energy, place.x, least, self.box, self.spacing / 2)
+            if self.best.place is place or self.tolerance is None:
+                return
+            # a farther place is better
+            self.tolerance = None
+            self._refine(end)
+
+    def _compare(self) -> None:
+        """Compute the best place once more, with baselines."""
+        assert self.best is not None and self.best.energy is not None
+        if self.best.place is self.nominal.place or self.end.passed:
+            return
+        found = self.rounds.solved(self.best.place, self.end, self._known, compared=True)
+        if found.energy is not None and found.energy <= self.best.energy * (1 + SEARCH.same):
+            self.best = found
+
+    def _no_place(self) -> NoPlacement | DeadlineExceeded:
+        reasons = [each.reason for each in [*self.map, self.nominal] if each.reason is not None]
+        if not reasons:
+            return DeadlineExceeded([])
+        counts = ReasonCounts(**{name: reasons.count(name) for name in get_args(Reason)})
+        return NoPlacement(counts, str(self.nominal.error))
+
+
+def _coarse_first(count: int) -> list[int]:
+    """The numbers below `count` in van der Corput's order, which is even wherever it ends."""
+    bits = max(count - 1, 1).bit_length()
+    order = (int(f"{k:0{bits}b}"[::-1], 2) for k in range(1 << bits))
+    return [k for k in order if k < count]

@@ -1,0 +1,187 @@
+"""The rounds at a place: the cycles of least energy, or the reason why there are none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from joulepath.optimizer.cycle.chains import LeastChain
+from joulepath.optimizer.cycle.cycle_search import CycleSearch
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.cycle.errors import CycleTooShort, NoSequence
+from joulepath.optimizer.cycle.known_motions import KnownMotions, knowing
+from joulepath.optimizer.deadline import Clock, Deadline
+from joulepath.optimizer.exceptions import (
+    DeadlineExceeded,
+    JoulepathError,
+    NoConfigurationFound,
+    NoTrajectory,
+    OutsideLimits,
+    SingularPose,
+    UnreachablePose,
+    UnreachableTargets,
+)
+from joulepath.optimizer.placement.space import Place, Space
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.progress import no_listener
+from joulepath.optimizer.search.errors import (
+    DurationTooShort,
+    InCollision,
+    NoCollisionFreeTrajectory,
+    PathInfeasible,
+    TorqueInfeasible,
+)
+
+Reason = Literal["reach", "collision", "torque", "time", "motion"]
+
+REASONS: tuple[tuple[type[JoulepathError], Reason], ...] = (
+    (UnreachablePose, "reach"),
+    (NoConfigurationFound, "reach"),
+    (SingularPose, "reach"),
+    (UnreachableTargets, "reach"),
+    (OutsideLimits, "reach"),
+    (PathInfeasible, "reach"),
+    (InCollision, "collision"),
+    (NoCollisionFreeTrajectory, "collision"),
+    (TorqueInfeasible, "torque"),
+    (CycleTooShort, "time"),
+    (DurationTooShort, "time"),
+    (NoSequence, "motion"),
+    (NoTrajectory, "motion"),
+)
+"""Reasons of the errors of cycles; the first class that an error belongs to counts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What was found at a place.
+
+    Attributes:
+        place: the place.
+        energy: objective of all cycles times their weights [J]; None without certified cycles.
+        solutions: the cycles; empty without them.
+        reason: why there are none; None if there are some, or if there was no time to look.
+        error: the error of the first cycle without a solution.
+        bound: lower bound of the objective at this place [J], where one is known.
+    """
+
+    place: Place
+    energy: float | None = None
+    solutions: tuple[CycleSolution, ...] = ()
+    reason: Reason | None = None
+    error: JoulepathError | None = None
+    bound: float | None = None
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the place has cycles, or a reason why not."""
+        return self.energy is not None or self.reason is not None
+
+
+def reason_of(error: JoulepathError) -> Reason | None:
+    """Why there is no cycle; None for an error that has nothing to do with the place."""
+    if isinstance(error, PathInfeasible) and any(
+        each.reason == "in_collision" for each in error.attempts
+    ):
+        return "collision"
+    return next((reason for kind, reason in REASONS if isinstance(error, kind)), None)
+
+
+class Rounds:
+    """Computes the rounds at places.
+
+    Args:
+        space: the places.
+        clock: function that returns the time [s].
+    """
+
+    def __init__(self, space: Space, clock: Clock) -> None:
+        self.space, self.clock = space, clock
+        self.weights = [each.weight for each in space.placement.cycles]
+
+    def checked(self, place: Place, end: Deadline) -> Round:
+        """Whether the stops can be reached at a place, and a lower bound.
+
+        Args:
+            place: the place.
+            end: deadline.
+
+        Returns:
+            A round with a reason, or with a bound alone. The bound is None where none is known for
+            all configurations.
+        """
+        total: float | None = 0.0
+        for weight, cycle in zip(self.weights, self.space.cycles(place), strict=True):
+            try:
+                bound = self._bound(replace(cycle, deadline=max(end.left, _LEAST)))
+            except DeadlineExceeded:
+                return Round(place)
+            except JoulepathError as error:
+                return _failed(place, error)
+            total = None if total is None or bound is None else total + weight * bound
+        return Round(place, bound=total)
+
+    def _bound(self, cycle: Cycle) -> float | None:
+        """Lower bound [J] of a cycle at its place; None where it costs as much as the cycle."""
+        if (
+            cycle.order is not None
+            or cycle.has_passes
+            or any(
+                True in stop.free_ends or (stop.path is not None and stop.path.split)
+                for stop in cycle.stops
+            )
+        ):
+            return None
+        search = CycleSearch(cycle, self.clock)
+        layers = [layer for leg in search.legs for layer in leg.layers]
+        if any(layer.sampled or not layer.complete for layer in layers):
+            return None
+        bound, nodes = LeastChain([leg.least_costs for leg in search.legs], cycle.closed).find()
+        return bound if nodes else None
+
+    def solved(
+        self, place: Place, end: Deadline, known: KnownMotions, compared: bool = False
+    ) -> Round:
+        """The rounds at a place.
+
+        Args:
+            place: the place.
+            end: deadline; what is certified until then counts.
+            known: memo of motions, which gets those found.
+            compared: whether to search for baselines.
+
+        Returns:
+            The round; without energy and reason if there was no time for all cycles.
+        """
+        found, energy = list[CycleSolution](), 0.0
+        cycles = self.space.cycles(place)
+        for k, (weight, cycle) in enumerate(zip(self.weights, cycles, strict=True)):
+            share = max(end.left / (len(cycles) - k), _LEAST)
+            asked = replace(cycle, deadline=min(cycle.deadline, share), with_baselines=compared)
+            try:
+                with knowing(known):
+                    solution = plan_cycle(asked, self.clock, no_listener, progress=False)
+            except DeadlineExceeded as error:
+                return Round(place, error=error)
+            except JoulepathError as error:
+                return _failed(place, error)
+            if not all(move.solution.certificate.valid for move in solution.moves):
+                return Round(place, error=NoTrajectory([]), reason="motion")
+            found.append(solution)
+            energy += weight * solution.energy.of(solution.objective)
+        bound = sum(
+            weight * each.lower_bound for weight, each in zip(self.weights, found, strict=True)
+        )
+        return Round(place, energy, tuple(found), bound=bound)
+
+
+_LEAST = 1e-3
+"""Least deadline of a cycle [s]."""
+
+
+def _failed(place: Place, error: JoulepathError) -> Round:
+    reason = reason_of(error)
+    if reason is None:
+        raise error
+    return Round(place, reason=reason, error=error)

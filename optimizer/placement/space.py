@@ -1,0 +1,347 @@
+"""The places of a placement: mounts or listed places, and the coordinates that are free."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import ceil
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.placement.moved_cycle import Offsets, cycle_at
+from joulepath.optimizer.placement.placement import Placement
+from joulepath.optimizer.placement.region import (
+    COORDINATES,
+    Coordinate,
+    Group,
+    Mount,
+    Places,
+    Region,
+)
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import START, Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.targets import members
+
+
+@dataclass(frozen=True)
+class MapSettings:
+    """Settings of the map."""
+
+    points: int = 100
+    """Most places of a map without a given resolution."""
+    most_points: int = 20_000
+    """Most places of any map, whose answer stays readable."""
+    lever: float = 0.15
+    """Yaw per length that a step of the map counts alike, as a lever [m]: the yaw of a base turns
+    the first joint alone, so a coarse step tells enough."""
+    fixed: float = 1e-9
+    """Length of a range up to which it is one value [m, rad]."""
+    vertical: float = 1e-6
+    """Sine of the angle from the vertical below which the base stands on the floor or hangs from
+    the ceiling."""
+    inside: float = 1e-9
+    """Distance beyond a range that is rounding [m, rad]."""
+
+
+MAP = MapSettings()
+
+FLOOR, WALL, CEILING = (
+    np.eye(3),
+    np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
+    np.diag([1.0, -1.0, -1.0]),
+)
+TILTS: dict[Mount, Array] = {"floor": FLOOR, "wall": WALL, "ceiling": CEILING}
+"""Rotations of a base at yaw 0, by its mount."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A free coordinate of a body: its range and nominal value [m, rad]."""
+
+    body: int
+    name: Coordinate
+    low: float
+    high: float
+    nominal: float
+
+    @property
+    def scale(self) -> float:
+        """Value of the coordinate that counts like a metre."""
+        return 1 / MAP.lever if self.name == "yaw" else 1.0
+
+    def values(self, resolution: float) -> Array:
+        """Values of a map, no farther apart than the resolution [m]."""
+        turn, length = 2 * np.pi, self.high - self.low
+        count = ceil(length / (resolution * self.scale) - MAP.inside) + 1
+        values = np.linspace(self.low, self.high, max(count, 2))
+        # the last value of a whole turn is the first one
+        is_turn = self.name == "yaw" and abs(length - turn) < MAP.inside
+        return values[:-1] if is_turn and len(values) > 2 else values
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place of everything that moves.
+
+    Attributes:
+        choice: number of the mount or of the listed place, of every body.
+        x: values of the free coordinates, shape (n,) [m, rad].
+        poses: pose of the base in the world, or offset of a group, shape (4, 4), of every body.
+    """
+
+    choice: tuple[int, ...]
+    x: Array
+    poses: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body that moves: its discrete choices, and the nominal values of its coordinates.
+
+    Attributes:
+        tilts: rotations (3, 3) at yaw 0; None for listed places.
+        places: listed poses (4, 4); None for ranges.
+        nominal: nominal coordinates x, y, z [m] and yaw [rad], shape (4,).
+        pivot: point about which a group turns, shape (3,) [m]; zero for the base.
+        mounts: names of the tilts; None where the nominal one has no name.
+    """
+
+    tilts: tuple[Array, ...] | None
+    places: tuple[Array, ...] | None
+    nominal: Array
+    pivot: Array
+    mounts: tuple[Mount | None, ...] = ()
+
+    @property
+    def choices(self) -> int:
+        """Number of the discrete choices; the first is the nominal one."""
+        return len(self.places if self.places is not None else self.tilts or ())
+
+    def pose(self, choice: int, values: Array) -> Array:
+        """The pose (4, 4) at coordinates (4,) [m, rad]."""
+        if self.places is not None:
+            return self.places[choice]
+        assert self.tilts is not None
+        turn, T = about_z(values[3]), np.eye(4)
+        T[:3, :3] = turn @ self.tilts[choice]
+        T[:3, 3] = values[:3] + self.pivot - turn @ self.pivot
+        return T
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """All places of a placement."""
+
+    placement: Placement
+    bodies: tuple[Body, ...]
+    axes: tuple[Axis, ...]
+
+    @classmethod
+    def of(cls, placement: Placement) -> Space:
+        """The places of a placement.
+
+        Raises:
+            InvalidProblem: the nominal place is not in a region, or it is the only place.
+        """
+        bodies, axes = list[Body](), list[Axis]()
+        for k, moved in enumerate(placement.moved):
+            body = _body(placement, k)
+            bodies.append(body)
+            if isinstance(moved.region, Region):
+                axes += _axes(placement, k, moved.region, body)
+        if not axes and all(body.choices == 1 for body in bodies):
+            raise InvalidProblem(
+                placement.field(0, "region"),
+                "The region has the nominal place alone: give a range of x, y, z or yaw, another "
+                "mount, or places.",
+            )
+        return cls(placement, tuple(bodies), tuple(axes))
+
+    @property
+    def choices(self) -> list[tuple[int, ...]]:
+        """All combinations of the discrete choices; the first is the nominal one."""
+        return list(product(*(range(body.choices) for body in self.bodies)))
+
+    @property
+    def nominal(self) -> Place:
+        """The nominal place."""
+        x = np.array([axis.nominal for axis in self.axes])
+        poses = [
+            np.eye(4) if isinstance(moved.moves, Group) else self.placement.base
+            for moved in self.placement.moved
+        ]
+        return Place((0,) * len(self.bodies), x, tuple(poses))
+
+    def place(self, choice: tuple[int, ...], x: Array) -> Place:
+        """The place with a discrete choice and values (n,) of the axes [m, rad]."""
+        poses = list[Array]()
+        for k, body in enumerate(self.bodies):
+            values = body.nominal.copy()
+            for axis, value in zip(self.axes, x, strict=True):
+                if axis.body == k:
+                    values[COORDINATES.index(axis.name)] = value
+            poses.append(body.pose(choice[k], values))
+        return Place(choice, np.array(x, dtype=float), tuple(poses))
+
+    def mount(self, place: Place) -> Mount | None:
+        """The mount of the base at a place; None where it has none."""
+        for moved, body, choice in zip(
+            self.placement.moved, self.bodies, place.choice, strict=True
+        ):
+            if moved.moves == "base" and body.mounts:
+                return body.mounts[choice]
+        return None
+
+    def base(self, place: Place) -> Array:
+        """Pose (4, 4) of the base in the world at a place."""
+        for moved, pose in zip(self.placement.moved, place.poses, strict=True):
+            if moved.moves == "base":
+                return pose
+        return self.placement.base
+
+    def cycles(self, place: Place) -> list[Cycle]:
+        """The cycles at a place, in the frame of the base."""
+        stops, obstacles = dict[str, Array](), dict[str, Array]()
+        for moved, pose in zip(self.placement.moved, place.poses, strict=True):
+            if isinstance(moved.moves, Group):
+                stops |= dict.fromkeys(moved.moves.stops, pose)
+                obstacles |= dict.fromkeys(moved.moves.obstacles, pose)
+        offsets: tuple[Offsets, Offsets] = stops, obstacles
+        base = self.base(place)
+        return [cycle_at(each.cycle, base, *offsets) for each in self.placement.cycles]
+
+    def map(self) -> tuple[list[Place], float]:
+        """The places of the map, and its resolution [m].
+
+        Raises:
+            InvalidProblem: the resolution gives too many places.
+        """
+        resolution = self.placement.resolution
+        if resolution is None:
+            resolution = self._resolution()
+        elif self._points(resolution) > MAP.most_points:
+            raise InvalidProblem(
+                "resolution",
+                f"This resolution gives {self._points(resolution)} places, of at most "
+                f"{MAP.most_points}: give a coarser one, or a smaller region.",
+            )
+        values = [axis.values(resolution) for axis in self.axes]
+        grid = [
+            self.place(choice, np.array(x)) for choice in self.choices for x in product(*values)
+        ]
+        return grid, resolution
+
+    def spacing(self, resolution: float) -> Array:
+        """Distances between neighbouring places of the map along the axes, shape (n,) [m, rad]."""
+        return np.array([axis.values(resolution)[1] - axis.low for axis in self.axes])
+
+    def _points(self, resolution: float) -> int:
+        counts = [len(axis.values(resolution)) for axis in self.axes]
+        return int(np.prod([len(self.choices), *counts]))
+
+    def _resolution(self) -> float:
+        """Finest resolution [m] with at most `MapSettings.points` places, if there is one."""
+        low, high = 0.0, max((axis.high - axis.low) / axis.scale for axis in self.axes or [_UNIT])
+        for _ in range(40):
+            middle = (low + high) / 2
+            low, high = (low, middle) if self._points(middle) <= MAP.points else (middle, high)
+        return high
+
+
+_UNIT = Axis(0, "x", 0.0, 1.0, 0.0)
+
+
+def about_z(angle: float) -> Array:
+    """Rotation matrix (3, 3) about z [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def yaw_of(R: Array) -> float:
+    """Angle [rad] about the world's z axis of a base with the rotation R (3, 3).
+
+    It is the angle of the x axis of a base on the floor or the ceiling, and of the z axis of any
+    other base.
+    """
+    along = R[:, 0] if np.hypot(R[0, 2], R[1, 2]) < MAP.vertical else R[:, 2]
+    return float(np.arctan2(along[1], along[0]))
+
+
+def mount_of(R: Array) -> Mount | None:
+    """The mount of a base with the rotation R (3, 3); None for a base that is tilted."""
+    if np.hypot(R[0, 2], R[1, 2]) < MAP.vertical:
+        return "floor" if R[2, 2] > 0 else "ceiling"
+    return "wall" if abs(R[2, 2]) < MAP.vertical else None
+
+
+def _body(placement: Placement, k: int) -> Body:
+    moved = placement.moved[k]
+    is_base = moved.moves == "base"
+    given = placement.base if is_base else np.eye(4)
+    if isinstance(moved.region, Places):
+        others = [pose for pose in moved.region.poses if not np.array_equal(pose, given)]
+        return Body(None, (given, *others), np.zeros(4), np.zeros(3))
+    if isinstance(moved.moves, Group):
+        return Body((np.eye(3),), None, np.zeros(4), _pivot(placement, moved.moves))
+    R = given[:3, :3]
+    yaw, mount = yaw_of(R), mount_of(R)
+    tilts: dict[Mount | None, Array] = {mount: about_z(-yaw) @ R}
+    mounts = moved.region.mounts
+    if mounts is not None and mount not in mounts:
+        raise InvalidProblem(
+            placement.field(k, "region.mounts"),
+            f"The nominal base is not in the region: its mount is {mount or 'none of them'}; "
+            "name it, too, or give another `base`.",
+        )
+    for name in mounts or ():
+        if name != mount:
+            tilts[name] = TILTS[name]
+    nominal = np.array([*given[:3, 3], yaw])
+    return Body(tuple(tilts.values()), None, nominal, np.zeros(3), tuple(tilts))
+
+
+def _axes(placement: Placement, k: int, region: Region, body: Body) -> Iterator[Axis]:
+    for name, nominal in zip(COORDINATES, body.nominal.tolist(), strict=True):
+        given = region.range_of(name)
+        if given is None:
+            continue
+        low, high = given
+        if name == "yaw":
+            # the equivalent yaw that is nearest to the middle of the range
+            turn = 2 * np.pi
+            nominal += turn * np.round(((low + high) / 2 - nominal) / turn)
+        if not low - MAP.inside <= nominal <= high + MAP.inside:
+            raise InvalidProblem(
+                placement.field(k, f"region.{name}"),
+                f"The nominal place is not in the region: its {name} is {nominal:.6g}, and the "
+                f"range is from {low:g} to {high:g}. Widen the range, or give another `base`.",
+            )
+        nominal = float(np.clip(nominal, low, high))
+        body.nominal[COORDINATES.index(name)] = nominal
+        if high - low > MAP.fixed:
+            yield Axis(k, name, low, high, nominal)
+
+
+def _pivot(placement: Placement, group: Group) -> Array:
+    """Mean position (3,) [m] of a group's stops; of its obstacles where it has no stops."""
+    cycles = [each.cycle for each in placement.cycles]
+    targets = [(START, cycle.start) for cycle in cycles]
+    targets += [(stop.name, stop.target) for cycle in cycles for stop in cycle.stops]
+    at: Sequence[Array] = [
+        each.T[:3, 3] if isinstance(each, Pose) else each.position
+        for name, target in targets
+        if name in group.stops
+        for each in members(target)
+        if isinstance(each, Pose | ConeOrientedPose)
+    ]
+    at = at or [
+        each.T_base_shape[:3, 3]
+        for cycle in cycles
+        for each in cycle.arm.scene.obstacles
+        if each.name in group.obstacles
+    ]
+    return np.asarray(np.mean(at, axis=0))
