@@ -29,6 +29,7 @@ from joulepath.app.api.jobs import route as jobs
 from joulepath.app.api.logs import route as logs
 from joulepath.app.api.optimize import route as optimize
 from joulepath.app.api.pareto import route as pareto
+from joulepath.app.api.placement import route as placement
 from joulepath.app.api.replay import route as replay
 from joulepath.app.api.report import route as report
 from joulepath.app.api.robots import route as robots
@@ -58,6 +59,7 @@ ROUTES = (
     compare,
     pareto,
     cycle,
+    placement,
     whatif,
     advice,
     evaluate,

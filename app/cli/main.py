@@ -22,6 +22,7 @@ from joulepath.app.cli.jobs import jobs
 from joulepath.app.cli.keys import keys
 from joulepath.app.cli.optimize import optimize
 from joulepath.app.cli.pareto import pareto
+from joulepath.app.cli.placement import placement
 from joulepath.app.cli.replay import replay
 from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
@@ -67,6 +68,7 @@ for command in (
     pareto,
     compare,
     cycle,
+    placement,
     evaluate,
     whatif,
     ik,

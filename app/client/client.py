@@ -78,6 +78,10 @@ class Client:
         """Find the cycle of least energy: `POST /cycle`."""
         return self._post("/cycle", request, fields)
 
+    def place(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
+        """Find where to put the robot: `POST /placement`."""
+        return self._post("/placement", request, fields)
+
     def evaluate(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
         """Compute the energy of a given motion: `POST /evaluate`."""
         return self._post("/evaluate", request, fields)

@@ -34,6 +34,10 @@ STAND_INS = {
 }
 """Descriptions of the stand-ins for bodies without a shape."""
 SHAPES = {TOOL: "tool.capsules", PAYLOAD: "payload.shape"}
+AT_EDGE = "The best place is at an end of the range of {}: a wider region may have a better one."
+JOINT_POSITIONS = (
+    "These stops are given by joint positions, which stay the same wherever the base stands: {}."
+)
 NO_DEFAULT_MOTION = (
     "No default motion of the robot's controller is known: `controller_default` is left out."
 )

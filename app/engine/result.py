@@ -28,6 +28,8 @@ class StoredAnswer:
     id: str
     body: bytes
     figures: AnswerFigures = field(default_factory=AnswerFigures)
+    kind: str | None = None
+    """Endpoint of the answer; None for that of all answers of its result."""
 
     @property
     def path(self) -> str:

@@ -21,6 +21,7 @@ _PAGES = {
     "/compare": "methods",
     "/pareto": "pareto",
     "/cycle": "cycle",
+    "/placement": "placement",
     "/whatif": "whatif",
     "/evaluate": "evaluate",
     "/replay": "replay",

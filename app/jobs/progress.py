@@ -7,7 +7,7 @@ import math
 from joulepath.app.store.job_events import Report
 from joulepath.optimizer.progress import CandidateTried, Event, Improved, only_news
 
-HEARD = ("cycle", "pareto")
+HEARD = ("cycle", "placement", "pareto")
 """Endpoints with long requests, whose progress is reported by events."""
 
 

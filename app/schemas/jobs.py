@@ -10,6 +10,7 @@ from pydantic import Tag
 from joulepath.app.api.compare.task import CompareRequest
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.pareto.task import ParetoRequest
+from joulepath.app.api.placement.request import PlacementRequest
 from joulepath.app.api.whatif.task import WhatifRequest
 from joulepath.app.schemas.common import Request, Response, by_field, described, part
 from joulepath.app.schemas.evaluate import EvaluateRequest
@@ -22,7 +23,9 @@ MOST_REQUESTS = 10_000
 """Most requests of one job."""
 JobState = Literal["waiting", "running", "done", "cancelling", "cancelled"]
 RequestState = Literal["waiting", "running", "done", "failed", "cancelled"]
-Kind = Literal["optimize", "cycle", "pareto", "compare", "whatif", "evaluate", "identify"]
+Kind = Literal[
+    "optimize", "cycle", "placement", "pareto", "compare", "whatif", "evaluate", "identify"
+]
 
 
 class OptimizeJob(Request):
@@ -35,6 +38,12 @@ class CycleJob(Request):
     """A request to `POST /cycle`."""
 
     cycle: CycleRequest = part("A body of `POST /cycle`.")
+
+
+class PlacementJob(Request):
+    """A request to `POST /placement`."""
+
+    placement: PlacementRequest = part("A body of `POST /placement`.")
 
 
 class ParetoJob(Request):
@@ -61,10 +70,11 @@ class EvaluateJob(Request):
     evaluate: EvaluateRequest = described("A JSON body of `POST /evaluate`.", None, EVALUATE)
 
 
-KINDS = ("optimize", "cycle", "pareto", "compare", "whatif", "evaluate")
+KINDS = ("optimize", "cycle", "placement", "pareto", "compare", "whatif", "evaluate")
 RequestOfJob = Annotated[
     Annotated[OptimizeJob, Tag("by optimize")]
     | Annotated[CycleJob, Tag("by cycle")]
+    | Annotated[PlacementJob, Tag("by placement")]
     | Annotated[ParetoJob, Tag("by pareto")]
     | Annotated[CompareJob, Tag("by compare")]
     | Annotated[WhatifJob, Tag("by whatif")]
@@ -150,7 +160,8 @@ class RequestStatus(Response):
         "Time that the last work on it took; null before its end.", "s", 0.21
     )
     energy: float | None = described(
-        "Energy of the motion or cycle that answers it, of its objective (electrical for "
+        "Energy of the motion, the cycle or the best place that answers it, of its objective "
+        "(electrical for "
         "`evaluate`). Null for other kinds, and without an answer.",
         "J",
         57.5,

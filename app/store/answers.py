@@ -48,7 +48,13 @@ def put_of_job(
 def _row(kind: str, compressed: StoredAnswer, **whose: str | bool | None) -> Answer:
     id, body, figures = compressed.id, compressed.body, compressed.figures
     return Answer(
-        id=id, kind=kind, created=now(), size=len(body), body=body, **vars(figures), **whose
+        id=id,
+        kind=compressed.kind or kind,
+        created=now(),
+        size=len(body),
+        body=body,
+        **vars(figures),
+        **whose,
     )
 
 

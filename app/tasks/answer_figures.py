@@ -11,8 +11,12 @@ from joulepath.app.answers.envelope import AnswerFigures
 def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
     """The figures of the JSON answer of any endpoint.
 
-    The energy of a motion or cycle is the one of its objective, electrical for `evaluate`.
+    The energy of a motion or cycle is the one of its objective, electrical for `evaluate`; that of
+    a placement is the one of the best place.
     """
+    if "best" in answer:
+        best = answer["best"]
+        return AnswerFigures(answer["robot"], best["energy"], best["duration"], answer["status"])
     given = answer.get("total", answer)
     energy, objective = given.get("energy"), answer.get("objective", "electrical")
     return AnswerFigures(

@@ -18,6 +18,8 @@ from joulepath.app.api.identifications.request import IdentifyRequest
 from joulepath.app.api.identifications.task import IdentifyTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
+from joulepath.app.api.placement.request import PlacementRequest
+from joulepath.app.api.placement.task import PlacementTask
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.convert.recorded import GivenLog
@@ -110,6 +112,9 @@ def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {
     "optimize": lambda body, own, left: OptimizeTask(
         OptimizeRequest.model_validate_json(body), own
+    ).run(left),
+    "placement": lambda body, own, left: PlacementTask(
+        PlacementRequest.model_validate_json(body), own
     ).run(left),
     "pareto": lambda body, own, left: ParetoTask(
         ParetoRequest.model_validate_json(body), own, "json"

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array
+from joulepath.optimizer.placement.mounts import about_z
 from joulepath.optimizer.placement.region import COORDINATES, Group
-from joulepath.optimizer.placement.space import Space, about_z
+from joulepath.optimizer.placement.space import Space
 
 
 @dataclass(frozen=True, eq=False)

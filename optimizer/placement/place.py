@@ -22,7 +22,7 @@ from joulepath.optimizer.placement.placement_solution import (
     PlacementSolution,
     Tolerance,
 )
-from joulepath.optimizer.placement.region import Group, Moved, Places, Region
+from joulepath.optimizer.placement.region import Coordinate, Group, Moved, Places, Region
 from joulepath.optimizer.placement.rounds import Round
 from joulepath.optimizer.placement.space import Place, Space
 from joulepath.optimizer.presentation.progress_bar import progress_bar
@@ -127,6 +127,7 @@ def _solution(search: PlacementSearch, wall_time: float) -> PlacementSolution:
         left_out=left_out,
         wall_time=wall_time,
         objective=space.placement.objective,
+        edges=_edges(space, best.place),
     )
 
 
@@ -137,6 +138,7 @@ def _placed(search: PlacementSearch, found: Round) -> PlacedRound:
         energy=found.energy,
         duration=search.duration(found),
         solutions=found.solutions,
+        placed_cycles=tuple(search.space.cycles(found.place)),
     )
 
 
@@ -175,3 +177,9 @@ def _tolerance(search: PlacementSearch) -> list[Tolerance] | None:
         Tolerance(body=axis.body, coordinate=axis.name, lower=float(lower), upper=float(upper))
         for axis, (lower, upper) in zip(search.space.axes, search.tolerance, strict=True)
     ]
+
+
+def _edges(space: Space, at: Place) -> list[Coordinate]:
+    """Coordinates of a place that are at an end of their range."""
+    ends = zip(space.axes, at.x.tolist(), strict=True)
+    return [axis.name for axis, value in ends if value in (axis.low, axis.high)]

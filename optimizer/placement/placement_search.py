@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
@@ -45,8 +45,14 @@ class PlacementSearchSettings:
     """Time that any round may take [s]."""
     starts: int = 3
     """Most places of the map from which the search is refined."""
+    apart: float = 0.75
+    """Distance of such places from those before and from what they led to, as a share of the
+    distance of neighbours on the map."""
     near_best: float = 0.05
     """Share of the least energy above it up to which a place of the map is refined."""
+    nearby: float = 0.04
+    """Distance from a place up to which the best cycles have its configurations [m]: mostly those
+    of neighbours in a map of 15 cm have others."""
     same: float = 1e-6
     """Relative difference of energies below which a bound excludes a better place."""
 
@@ -142,7 +148,7 @@ class PlacementSearch:
         self.evaluated += 1
         if found.is_decided:
             self._times.append(self.clock() - began)
-            self._memo[key] = replace(found, solutions=(), error=None)
+            self._memo[key] = found.summary
         if found.energy is not None and found.energy < self._least:
             self.best, self._known = found, known
             self.tell(Improved(found.energy, self.duration(found), self.lower_bound))
@@ -176,7 +182,7 @@ class PlacementSearch:
                 continue
             bound = self.map[k].bound
             found = self._solved(self.points[k], end)
-            self.map[k] = replace(found, solutions=(), error=None)
+            self.map[k] = found.summary
             if not found.is_decided:
                 self.map[k] = Round(self.points[k], bound=bound)
                 continue
@@ -192,14 +198,11 @@ class PlacementSearch:
         if end.passed:
             return
         for start in self._starts():
-            choice = start.place.choice
-
-            def energy(x: Array, choice: tuple[int, ...] = choice) -> float | None:
-                return self._energy(self.space.place(choice, x), end)
-
             assert start.energy is not None
+            nearby = Nearby(self, start, end)
             step = PATTERN.first_step * self.spacing
-            _, ended = refined(energy, start.place.x, start.energy, self.box, step)
+            x, ended = refined(nearby.energy, start.place.x, start.energy, self.box, step)
+            self._solved(self.space.place(start.place.choice, x), self.end)
             if not ended:
                 return
         self.is_refined = True
@@ -211,7 +214,7 @@ class PlacementSearch:
         for each in sorted(found, key=lambda each: each.energy or 0.0):
             assert each.energy is not None
             most = self._least + SEARCH.near_best * abs(self._least)
-            if len(taken) == SEARCH.starts or each.energy > most:
+            if len(taken) >= 2 * SEARCH.starts or each.energy > most:
                 return
             if any(self._is_near(each.place, other) for other in taken):
                 continue
@@ -221,47 +224,31 @@ class PlacementSearch:
             taken.append(self.best.place)
 
     def _is_near(self, a: Place, b: Place) -> bool:
-        """Whether two places are neighbours on the map."""
+        """Whether two places are closer than neighbours on the map."""
         same = a.choice == b.choice
-        return same and bool((np.abs(a.x - b.x) <= 1.5 * self.spacing).all())
+        return same and bool((np.abs(a.x - b.x) <= SEARCH.apart * self.spacing).all())
 
-    def _energy(self, place: Place, end: Deadline) -> float | None:
+    def energy(self, place: Place, end: Deadline) -> float | None:
         """Energy at a place [J]: inf without cycles and where a bound excludes a better place.
 
         Returns:
             The energy; None if the time is up.
         """
-        if end.passed:
-            return None
         checked = self.rounds.checked(place, end)
         if checked.reason is not None or not self._may_be_better(checked):
             return np.inf
-        return self._energy_itself(place, end)
-
-    def _energy_itself(self, place: Place, end: Deadline) -> float | None:
-        """Energy at a place [J]: inf without cycles; None if the time is up."""
-        if end.passed:
-            return None
         found = self._solved(place, end)
-        if not found.is_decided and end.left < 0:
+        if not found.is_decided and end.passed:
             return None
         return np.inf if found.energy is None else found.energy
 
     def _measure(self, end: Deadline) -> None:
         """Find how precisely the best place must be kept."""
-        for _ in range(SEARCH.starts):
-            assert self.best is not None and self.best.energy is not None
-            place, least = self.best.place, self.best.energy
-
-            def energy(x: Array, choice: tuple[int, ...] = place.choice) -> float | None:
-                return self._energy_itself(self.space.place(choice, x), end)
-
-            self.tolerance = tolerances(energy, place.x, least, self.box, self.spacing / 2)
-            if self.best.place is place or self.tolerance is None:
-                return
-            # a farther place is better
-            self.tolerance = None
-            self._refine(end)
+        best = self.best
+        assert best is not None and best.energy is not None
+        nearby = Nearby(self, best, end, follows=False)
+        step = self.spacing / 2
+        self.tolerance = tolerances(nearby.energy, best.place.x, best.energy, self.box, step)
 
     def _compare(self) -> None:
         """Compute the best place once more, with baselines."""
@@ -278,6 +265,57 @@ class PlacementSearch:
             return DeadlineExceeded([])
         counts = ReasonCounts(**{name: reasons.count(name) for name in get_args(Reason)})
         return NoPlacement(counts, str(self.nominal.error))
+
+
+class Nearby:
+    """Energies at places through configurations near those of a place.
+
+    Args:
+        search: the search.
+        start: round at the place.
+        end: deadline.
+        follows: whether the configurations of a better place take the place of those before, and
+            the best cycles of a place are sought where there are none in nearby configurations.
+    """
+
+    def __init__(
+        self, search: PlacementSearch, start: Round, end: Deadline, follows: bool = True
+    ) -> None:
+        self.search, self.end, self.follows = search, end, follows
+        self.near, self.at, self.least = start.visited, start.place.x, start.energy or np.inf
+        self.choice = start.place.choice
+        self._memo: dict[bytes, float] = {}
+
+    def energy(self, x: Array) -> float | None:
+        """Energy [J] at coordinates (n,): inf without cycles, None if the time is up."""
+        end_if_stopped()
+        if self.end.passed:
+            return None
+        key = np.round(x, 9).tobytes()
+        if key not in self._memo:
+            value = self._near_energy(x)
+            if value is None and self.follows:
+                value = self.search.energy(self.search.space.place(self.choice, x), self.end)
+                if value is None:
+                    return None
+            self._memo[key] = np.inf if value is None else value
+        return self._memo[key]
+
+    def _near_energy(self, x: Array) -> float | None:
+        """Energy [J] through nearby configurations; None without such cycles."""
+        search = self.search
+        away = float(np.abs((x - self.at) / search.box.scale).max())
+        if self.follows and away > SEARCH.nearby:
+            return None
+        place = search.space.place(self.choice, x)
+        cycles = search.rounds.nearby(place, self.near)
+        if cycles is None:
+            return None
+        found = search.rounds.solved(place, self.end, KnownMotions(), cycles=cycles)
+        search.evaluated += 1
+        if self.follows and found.energy is not None and found.energy < self.least:
+            self.near, self.at, self.least = found.visited, x, found.energy
+        return found.energy
 
 
 def _coarse_first(count: int) -> list[int]:

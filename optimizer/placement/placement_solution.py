@@ -14,6 +14,7 @@ from joulepath.optimizer.placement.region import Coordinate, Mount
 from joulepath.optimizer.placement.rounds import Reason
 from joulepath.optimizer.presentation.chart import Chart
 from joulepath.optimizer.presentation.result import Result, Rows
+from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.result.energy import Objective, optimality_gap
 
 PlacementStatus = Literal["complete", "cut_short"]
@@ -45,7 +46,9 @@ class PlacedRound:
     duration: Seconds
     """Duration of all cycles, times their weights."""
     solutions: Annotated[tuple[CycleSolution, ...], Internal] = field(repr=False)
-    """The cycles."""
+    """The cycles that were found."""
+    placed_cycles: Annotated[tuple[Cycle, ...], Internal] = field(repr=False)
+    """The cycles as they were asked for, in the frame of the base at this place."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +146,7 @@ class PlacementSolution(Result):
         left_out: number of places of the map for which there was no time.
         wall_time: wall time [s].
         objective: the minimised energy.
+        edges: coordinates of the best place that are at an end of their range.
     """
 
     best: PlacedRound
@@ -157,6 +161,7 @@ class PlacementSolution(Result):
     left_out: int
     wall_time: float
     objective: Objective
+    edges: Sequence[Coordinate] = ()
 
     @property
     def saving(self) -> float | None:

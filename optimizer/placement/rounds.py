@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,6 +22,7 @@ from joulepath.optimizer.exceptions import (
     UnreachablePose,
     UnreachableTargets,
 )
+from joulepath.optimizer.placement.nearby_chain import Visited, nearby_cycle
 from joulepath.optimizer.placement.space import Place, Space
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.cycle import Cycle
@@ -64,6 +66,7 @@ class Round:
         reason: why there are none; None if there are some, or if there was no time to look.
         error: the error of the first cycle without a solution.
         bound: lower bound of the objective at this place [J], where one is known.
+        visited: configurations of the cycles; empty without them.
     """
 
     place: Place
@@ -72,6 +75,12 @@ class Round:
     reason: Reason | None = None
     error: JoulepathError | None = None
     bound: float | None = None
+    visited: tuple[Visited, ...] = ()
+
+    @property
+    def summary(self) -> Round:
+        """The round without its solutions and its error, which take memory."""
+        return replace(self, solutions=(), error=None)
 
     @property
     def is_decided(self) -> bool:
@@ -141,7 +150,12 @@ class Rounds:
         return bound if nodes else None
 
     def solved(
-        self, place: Place, end: Deadline, known: KnownMotions, compared: bool = False
+        self,
+        place: Place,
+        end: Deadline,
+        known: KnownMotions,
+        compared: bool = False,
+        cycles: Sequence[Cycle] | None = None,
     ) -> Round:
         """The rounds at a place.
 
@@ -150,12 +164,13 @@ class Rounds:
             end: deadline; what is certified until then counts.
             known: memo of motions, which gets those found.
             compared: whether to search for baselines.
+            cycles: the cycles to be solved; None for those of the place.
 
         Returns:
             The round; without energy and reason if there was no time for all cycles.
         """
         found, energy = list[CycleSolution](), 0.0
-        cycles = self.space.cycles(place)
+        cycles = self.space.cycles(place) if cycles is None else cycles
         for k, (weight, cycle) in enumerate(zip(self.weights, cycles, strict=True)):
             share = max(end.left / (len(cycles) - k), _LEAST)
             asked = replace(cycle, deadline=min(cycle.deadline, share), with_baselines=compared)
@@ -173,7 +188,23 @@ class Rounds:
         bound = sum(
             weight * each.lower_bound for weight, each in zip(self.weights, found, strict=True)
         )
-        return Round(place, energy, tuple(found), bound=bound)
+        visited = map(Visited.of, found, self.space.stops(place))
+        return Round(place, energy, tuple(found), bound=bound, visited=tuple(visited))
+
+    def nearby(self, place: Place, near: Sequence[Visited]) -> list[Cycle] | None:
+        """The cycles at a place through configurations near those of another place.
+
+        Args:
+            place: the place.
+            near: configurations of every cycle at another place.
+
+        Returns:
+            The cycles; None if there are no such configurations.
+        """
+        poses = self.space.stops(place)
+        found = list(map(nearby_cycle, self.space.cycles(place), near, poses))
+        cycles = [each for each in found if each is not None]
+        return cycles if near and len(cycles) == len(found) else None
 
 
 _LEAST = 1e-3

@@ -11,7 +11,8 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.placement.moved_cycle import Offsets, cycle_at
+from joulepath.optimizer.placement.mounts import TILTS, about_z, mount_of, yaw_of
+from joulepath.optimizer.placement.moved_cycle import Offsets, composed, cycle_at, inverted
 from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.region import (
     COORDINATES,
@@ -40,22 +41,11 @@ class MapSettings:
     the first joint alone, so a coarse step tells enough."""
     fixed: float = 1e-9
     """Length of a range up to which it is one value [m, rad]."""
-    vertical: float = 1e-6
-    """Sine of the angle from the vertical below which the base stands on the floor or hangs from
-    the ceiling."""
     inside: float = 1e-9
     """Distance beyond a range that is rounding [m, rad]."""
 
 
 MAP = MapSettings()
-
-FLOOR, WALL, CEILING = (
-    np.eye(3),
-    np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
-    np.diag([1.0, -1.0, -1.0]),
-)
-TILTS: dict[Mount, Array] = {"floor": FLOOR, "wall": WALL, "ceiling": CEILING}
-"""Rotations of a base at yaw 0, by its mount."""
 
 
 @dataclass(frozen=True)
@@ -205,14 +195,34 @@ class Space:
 
     def cycles(self, place: Place) -> list[Cycle]:
         """The cycles at a place, in the frame of the base."""
+        base, offsets = self.base(place), self._offsets(place)
+        return [cycle_at(each.cycle, base, *offsets) for each in self.placement.cycles]
+
+    def stops(self, place: Place) -> list[dict[str, Array]]:
+        """Pose (4, 4) of the body that each stop moves with, in the frame of the base.
+
+        There is one mapping per cycle, by the names of its stops and of its start.
+        """
+        T_base_world, (offsets, _) = inverted(self.base(place)), self._offsets(place)
+        names = [
+            (START, *(stop.name for stop in each.cycle.stops)) for each in self.placement.cycles
+        ]
+        return [
+            {
+                name: composed(T_base_world, offsets[name]) if name in offsets else T_base_world
+                for name in each
+            }
+            for each in names
+        ]
+
+    def _offsets(self, place: Place) -> tuple[Offsets, Offsets]:
+        """Offsets of stops and of obstacles in the world."""
         stops, obstacles = dict[str, Array](), dict[str, Array]()
         for moved, pose in zip(self.placement.moved, place.poses, strict=True):
             if isinstance(moved.moves, Group):
                 stops |= dict.fromkeys(moved.moves.stops, pose)
                 obstacles |= dict.fromkeys(moved.moves.obstacles, pose)
-        offsets: tuple[Offsets, Offsets] = stops, obstacles
-        base = self.base(place)
-        return [cycle_at(each.cycle, base, *offsets) for each in self.placement.cycles]
+        return stops, obstacles
 
     def map(self) -> tuple[list[Place], float]:
         """The places of the map, and its resolution [m].
@@ -253,29 +263,6 @@ class Space:
 
 
 _UNIT = Axis(0, "x", 0.0, 1.0, 0.0)
-
-
-def about_z(angle: float) -> Array:
-    """Rotation matrix (3, 3) about z [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def yaw_of(R: Array) -> float:
-    """Angle [rad] about the world's z axis of a base with the rotation R (3, 3).
-
-    It is the angle of the x axis of a base on the floor or the ceiling, and of the z axis of any
-    other base.
-    """
-    along = R[:, 0] if np.hypot(R[0, 2], R[1, 2]) < MAP.vertical else R[:, 2]
-    return float(np.arctan2(along[1], along[0]))
-
-
-def mount_of(R: Array) -> Mount | None:
-    """The mount of a base with the rotation R (3, 3); None for a base that is tilted."""
-    if np.hypot(R[0, 2], R[1, 2]) < MAP.vertical:
-        return "floor" if R[2, 2] > 0 else "ceiling"
-    return "wall" if abs(R[2, 2]) < MAP.vertical else None
 
 
 def _body(placement: Placement, k: int) -> Body:

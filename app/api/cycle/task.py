@@ -90,14 +90,22 @@ class CycleTask:
     def _result(self, found: CycleSolution) -> TaskResult:
         if self.wanted == "csv":
             return TaskResult.of_csv(to_cycle_csv(found))
-        collector, legs = AnswerCollector(), list[CycleLeg]()
-        for move, arm in zip(found.moves, arms_of_moves(self.request, found), strict=True):
-            solution = certified(move.solution)
-            path = collector.add(OptimizeAnswer.of(self.request, self.request_id, solution, arm))
-            first, *rests = (CycleLeg(**vars(leg)) for leg in move.legs(found.objective))
-            legs += [replace(first, answer=path), *rests]
-        answer = CycleAnswer.of(self.request, self.request_id, found, legs)
+        collector = AnswerCollector()
+        answer = cycle_answer(self.request, self.request_id, found, collector)
         return TaskResult.of_kept_json(answer, answer.figures, collector.stored)
+
+
+def cycle_answer(
+    request: CycleRequest, request_id: str, found: CycleSolution, collector: AnswerCollector
+) -> CycleAnswer:
+    """The answer to a request, not kept yet; the answers of its moves are collected."""
+    legs = list[CycleLeg]()
+    for move, arm in zip(found.moves, arms_of_moves(request, found), strict=True):
+        solution = certified(move.solution)
+        path = collector.add(OptimizeAnswer.of(request, request_id, solution, arm))
+        first, *rests = (CycleLeg(**vars(leg)) for leg in move.legs(found.objective))
+        legs += [replace(first, answer=path), *rests]
+    return CycleAnswer.of(request, request_id, found, legs)
 
 
 def _warnings(found: CycleSolution) -> list[str]:

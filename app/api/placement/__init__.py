@@ -1,0 +1,1 @@
+"""`POST /placement`: where to put the robot, for cycles of least energy."""

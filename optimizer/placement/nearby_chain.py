@@ -1,0 +1,106 @@
+"""A cycle through the configurations of a cycle at a nearby place.
+
+A place a few centimetres away mostly has its best cycle in nearly the same configurations. With
+them as its targets, a cycle has one move between two stops in place of thousands, and is computed
+in a fraction of the time. It is a cycle through the same poses, and thus never better than the best
+one at its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.newton import solved
+from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
+from joulepath.optimizer.placement.moved_cycle import composed, inverted
+from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath.optimizer.problem.cycle import START, Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.targets import Single, members
+
+
+@dataclass(frozen=True)
+class NearbySettings:
+    """Settings of nearby configurations."""
+
+    farthest: float = 0.8
+    """Greatest change of a joint that counts as near [rad]."""
+    residual: float = 1e-9
+    """Greatest pose error of a configuration [m, rad], far below the 1e-6 that the certificate
+    allows at an end."""
+
+
+NEARBY = NearbySettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """The configurations of a cycle, and the poses from which they come.
+
+    Attributes:
+        q: joint positions at every stop and at the start, shape (nq,) [rad], by their names.
+        T_base_stop: pose (4, 4) of the body that each moves with, in the frame of the base.
+    """
+
+    q: Mapping[str, Array]
+    T_base_stop: Mapping[str, Array]
+
+    @classmethod
+    def of(cls, found: CycleSolution, T_base_stop: Mapping[str, Array]) -> Visited:
+        """The configurations of a found cycle."""
+        q = {START: found.moves[0].solution.start.q}
+        for move in found.moves:
+            q |= {each.stop: each.q for each in move.passes}
+            q.setdefault(move.planned.goal, move.solution.goal.q)
+        return cls(q, T_base_stop)
+
+
+def nearby_cycle(cycle: Cycle, visited: Visited, T_base_stop: Mapping[str, Array]) -> Cycle | None:
+    """The cycle through configurations near those of another place.
+
+    Args:
+        cycle: cycle at its place, in the given order.
+        visited: configurations of the same cycle at another place.
+        T_base_stop: pose (4, 4) of the body that each stop moves with, in the frame of the base.
+
+    Returns:
+        The cycle with joint positions as its targets; None if some are out of reach or far away, or
+        if a stop has a path.
+    """
+    if cycle.order is not None or any(stop.path is not None for stop in cycle.stops):
+        return None
+    names = [START, *(stop.name for stop in cycle.stops)]
+    targets = [cycle.start, *(stop.target for stop in cycle.stops)]
+    if not set(names) <= set(visited.q):
+        return None
+    chain, limits = Chain.of(cycle.arm.robot.model), cycle.arm.active_limits
+    q, poses = list[Array](), list[Array]()
+    for name, target in zip(names, targets, strict=True):
+        T = composed(T_base_stop[name], inverted(visited.T_base_stop[name]))
+        q.append(visited.q[name])
+        poses.append(_pose(cycle, members(target), visited.q[name], T))
+    at = np.array(q)
+    near, residual = solved(chain, at, np.array(poses))
+    inside = (near >= limits.q_min) & (near <= limits.q_max)
+    if not (inside.all() and (residual <= NEARBY.residual).all()):
+        return None
+    if np.abs(near - at).max() > NEARBY.farthest:
+        return None
+    stops = [replace(stop, target=to) for stop, to in zip(cycle.stops, near[1:], strict=True)]
+    return replace(cycle, start=near[0], stops=stops)
+
+
+def _pose(cycle: Cycle, targets: tuple[Single, ...], q: Array, T: Array) -> Array:
+    """Flange pose (4, 4) at a stop whose body has moved by T (4, 4) in the frame of the base."""
+    arm = cycle.arm
+    if not any(isinstance(each, Pose | ConeOrientedPose) for each in targets):
+        return flange_pose(tcp_pose(arm, q), arm.T_flange_tcp)
+    if len(targets) == 1 and isinstance(targets[0], Pose):
+        return flange_pose(targets[0].T, arm.T_flange_tcp)
+    return flange_pose(composed(T, tcp_pose(arm, q)), arm.T_flange_tcp)
