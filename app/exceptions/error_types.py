@@ -14,11 +14,12 @@ from joulepath.optimizer.export import errors as exports
 from joulepath.optimizer.identify import errors as identification
 from joulepath.optimizer.identify.logs import log_errors as logs
 from joulepath.optimizer.kinematics import errors as kinematics
+from joulepath.optimizer.placement import errors as placements
 from joulepath.optimizer.search import errors as search
 
 _MODULES = (
-    *(base, library, kinematics, search, sequence, given_motions, exports, logs, identification),
-    *(excitation, stored, queue, access, transport, report),
+    *(base, library, kinematics, search, sequence, placements, given_motions, exports, logs),
+    *(identification, excitation, stored, queue, access, transport, report),
 )
 """Modules with declared errors, in the order of the reference."""
 

@@ -137,7 +137,7 @@ class PlacementSearch:
     def _solved(self, place: Place, end: Deadline, compared: bool = False) -> Round:
         """The rounds at a place, known ones or new ones; the best are kept."""
         end_if_stopped()
-        key = place.choice, np.round(place.x, 9).tobytes()
+        key = _key(place)
         if key in self._memo:
             return self._memo[key]
         if not compared and self._times:
@@ -260,7 +260,8 @@ class PlacementSearch:
             self.best = found
 
     def _no_place(self) -> NoPlacement | DeadlineExceeded:
-        reasons = [each.reason for each in [*self.map, self.nominal] if each.reason is not None]
+        found = {_key(each.place): each.reason for each in [*self.map, self.nominal]}
+        reasons = [reason for reason in found.values() if reason is not None]
         if not reasons:
             return DeadlineExceeded([])
         counts = ReasonCounts(**{name: reasons.count(name) for name in get_args(Reason)})
@@ -316,6 +317,11 @@ class Nearby:
         if self.follows and found.energy is not None and found.energy < self.least:
             self.near, self.at, self.least = found.visited, x, found.energy
         return found.energy
+
+
+def _key(place: Place) -> tuple[tuple[int, ...], bytes]:
+    """What two places have in common that are the same but for rounding."""
+    return place.choice, (np.round(place.x, 9) + 0.0).tobytes()
 
 
 def _coarse_first(count: int) -> list[int]:

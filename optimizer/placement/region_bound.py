@@ -128,6 +128,8 @@ class _CycleBound:
 
     def __init__(self, cycle: Cycle, extents: Extents) -> None:
         self.cycle, self.extents, self.spots = cycle, extents, _spots(cycle)
+        # by the power and the greatest speeds
+        self._prices: dict[tuple[float, bytes], tuple[Array, Array]] = {}
 
     def least(self) -> float | None:
         """The bound [J]; None where none is known."""
@@ -159,9 +161,17 @@ class _CycleBound:
             if time is None and price != 0:
                 continue
             paid = price * ((time or 0.0) - cycle.dwell_time)
-            moving = sum(_travel_bound(each, power - price) for each in travels)
+            moving = sum(self._moving(each, power - price) for each in travels)
             best = max(best, gain + dwells + paid + moving)
         return best
+
+    def _moving(self, travel: _Travel, power: float) -> float:
+        """Least energy of a move without its gain of potential energy [J]."""
+        key = power, travel.arm.active_limits.v_max.tobytes()
+        if key not in self._prices:
+            self._prices[key] = prices_of_travel(travel.arm, power)
+        per_metre, per_radian = self._prices[key]
+        return float((per_metre * travel.distance + per_radian * travel.angle).max())
 
     def _travel(self, move: PlannedMove) -> _Travel:
         between = [self._apart(*ends) for ends in pairwise((move.start, *move.through, move.goal))]
@@ -284,35 +294,25 @@ def levers(arm: Arm) -> Array:
     return np.array([across[j] + sum(along[j + 1 :]) for j in range(len(links))])
 
 
-def _travel_bound(travel: _Travel, power: float) -> float:
-    """Least energy of a move without its gain of potential energy [J], at a power of `power` [W].
+def prices_of_travel(arm: Arm, power: float) -> tuple[Array, Array]:
+    """Multipliers λ and κ of travel at a power of `power` [W], for every share that is tried.
 
-    It is -inf for a negative power, at which a longer move draws less.
+    Returns:
+        λ (k,) [J/m] and κ (k,) [J/rad]; -inf for a negative power, at which a longer move draws
+        less.
     """
-    if power < 0:
-        return -np.inf
-    reach, best = levers(travel.arm), 0.0
-    for share in REGION_BOUND.shares:
-        each = (1 - share) * reach + share
-        gained = (1 - share) * travel.distance + share * travel.angle
-        if gained <= 0:
-            continue
-        best = max(best, gained * _multiplier(travel.arm, each, power))
-    return best
-
-
-def _multiplier(arm: Arm, weights: Array, power: float) -> float:
-    """Greatest λ for which power + Σ_j min_v (φ_j(v) - λ weights_j v) is not negative."""
     law, v_max = arm.friction_law, arm.active_limits.v_max
-    high = float((power / v_max + law.coulomb + _slope(law, v_max)).sum() / weights.max())
-    low = 0.0
+    share = np.array(REGION_BOUND.shares)
+    if power < 0:
+        return np.full_like(share, -np.inf), np.zeros_like(share)
+    weights = (1 - share)[:, None] * levers(arm) + share[:, None]
+    steepest = (power / v_max + law.coulomb + _slope(law, v_max)).sum()
+    low, high = np.zeros_like(share), steepest / weights.max(axis=1)
     for _ in range(REGION_BOUND.bisections):
         middle = (low + high) / 2
-        if power + _least_power(law, middle * weights, v_max) >= 0:
-            low = middle
-        else:
-            high = middle
-    return low
+        holds = power + _least_power(law, middle[:, None] * weights, v_max) >= 0
+        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+    return low * (1 - share), low * share
 
 
 def _slope(law: FrictionLaw, v: Array) -> Array:
@@ -321,12 +321,12 @@ def _slope(law: FrictionLaw, v: Array) -> Array:
     return np.asarray(bent + 2 * law.viscous * v)
 
 
-def _least_power(law: FrictionLaw, weights: Array, v_max: Array) -> float:
-    """Lower bound of Σ_j min_v (φ_j(v) - weights_j v) [W] over speeds from 0 to v_max (nq,).
+def _least_power(law: FrictionLaw, weights: Array, v_max: Array) -> Array:
+    """Lower bounds (k,) of Σ_j min_v (φ_j(v) - weights_j v) [W] over speeds from 0 to v_max (nq,).
 
     φ is convex: it lies above its tangent at the speed where the bisection ends.
     """
-    low, high = np.zeros_like(v_max), v_max.copy()
+    low, high = np.zeros_like(weights), np.broadcast_to(v_max, weights.shape)
     for _ in range(REGION_BOUND.bisections):
         middle = (low + high) / 2
         falls = law.coulomb + _slope(law, middle) < weights
@@ -335,4 +335,4 @@ def _least_power(law: FrictionLaw, weights: Array, v_max: Array) -> float:
     value = v * (law.coulomb + law.curved * np.arcsinh(v / law.speed) + law.viscous * v)
     slope = law.coulomb + _slope(law, v) - weights
     least = np.minimum(-slope * v, slope * (v_max - v))
-    return float((value - weights * v + np.minimum(least, 0.0)).sum())
+    return np.asarray((value - weights * v + np.minimum(least, 0.0)).sum(axis=-1))

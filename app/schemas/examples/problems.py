@@ -35,6 +35,7 @@ from joulepath.optimizer.identify.errors import (
 )
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from joulepath.optimizer.kinematics.errors import OrientationNotHeld
+from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
 from joulepath.optimizer.result.candidates import (
     CandidateReport,
     CandidateStatus,
@@ -104,6 +105,10 @@ _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
         ),
         NoSequence("stops/place", [LABEL], [LABEL]),
         CycleTooShort(5.55, 0.9),
+        NoPlacement(
+            ReasonCounts(reach=61, collision=39, torque=0, time=0, motion=0),
+            f"The stops/pick pose{_OUT_OF_REACH.removeprefix('The goal pose')}",
+        ),
         NotCertified(0, "its velocity is at 1.31 of the limit", {"velocity": 1.31}),
         FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),
         LogTooLarge(1_000_000, "rows"),

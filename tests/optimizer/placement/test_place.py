@@ -1,0 +1,159 @@
+"""Placements whose best place is known by symmetry or by brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.placement.errors import NoPlacement
+from joulepath.optimizer.placement.place import place, place_robot
+from joulepath.optimizer.placement.placement import Placement, WeightedCycle
+from joulepath.optimizer.placement.placement_solution import PlacementSolution
+from joulepath.optimizer.placement.region import Group, Moved, Places, Region
+from joulepath.optimizer.placement.space import Space
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved
+from tests.optimizer.placement.cells import arm, at, down, floor, two_stops, wall
+
+AMPLE = 600.0
+ROUNDED = 1e-6  # relative scatter of solves of one motion whose targets differ by rounding
+SCATTER = 2e-3  # relative scatter of solves at places a few millimetres apart
+
+
+def check(found: PlacementSolution) -> None:
+    """What holds for every answer."""
+    assert found.nominal is None or found.best.energy <= found.nominal.energy
+    assert found.lower_bound is not None
+    for energy in [found.best.energy, *(each.energy for each in found.map if each.energy)]:
+        assert found.lower_bound <= energy
+    for round in [found.best, *([] if found.nominal is None else [found.nominal])]:
+        for solution in round.solutions:
+            assert all(move.solution.certificate.valid for move in solution.moves)
+    for each in found.map:
+        assert each.energy is None or each.reason is None
+        assert each.lower_bound is None or each.energy is None or each.lower_bound <= each.energy
+    undecided = [each for each in found.map if each.energy is None and each.reason is None]
+    assert len(undecided) == found.left_out
+
+
+@pytest.mark.long
+def test_brute_force_finds_no_better_place() -> None:
+    """On a line, against a cycle every two centimetres."""
+    cycle = two_stops([floor()])
+    found = place(cycle, Region(x=(-0.25, 0.15)), resolution=0.1, deadline=AMPLE, progress=False)
+    check(found)
+    assert found.status == "complete" and len(found.map) == 5
+    placement = Placement(
+        cycles=[WeightedCycle(replace(cycle, with_baselines=False))],
+        moved=[Moved(Region(x=(-0.25, 0.15)))],
+        resolution=0.02,
+    )
+    space, energies = Space.of(placement), list[float]()
+    for each in space.map()[0]:
+        (own,) = space.cycles(each)
+        try:
+            energies.append(plan_cycle(own, progress=False).energy.electrical.total)
+        except JoulepathError:
+            continue
+    assert found.best.energy <= min(energies) * (1 + SCATTER)
+    (tolerance,) = found.tolerance or []
+    assert tolerance.lower <= 0 <= tolerance.upper
+
+
+def test_a_symmetric_cell_is_served_as_well_from_either_side() -> None:
+    """Turned by half a turn about the vertical through the middle of the stops, the cell is the
+    same: the base is as good on one side as on the other, and the first joint only turns.
+    """
+    cycle = two_stops()
+    turned = at(1.0, 0.0, 0.0, np.diag([-1.0, -1.0, 1.0]))
+    cycle = replace(cycle, start=down(0.5, 0.0, 0.35))
+    found = place(cycle, Places([turned]), deadline=AMPLE, progress=False)
+    check(found)
+    energies = [each.energy for each in found.map]
+    assert None not in energies
+    # the tool is turned by half a turn, too, which its last joint takes
+    assert energies[1] == pytest.approx(energies[0], rel=0.1)
+
+
+def test_the_base_at_the_same_place_in_another_world_costs_the_same() -> None:
+    """All stops moved to one side are the base moved to the other."""
+    cycle = two_stops()
+    group = Group(stops=("start", "pick", "place"))
+    by_group = place(
+        cycle,
+        Region(x=(0.0, 0.02)),
+        moves=group,
+        resolution=0.1,
+        deadline=AMPLE,
+        progress=False,
+    )
+    by_base = place(cycle, Region(x=(-0.02, 0.0)), resolution=0.1, deadline=AMPLE, progress=False)
+    check(by_group)
+    energies = [[each.energy for each in found.map] for found in (by_group, by_base)]
+    assert energies[0] == pytest.approx(energies[1][::-1], rel=ROUNDED)
+    assert by_group.best.energy == pytest.approx(by_base.best.energy, rel=SCATTER)
+
+
+def test_the_map_tells_why_there_is_no_cycle() -> None:
+    cycle = two_stops([floor(), wall(-0.35)])
+    places = [at(-3.0), at(-0.2)]
+    found = place(cycle, Places(places), deadline=AMPLE, progress=False)
+    check(found)
+    assert [each.reason for each in found.map] == [None, "reach", "collision"]
+    short = two_stops(duration_max=0.5)
+    with pytest.raises(NoPlacement) as raised:
+        place(short, Places([at(0.01)]), deadline=AMPLE, progress=False)
+    assert raised.value.reasons.time == 2
+    weak = two_stops(arm=arm(limits=_weak()))
+    with pytest.raises(NoPlacement) as raised:
+        place(weak, Places([at(0.01)]), deadline=AMPLE, progress=False)
+    assert raised.value.reasons.torque == 2
+
+
+def _weak() -> object:
+    limits = arm().robot.limits
+    return limits.tightened(tau_max=np.array([1.0] * 6))
+
+
+def test_a_bad_nominal_place_does_not_matter() -> None:
+    found = place(two_stops(), Places([at(-0.05)]), base=at(-3.0), deadline=AMPLE, progress=False)
+    check(found)
+    assert found.nominal is None and found.nominal_reason == "reach"
+    assert found.saving is None
+    assert found.best.base.position == pytest.approx([-0.05, 0.0, 0.0])
+
+
+def test_weights_count() -> None:
+    short = two_stops(stops=two_stops().stops[:1])
+    cycles = [WeightedCycle(two_stops(), 3.0), WeightedCycle(short)]
+    found = place(cycles, Places([at(-0.05)]), deadline=AMPLE, progress=False)
+    check(found)
+    first, second = (each.energy.electrical.total for each in found.best.solutions)
+    assert found.best.energy == pytest.approx(3 * first + second)
+
+
+def test_a_deadline_gives_the_best_so_far() -> None:
+    ticks = iter(range(10**9))
+    placement = Placement(
+        cycles=[WeightedCycle(two_stops())],
+        moved=[Moved(Region(x=(-0.2, 0.2), y=(-0.2, 0.2)))],
+        deadline=40.0,
+    )
+    found = place_robot(placement, clock=lambda: 0.02 * next(ticks), progress=False)
+    check(found)
+    assert found.status == "cut_short"
+
+
+def test_progress_is_told() -> None:
+    events = list[Event]()
+    found = place(two_stops(), Places([at(-0.05), at(-3.0)]), deadline=AMPLE, tell=events.append)
+    (total,) = [each.total for each in events if isinstance(each, CandidatesFound)]
+    assert total == len(found.map) == 3
+    tried = {each.index: each.status for each in events if isinstance(each, CandidateTried)}
+    assert tried == {0: "solved", 1: "solved", 2: "failed"}
+    energies = [each.energy for each in events if isinstance(each, Improved)]
+    assert energies == sorted(energies, reverse=True)
+    assert energies[-1] == pytest.approx(found.best.energy)
