@@ -1,0 +1,227 @@
+"""Placements: what the best place saves against a sensible one, against an exhaustive grid, the
+lower bound, the time and the memory.
+
+    python -m benchmarks.placement --count 50
+    python -m benchmarks.placement --count 10 --grid
+
+Cells of three robots, in turn. Two picks are on a table on one side, two places on a shelf on the
+other, with a post between them and a floor; the arm carries a part from each pick to a place. The
+nominal base is where a planner would put it: the stops lie about 60 % of the reach away. The region
+is x, y and z about the nominal base, 40 % of the reach wide and 20 % high on either side. Cells
+whose nominal place has no cycle are drawn anew. Times are CPU times, and so is the deadline.
+
+With `--grid`, a cycle is computed at every place of a grid of 5 cm, too, and the excess over the
+best of them is printed. An energy of any place below the lower bound ends the benchmark, and so
+does a best place above the nominal one, or a motion without a valid certificate. The memory is the
+greatest of the process so far.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.statistics import Spread
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.placement.place import place_robot
+from joulepath.optimizer.placement.placement import Placement, WeightedCycle
+from joulepath.optimizer.placement.placement_solution import PlacementSolution
+from joulepath.optimizer.placement.region import Moved, Region
+from joulepath.optimizer.placement.space import Space
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene
+from joulepath.optimizer.problem.stops import Stop
+
+ROBOTS = ("ur5e", "ur10e", "kr10_r1100")
+NOTHING = Payload()
+# shares of the reach: distances of stops from the nominal base, their heights, half the region
+NEAR, FAR, HEIGHTS, AROUND, ABOVE = 0.5, 0.7, (0.05, 0.35), 0.4, 0.2
+# half angle of each side [rad], tool above a table [m], step of the exhaustive grid [m]
+SIDE, CLEARANCE, GRID = 0.5, 0.06, 0.05
+TOOL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.12], [0, 0, 0, 1]])
+
+
+def cell(robot: str, rng: np.random.Generator) -> Cycle:
+    """A cycle between two sides, in the frame of the nominal base."""
+    model = load_robot(robot)
+    reach = Chain.of(model.model).length
+    middle = rng.uniform(0.6, 1.1)
+    turn, sides = rng.uniform(-np.pi, np.pi), (middle, -middle)
+    poses, tables = list[list[Pose]](), list[Obstacle]()
+    for number, angle in enumerate(sides):
+        height = reach * rng.uniform(*HEIGHTS)
+        at = [_around(rng, reach, turn + angle, height) for _ in range(2)]
+        yaw = rng.uniform(-np.pi, np.pi)
+        poses.append([Pose.from_rpy(each, [np.pi, 0.0, yaw]) for each in at])
+        centre = np.mean(at, axis=0) - [0.0, 0.0, CLEARANCE + 0.02]
+        tables.append(_box(f"table {number}", centre, [0.3 * reach, 0.3 * reach, 0.04]))
+    post = 0.6 * reach * np.array([np.cos(turn), np.sin(turn), 0.0])
+    top = reach * rng.uniform(0.1, 0.3)
+    tables.append(_box("post", np.array([*post[:2], top / 2]), [0.08, 0.08, top]))
+    tables.append(Obstacle("floor", HalfSpace(), _at(np.array([0.0, 0.0, -ABOVE * reach - 0.1]))))
+    part = Payload(mass=0.4 * model.rated_payload, com=np.array([0.0, 0.0, 0.15]))
+    (a, b), (c, d) = poses
+    stops = [
+        Stop(name=name, target=pose, payload=carried, dwell=0.2)
+        for name, pose, carried in (
+            ("pick 1", a, part),
+            ("place 1", c, NOTHING),
+            ("pick 2", b, part),
+            ("place 2", d, NOTHING),
+        )
+    ]
+    arm = Arm(robot=model, T_flange_tcp=TOOL, scene=Scene(tables))
+    above = np.mean([a.T[:3, 3], c.T[:3, 3]], axis=0) + np.array([0.0, 0.0, 0.3])
+    start = Pose.from_rpy(above, [np.pi, 0.0, turn])
+    return Cycle(arm=arm, start=start, stops=stops, deadline=20.0)
+
+
+def _around(rng: np.random.Generator, reach: float, angle: float, height: float) -> Array:
+    distance = reach * rng.uniform(NEAR, FAR)
+    angle += rng.uniform(-SIDE, SIDE) / 2
+    return np.array([distance * np.cos(angle), distance * np.sin(angle), height])
+
+
+def _at(position: Array) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = position
+    return T
+
+
+def _box(name: str, centre: Array, size: list[float]) -> Obstacle:
+    return Obstacle(name, Box(np.array(size)), _at(centre))
+
+
+def placements(seed: int, count: int, deadline: float) -> Iterator[Placement]:
+    """The placements, each with a generator of its own; cells without a nominal cycle are left
+    out.
+    """
+    for k in range(count):
+        rng, robot = np.random.default_rng([seed, k]), ROBOTS[k % len(ROBOTS)]
+        while True:
+            cycle = cell(robot, rng)
+            try:
+                plan_cycle(replace(cycle, with_baselines=False), progress=False)
+            except JoulepathError:
+                continue
+            break
+        reach = Chain.of(cycle.arm.robot.model).length
+        around, above = AROUND * reach / 2, ABOVE * reach
+        region = Region(x=(-around, around), y=(-around, around), z=(-above, above))
+        yield Placement(cycles=[WeightedCycle(cycle)], moved=[Moved(region)], deadline=deadline)
+
+
+def exhaustive(placement: Placement) -> list[float]:
+    """The energies [J] at all places of a fine grid with a cycle."""
+    space, energies = Space.of(replace(placement, resolution=GRID)), list[float]()
+    for each in space.map()[0]:
+        (own,) = space.cycles(each)
+        try:
+            found = plan_cycle(replace(own, with_baselines=False), progress=False)
+        except JoulepathError:
+            continue
+        energies.append(found.energy.electrical.total)
+    return energies
+
+
+def checked(found: PlacementSolution, others: list[float]) -> None:
+    """Ends the benchmark if a promise is broken."""
+    energies = [found.best.energy, *(each.energy for each in found.map if each.energy), *others]
+    if found.lower_bound is not None and found.lower_bound > min(energies):
+        raise SystemExit(f"the bound {found.lower_bound} J is above {min(energies)} J")
+    if found.nominal is None or found.best.energy > found.nominal.energy:
+        raise SystemExit("the best place is above the nominal one")
+    for solution in found.best.solutions:
+        if not all(move.solution.certificate.valid for move in solution.moves):
+            raise SystemExit("a move has no valid certificate")
+
+
+def memory() -> float:
+    """Greatest memory of this process so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def main() -> None:
+    """Prints the figures."""
+    on_one_core()
+    arguments = _arguments()
+    for robot in ROBOTS:
+        compile_kernel(load_robot(robot))
+    results = list[dict[str, float]]()
+    statuses, reasons = Counter[str](), Counter[str]()
+    for number, placement in enumerate(
+        placements(arguments.seed, arguments.count, arguments.deadline)
+    ):
+        began = time.process_time()
+        found = place_robot(placement, clock=time.process_time, progress=False)
+        took = time.process_time() - began
+        others = exhaustive(placement) if arguments.grid else []
+        checked(found, others)
+        energies = [each.energy for each in found.map if each.energy is not None]
+        statuses[found.status] += 1
+        reasons.update(each.reason for each in found.map if each.reason is not None)
+        own = {
+            "saving": found.saving or 0.0,
+            "against_worst": 1 - found.best.energy / max(energies),
+            "gap": found.optimality_gap or 1.0,
+            "time": took,
+            "points": len(found.map),
+            "left_out": found.left_out,
+            "evaluated": found.evaluated,
+            "memory": memory(),
+        }
+        if others:
+            own["excess"] = found.best.energy / min(others) - 1
+        results.append(own)
+        robot = placement.cycles[0].cycle.arm.robot.name
+        shown = ", ".join(f"{name} {value:.4g}" for name, value in own.items())
+        print(f"{number} {robot}: {found.best.energy:.1f} J, {shown}", flush=True)
+    report(results, statuses, reasons)
+    write_json(arguments.json, {"placements": results})
+
+
+def report(results: list[dict[str, float]], statuses: Counter[str], reasons: Counter[str]) -> None:
+    """Prints the statistics."""
+
+    def spread(name: str) -> Spread:
+        return Spread.of([each[name] for each in results if name in each])
+
+    print(f"status: {dict(statuses)}; places without a cycle: {dict(reasons)}")
+    print(f"saved against nominal: {spread('saving').times(100).formatted(' %')}")
+    print(f"saved against the worst: {spread('against_worst').times(100).formatted(' %')}")
+    print(f"gap of the lower bound: {spread('gap').times(100).formatted(' %')}")
+    print(f"CPU time: {spread('time').formatted(' s')}")
+    print(f"places of the map: {spread('points').formatted(digits=0)}")
+    print(f"left out: {spread('left_out').formatted(digits=0)}")
+    if any("excess" in each for each in results):
+        print(f"above the best of the grid: {spread('excess').times(100).formatted(' %', 2)}")
+    for number in sorted({0, len(results) // 2, len(results) - 1}):
+        print(f"memory after {number + 1}: {results[number]['memory']:.0f} MB")
+
+
+def _arguments() -> argparse.Namespace:
+    options = parser(__doc__)
+    options.add_argument("--count", type=int, default=50, help="number of cells (%(default)s)")
+    options.add_argument(
+        "--deadline", type=float, default=120.0, help="of a placement [s] (%(default)s)"
+    )
+    options.add_argument("--grid", action="store_true", help="compare with a grid of 5 cm")
+    return options.parse_args()
+
+
+if __name__ == "__main__":
+    main()
