@@ -163,7 +163,8 @@ class Rounds:
             place: the place.
             end: deadline; what is certified until then counts.
             known: memo of motions, which gets those found.
-            compared: whether to search for baselines.
+            compared: whether to search in full, and for baselines; else the configurations are
+                only likely the best.
             cycles: the cycles to be solved; None for those of the place.
 
         Returns:
@@ -173,7 +174,12 @@ class Rounds:
         cycles = self.space.cycles(place) if cycles is None else cycles
         for k, (weight, cycle) in enumerate(zip(self.weights, cycles, strict=True)):
             share = max(end.left / (len(cycles) - k), _LEAST)
-            asked = replace(cycle, deadline=min(cycle.deadline, share), with_baselines=compared)
+            asked = replace(
+                cycle,
+                deadline=min(cycle.deadline, share),
+                with_baselines=compared,
+                approximate=not compared,
+            )
             try:
                 with knowing(known):
                     solution = plan_cycle(asked, self.clock, no_listener, progress=False)

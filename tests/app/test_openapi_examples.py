@@ -112,7 +112,7 @@ def test_every_body_has_an_example() -> None:
 
 
 # a front of dozens of durations, all methods, cycles in a given time, among obstacles or along a
-# path, an excitation of all parameters
+# path, an excitation of all parameters, a map of many places
 SLOW = (
     "post /cycle application/json glue_path",
     "post /cycle application/json out_of_a_tray",
@@ -121,6 +121,8 @@ SLOW = (
     "post /compare application/json all_methods",
     "post /cycle application/json pick_and_place",
     "post /cycle application/json press_tending",
+    "post /placement application/json conveyor",
+    "post /placement application/json two_tables",
 )
 
 

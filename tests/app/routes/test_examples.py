@@ -35,6 +35,8 @@ SLOW = {
     "cycle/seam_any_turn",
     "optimize/seam_any_turn",
     "optimize/polynomial_ga",
+    "placement/conveyor",
+    "placement/two_tables",
     "replay/lift_with_payload",
 }
 
