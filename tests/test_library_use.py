@@ -146,6 +146,7 @@ TYPES = {
     "LogReading",
     "LogReport",
     "MapPoint",
+    "McapOptions",
     "MechanicalEnergy",
     "Mesh",
     "Move",
