@@ -229,14 +229,7 @@ class PlacementSearch:
         return same and bool((np.abs(a.x - b.x) <= SEARCH.apart * self.spacing).all())
 
     def energy(self, place: Place, end: Deadline) -> float | None:
-        """Energy at a place [J]: inf without cycles and where a bound excludes a better place.
-
-        Returns:
-            The energy; None if the time is up.
-        """
-        checked = self.rounds.checked(place, end)
-        if checked.reason is not None or not self._may_be_better(checked):
-            return np.inf
+        """Energy at a place [J]: inf without cycles; None if the time is up."""
         found = self._solved(place, end)
         if not found.is_decided and end.passed:
             return None

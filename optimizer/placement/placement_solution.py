@@ -115,8 +115,8 @@ class SolvedPlacement:
     tolerance: list[Tolerance] | None
     """How precisely every free coordinate of the best place must be kept; null if there was no time
     to find it."""
-    resolution: Metres
-    """Distance between neighbouring places of the map."""
+    resolution: Metres | None
+    """Distance between neighbouring places of the map; null if its places were listed."""
     map: list[MapPoint]
     """Places all over the region."""
     evaluated: Count
@@ -136,7 +136,7 @@ class PlacementSolution(Result):
         nominal: nominal place; None where its cycles cannot be run, for `nominal_reason`.
         nominal_reason: why the nominal place has no cycles.
         map: places of the map, in the order of the axes.
-        resolution: distance between neighbouring places of the map [m].
+        resolution: distance between neighbouring places of the map [m]; None of listed places.
         tolerance: how precisely every free coordinate must be kept; None if there was no time.
         lower_bound: lower bound of the objective at every place of the region [J]; None where none
             is known.
@@ -153,7 +153,7 @@ class PlacementSolution(Result):
     nominal: PlacedRound | None
     nominal_reason: Reason | None
     map: list[MapPoint]
-    resolution: float
+    resolution: float | None
     tolerance: list[Tolerance] | None
     lower_bound: float | None
     status: PlacementStatus

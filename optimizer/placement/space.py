@@ -149,6 +149,10 @@ class Space:
                 "The region has the nominal place alone: give a range of x, y, z or yaw, another "
                 "mount, or places.",
             )
+        if placement.resolution is not None and not axes:
+            raise InvalidProblem(
+                "resolution", "Listed places have no resolution: leave it out, or give ranges."
+            )
         return cls(placement, tuple(bodies), tuple(axes))
 
     @property
@@ -224,13 +228,15 @@ class Space:
                 obstacles |= dict.fromkeys(moved.moves.obstacles, pose)
         return stops, obstacles
 
-    def map(self) -> tuple[list[Place], float]:
-        """The places of the map, and its resolution [m].
+    def map(self) -> tuple[list[Place], float | None]:
+        """The places of the map, and its resolution [m]; None of listed places alone.
 
         Raises:
             InvalidProblem: the resolution gives too many places.
         """
         resolution = self.placement.resolution
+        if not self.axes:
+            return [self.place(choice, np.zeros(0)) for choice in self.choices], None
         if resolution is None:
             resolution = self._resolution()
         elif self._points(resolution) > MAP.most_points:
@@ -245,8 +251,10 @@ class Space:
         ]
         return grid, resolution
 
-    def spacing(self, resolution: float) -> Array:
+    def spacing(self, resolution: float | None) -> Array:
         """Distances between neighbouring places of the map along the axes, shape (n,) [m, rad]."""
+        if resolution is None:
+            return np.zeros(0)
         return np.array([axis.values(resolution)[1] - axis.low for axis in self.axes])
 
     def _points(self, resolution: float) -> int:
@@ -255,14 +263,11 @@ class Space:
 
     def _resolution(self) -> float:
         """Finest resolution [m] with at most `MapSettings.points` places, if there is one."""
-        low, high = 0.0, max((axis.high - axis.low) / axis.scale for axis in self.axes or [_UNIT])
+        low, high = 0.0, max((axis.high - axis.low) / axis.scale for axis in self.axes)
         for _ in range(40):
             middle = (low + high) / 2
             low, high = (low, middle) if self._points(middle) <= MAP.points else (middle, high)
         return high
-
-
-_UNIT = Axis(0, "x", 0.0, 1.0, 0.0)
 
 
 def _body(placement: Placement, k: int) -> Body:

@@ -11,9 +11,10 @@ from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import cycle_answer
 from joulepath.app.api.placement.problem import request_at, to_placement
 from joulepath.app.api.placement.request import PlacementRequest
+from joulepath.app.convert.arm_fields import LARGEST
 from joulepath.app.convert.warnings import AT_EDGE, JOINT_POSITIONS
 from joulepath.app.engine.listening import listener
-from joulepath.app.engine.result import TaskResult
+from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.schemas.request import JointTarget
 from joulepath.app.tasks.answer_collector import AnswerCollector
 from joulepath.optimizer.declared import NotEmpty
@@ -34,9 +35,9 @@ class PlacedCycle:
 
     answer: str
     """Path of its complete answer of `POST /cycle`."""
-    request: dict[str, Any]
+    request: dict[str, Any] | None
     """The body of `POST /cycle` with this answer: poses, obstacles and `gravity` in the frame of
-    the base at this place."""
+    the base at this place. Null above 64 KiB of JSON."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +100,8 @@ class PlacementTask:
             answer = cycle_answer(request, self.request_id, solution, collector)
             path = collector.add(answer, CYCLE)
             body = request.model_dump(mode="json", exclude_unset=True)
-            placed.append(PlacedCycle(answer=path, request=body))
+            short = len(json_document(body)) <= LARGEST
+            placed.append(PlacedCycle(answer=path, request=body if short else None))
         return PlacedCycles(**vars(found) | {"cycles": placed})
 
 

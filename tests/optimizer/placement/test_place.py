@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import JoulepathError
+from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.placement.errors import NoPlacement
 from joulepath.optimizer.placement.place import place, place_robot
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
@@ -145,6 +145,11 @@ def test_a_deadline_gives_the_best_so_far() -> None:
     found = place_robot(placement, clock=lambda: 0.02 * next(ticks), progress=False)
     check(found)
     assert found.status == "cut_short"
+
+
+def test_no_time_at_all_is_an_error_of_its_own() -> None:
+    with pytest.raises(DeadlineExceeded):
+        place(two_stops(), Places([at(0.1)]), deadline=1e-3, progress=False)
 
 
 def test_progress_is_told() -> None:

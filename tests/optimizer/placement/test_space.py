@@ -127,6 +127,10 @@ WRONG: dict[str, tuple[str, Any]] = {
         lambda: Space.of(placement(Moved(Region(mounts=("wall",))))),
     ),
     "one place": ("region", lambda: Space.of(placement(Moved(Region(x=(0.0, 0.0)))))),
+    "resolution of listed places": (
+        "resolution",
+        lambda: Space.of(placement(Moved(Places([at(0.1)])), resolution=0.1)),
+    ),
     "too fine": (
         "resolution",
         lambda: Space.of(
