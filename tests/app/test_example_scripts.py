@@ -17,12 +17,20 @@ from tests.app.live import ANSWER, ROOT, Server
 EXAMPLES = ROOT / "examples"
 PNG = b"\x89PNG"
 # several requests, or one that takes long: the cycles in many times are cut to one
-SLOW = {"plot_cycle", "plot_cycle_times", "plot_front", "plot_swept_arm", "plot_replay"}
+SLOW = {
+    "plot_cycle",
+    "plot_cycle_times",
+    "plot_front",
+    "plot_placement",
+    "plot_swept_arm",
+    "plot_replay",
+}
 # by its name: the request, and the further arguments
 ASKING = {
     "plot_answer": ("optimize/paper_pose_1", ()),
     "plot_front": ("pareto/lift", ()),
     "plot_cycle": ("cycle/pick_and_place", ()),
+    "plot_placement": ("placement/ceiling", ()),
     "plot_cycle_times": ("cycle/pick_and_place", ("--ratios", "1.2")),
 }
 COMPUTING = {

@@ -14,7 +14,7 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.whatif.answer import WhatifAnswer
-from joulepath.app.cli import compare, excitation, ik, pareto, whatif
+from joulepath.app.cli import compare, excitation, ik, pareto, placement, whatif
 from tests.app.cli.console import ROOT, Here, request
 from tests.app.cli.test_terminal import on_a_terminal
 from tests.app.requests import HOME, NEAR, move
@@ -98,6 +98,24 @@ def test_a_front_with_its_motions(here: Here, tmp_path: Path) -> None:
     lines = pareto.summary_of(answer)
     first = answer["points"][0]
     assert lines[f"{first['duration']:.4g} s"] == f"{first['energy']:.4g} J electrical"
+
+
+def test_a_placement_with_its_cycles(here: Here, tmp_path: Path) -> None:
+    folder = tmp_path / "cycles"
+    stops = [{"name": "there", "target": {"q": NEAR}}]
+    cycle = {"start": {"q": HOME}, "stops": stops, "windings": False}
+    places = [{"position": [0.1, 0.0, 0.0], "rpy": [0.0, 0.0, 0.0]}]
+    body = json.dumps({"cycle": cycle, "region": {"places": places}, "deadline": 60})
+    answer = written(here, tmp_path, "placement", "-", "--answers", str(folder), stdin=body)
+    (own,) = answer["best"]["cycles"]
+    kept = json.loads((folder / f"{Path(own['answer']).name}.json").read_text())
+    total = kept["energy"]["electrical"]["total"]
+    assert total == pytest.approx(answer["best"]["energy"])
+    # joint positions stay the same wherever the base stands
+    assert answer["saving"] == pytest.approx(0.0, abs=1e-6)
+    lines = placement.summary_of(answer)
+    assert lines["energy"] == f"{answer['best']['energy']:.4g} J electrical"
+    assert lines["saved"] == "0.0%"
 
 
 def test_a_front_as_csv(here: Here) -> None:
