@@ -39,10 +39,12 @@ def draw(found: dict[str, Any]) -> Figure:
         cmap="viridis_r",
     )
     for reason, mark in MARKS.items():
-        at = [each for each in columns if each not in solved and columns[each]["reason"] == reason]
-        if at:
-            name = reason or "left out"
-            axes.scatter(*zip(*at, strict=True), marker=mark, color="0.45", label=name)
+        without = [
+            each for each in columns if each not in solved and columns[each]["reason"] == reason
+        ]
+        if without:
+            label = reason or "left out"
+            axes.scatter(*zip(*without, strict=True), marker=mark, color="0.45", label=label)
     for name, mark in (("nominal", "o"), ("best", "*")):
         if found[name] is not None:
             x, y = at_floor(found[name])

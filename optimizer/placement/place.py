@@ -170,9 +170,9 @@ def placed_pose(T: Array) -> PlacedPose:
     return PlacedPose(position=T[:3, 3].tolist(), quaternion=quaternion.tolist())
 
 
-def _tolerance(search: PlacementSearch) -> list[Tolerance] | None:
+def _tolerance(search: PlacementSearch) -> list[Tolerance]:
     if search.tolerance is None:
-        return None
+        return []
     return [
         Tolerance(body=axis.body, coordinate=axis.name, lower=float(lower), upper=float(upper))
         for axis, (lower, upper) in zip(search.space.axes, search.tolerance, strict=True)

@@ -112,9 +112,9 @@ class SolvedPlacement:
     optimality_gap: Ratio | None
     """1 - lower_bound / energy of the best place. The bound knows the lengths of the ways, the
     payloads and the rests, and not where the base stands, so that the gap is wide."""
-    tolerance: list[Tolerance] | None
-    """How precisely every free coordinate of the best place must be kept; null if there was no time
-    to find it."""
+    tolerance: list[Tolerance]
+    """How precisely every free coordinate of the best place must be kept. Empty for listed places,
+    and if there was no time to find it."""
     resolution: Metres | None
     """Distance between neighbouring places of the map; null if its places were listed."""
     map: list[MapPoint]
@@ -137,7 +137,7 @@ class PlacementSolution(Result):
         nominal_reason: why the nominal place has no cycles.
         map: places of the map, in the order of the axes.
         resolution: distance between neighbouring places of the map [m]; None of listed places.
-        tolerance: how precisely every free coordinate must be kept; None if there was no time.
+        tolerance: how precisely every free coordinate must be kept; empty if there was no time.
         lower_bound: lower bound of the objective at every place of the region [J]; None where none
             is known.
         status: "complete" if every place of the map was decided and the refinement ended;
@@ -154,7 +154,7 @@ class PlacementSolution(Result):
     nominal_reason: Reason | None
     map: list[MapPoint]
     resolution: float | None
-    tolerance: list[Tolerance] | None
+    tolerance: list[Tolerance]
     lower_bound: float | None
     status: PlacementStatus
     evaluated: int

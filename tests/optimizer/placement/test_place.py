@@ -59,7 +59,7 @@ def test_brute_force_finds_no_better_place() -> None:
         except JoulepathError:
             continue
     assert found.best.energy <= min(energies) * (1 + SCATTER)
-    (tolerance,) = found.tolerance or []
+    (tolerance,) = found.tolerance
     assert tolerance.lower <= 0 <= tolerance.upper
 
 
