@@ -143,8 +143,11 @@ def main() -> None:
     if shutil.which("readelf") and shutil.which("strip"):
         remove_unreached(casadi, {casadi / "_casadi.so", *casadi.glob("libcasadi_*.so")})
         remove_unreached(cmeel, set(cmeel.glob("python*/site-packages/*/*.so")))
-        libraries = [str(path) for pattern in SYMBOLS for path in packages.glob(pattern)]
-        subprocess.run(["strip", "--strip-unneeded", *libraries], check=True)
+        for library in (path for pattern in SYMBOLS for path in packages.glob(pattern)):
+            # not in place: a process that runs has mapped the file, and would crash
+            stripped = library.with_suffix(".stripped")
+            subprocess.run(["strip", "--strip-unneeded", "-o", stripped, library], check=True)
+            stripped.replace(library)
     print(f"{packages}: {before} MiB before, {size(packages)} MiB after")
 
 
