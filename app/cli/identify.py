@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import json
 import shutil
 from io import BytesIO
 from pathlib import Path
@@ -22,6 +23,26 @@ _PIECE = 1 << 20
 FILE_ID = "file"
 """Stand-in for the ids of stored logs: those of a command are files."""
 
+
+class _Json(click.ParamType[dict[str, Any], Any]):
+    """A mapping in JSON."""
+
+    name = "JSON"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> dict[str, Any]:
+        """The mapping."""
+        try:
+            content = json.loads(value)
+        except ValueError as error:
+            self.fail(f"is no JSON: {error}", param, ctx)
+        if not isinstance(content, dict):
+            self.fail("must be a mapping, as {...}.", param, ctx)
+        return content
+
+
+JSON = _Json()
 OTHERS = click.option(
     "--validate",
     "others",
@@ -105,9 +126,23 @@ Examples:
 )
 @click.option(
     "--effort",
-    type=click.Choice(["auto", "current", "torque"]),
+    type=click.Choice(["auto", "current", "torque", "external"]),
     default="auto",
     help="What efforts are.",
+)
+@click.option(
+    "--columns",
+    type=JSON,
+    help="Names of the columns, or their numbers from 1, as JSON: "
+    """'{"time": 1, "q": [2, 3, 4, 5, 6, 7]}'.""",
+)
+@click.option(
+    "--gravity",
+    type=(float, float, float),
+    help="Gravity in the base frame [m/s²]. Default: that of the robot.",
+)
+@click.option(
+    "--current-units", type=click.Choice(["A", "mA"]), default="A", help="Unit of currents."
 )
 @click.option(
     "--torque-side",
@@ -130,6 +165,9 @@ def identify(
     com: tuple[float, float, float],
     units: str,
     effort: str,
+    columns: dict[str, Any] | None,
+    gravity: tuple[float, float, float] | None,
+    current_units: str,
     torque_side: str | None,
 ) -> None:
     """Finds the figures of one arm from its LOGS, with their standard deviations.
@@ -147,6 +185,9 @@ def identify(
         "payload": carried,
         "units": units,
         "effort": effort,
+        "columns": columns,
+        "gravity": gravity,
+        "current_units": current_units,
         "torque_side": torque_side,
     }
     read = tuple(read_log_file(settings, file, request_id) for file in (*logs, *others))

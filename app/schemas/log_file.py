@@ -10,13 +10,16 @@ from joulepath.app.schemas.common import NO_CONTROLS, Request, described
 from joulepath.app.schemas.lengths import LENGTHS
 
 EffortMeaning = Literal["current", "torque", "external"]
-_Column = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS)]
+_Column = (
+    Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS)]
+    | Annotated[int, Field(ge=1, le=1000)]
+)
 _Columns = Annotated[list[_Column], Field(min_length=1, max_length=16)]
 
 
 class LogColumns(Request):
-    """Names of the columns of a log, as in its header; of joints one each, from base to flange.
-    Null: none.
+    """Names of the columns of a log, as in its header, or their numbers from 1; of joints one each,
+    from base to flange. Null: none.
     """
 
     time: _Column = described("Times [s].", None, "time_s")

@@ -8,8 +8,11 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identify.logs.head import NUMBERED
 from joulepath.optimizer.identify.logs.log_formats import FORMATS, ChannelName, LogFormat
 
+ColumnMap = Mapping[str, str | int | Sequence[str | int]]
+"""Names of columns, or their numbers from 1, by the name of the channel."""
 WRENCH_COLUMNS = 6
 """Columns of a wrench: three of the force, then three of the torque."""
 
@@ -111,6 +114,12 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
         return Columns(
             log_format.name, names, time, found | dict(_columns_without_joint(log_format, names))
         )
+    if NUMBERED.format(1) in names:
+        raise InvalidTable(
+            "The file has no header: give one, or the numbers of the columns in `columns`, as in "
+            '{"time": 1, "q": [2, 3, 4, 5, 6, 7]}.',
+            1,
+        )
     raise InvalidTable(
         f"The header names no joint positions that are known: begin it with {_KNOWN_HEADERS}.", 1
     )
@@ -197,13 +206,13 @@ def _columns_without_joint(
         yield "payload", present if len(present) == len(log_format.payload) else present[:1]
 
 
-def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
-    """Columns by a map of names.
+def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
+    """Columns by a map of names, or of numbers from 1.
 
     Args:
         names: names of the columns.
-        columns: names of the columns of each channel: one for `time`, `nanoseconds` and `power`,
-            six for `wrench`, and one per joint for all others.
+        columns: names or numbers of the columns of each channel: one for `time`, `nanoseconds` and
+            `power`, six for `wrench`, and one per joint for all others.
         nq: number of joints.
 
     Raises:
@@ -219,7 +228,7 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
         )
     found: dict[str, tuple[int, ...]] = {}
     for group, given in columns.items():
-        wanted = [given] if isinstance(given, str) else [*given]
+        wanted = [given] if isinstance(given, str | int) else [*given]
         if group in ("time", "nanoseconds", "power") and len(wanted) != 1:
             raise InvalidProblem(
                 f"columns.{group}", f"columns.{group} must be the name of one column."
@@ -240,7 +249,15 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
     return Columns("mapped", names, time, groups)
 
 
-def _index(names: Sequence[str], name: str) -> int:
+def _index(names: Sequence[str], name: str | int) -> int:
+    if isinstance(name, int):
+        if not 1 <= name <= len(names):
+            raise InvalidTable(
+                f"The file has {len(names)} columns, and `columns` names number {name}: columns "
+                "are numbered from 1.",
+                1,
+            )
+        return name - 1
     if names.count(name.lower()) != 1:
         has = "does not have" if name.lower() not in names else "has more than once"
         raise InvalidTable(

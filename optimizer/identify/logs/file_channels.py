@@ -94,7 +94,7 @@ def read_channels(
     )
     scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
     with LogSource(source, options.max_bytes) as file:
-        rows = FileRows(file, head_of(file, robot.joint_names))
+        rows = FileRows(file, head_of(file))
         columns = columns_of_rows(rows, robot, options, scales, remarks)
         times, lines, values = _read_rows(rows, columns, robot, scales)
     grid = grid_of(times, lines, columns.names[columns.time[0]])

@@ -18,6 +18,7 @@ from joulepath.optimizer.csv_table import line_of, names_of, numbers_of, with_po
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidTable
+from joulepath.optimizer.identify.logs.bag import BagText, kind_of_bag
 from joulepath.optimizer.identify.logs.head import HEAD, Head, is_comment
 from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
 
@@ -30,6 +31,8 @@ class FileSettings:
 
     max_bytes: int = 1 << 30
     """Largest size after unpacking [bytes]."""
+    head_bytes: int = 4096
+    """Bytes by which the kind of a file is recognised."""
     max_dropped: float = 0.1
     """Largest share of lines with a wrong number of cells; more show that the whole file is
     wrong [1]."""
@@ -63,8 +66,27 @@ class _DeadlineFile(RawIOBase):
         super().close()
 
 
+class _CarriageReturns(RawIOBase):
+    """A file whose lines end with carriage returns alone, as with line feeds."""
+
+    def __init__(self, file: BufferedReader) -> None:
+        self._file = file
+
+    def readable(self) -> bool:
+        """Always true."""
+        return True
+
+    def readinto(self, buffer: Any, /) -> int:
+        """Read into a buffer."""
+        view = memoryview(buffer)
+        data = self._file.read1(len(view)).replace(b"\r", b"\n")
+        view[: len(data)] = data
+        return len(data)
+
+
 class LogSource:
-    """Lines of a log, unpacked if the file is gzip.
+    """Lines of a log, unpacked if the file is gzip; those of a bag of ROS 2 are made of its
+    messages.
 
     Args:
         source: path of the file, or its content.
@@ -79,7 +101,7 @@ class LogSource:
         )
         packed = self._raw.peek(2)[:2] == _GZIP_MAGIC
         self._file: BufferedIOBase = gzip.GzipFile(fileobj=self._raw) if packed else self._raw
-        self._max_bytes, self._read = max_bytes, 0
+        self._max_bytes, self._read, self._begun = max_bytes, 0, False
 
     def __enter__(self) -> LogSource:
         return self
@@ -96,6 +118,8 @@ class LogSource:
             LogTooLarge: the file is too large.
         """
         try:
+            if not self._begun:
+                self._begin()
             line = self._file.readline(size)
         except (OSError, EOFError, ZlibError):
             raise InvalidTable(
@@ -105,6 +129,19 @@ class LogSource:
         if self._read > self._max_bytes:
             raise LogTooLarge(self._max_bytes, "bytes after unpacking")
         return line
+
+    def _begin(self) -> None:
+        """Find out what kind of file it is: a bag, or lines that end with carriage returns."""
+        self._begun = True
+        file = self._file if isinstance(self._file, BufferedReader) else BufferedReader(self._file)
+        head = file.peek(FILE.head_bytes)[: FILE.head_bytes]
+        kind = kind_of_bag(head)
+        if kind is not None:
+            self._file = BufferedReader(BagText(file, kind, self._max_bytes))
+        elif b"\r" in head and b"\n" not in head:
+            self._file = BufferedReader(_CarriageReturns(file))
+        else:
+            self._file = file
 
 
 class FileRows:

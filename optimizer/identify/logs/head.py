@@ -16,6 +16,8 @@ _ROS_HEADER = "%time"
 _SEPARATOR_LINE = re.compile(r"sep=(.)")
 """Line of spreadsheets that names the separator."""
 _STAMP = ("sec", "nanosec", "frame_id")
+NUMBERED = "column {}"
+"""Name of a column without header, by its number from 1."""
 
 
 @dataclass(frozen=True)
@@ -44,16 +46,15 @@ class Head:
     """That line, if it has been read already."""
 
 
-def head_of(file: Lines, joints: Sequence[str]) -> Head:
+def head_of(file: Lines) -> Head:
     """Read the head of a log.
 
     Comments, a line with the separator, and empty lines may stand above the header. The header may
     be the last of the comments. A JointState without header, as printed by `ros2 topic echo --csv`,
-    gets a header.
+    gets a header; the columns of other files without header are named by their numbers.
 
     Args:
         file: lines of the log.
-        joints: names of the joints.
 
     Raises:
         InvalidTable: there is no header.
@@ -80,8 +81,10 @@ def head_of(file: Lines, joints: Sequence[str]) -> Head:
     if all(is_number(each) for each in names):
         if comment:
             names, separator = names_of(comment.lstrip("#/% "), separators)
+        else:
+            names = [NUMBERED.format(k) for k in range(1, len(names) + 1)]
         return Head(names, separator, row, line)
-    state = _joint_state(names, [joint.lower() for joint in joints])
+    state = _joint_state(names)
     if state is not None:
         return Head(state, separator, row, line)
     while names and not names[-1]:
@@ -104,20 +107,16 @@ def is_number(cell: str) -> bool:
     return True
 
 
-def _joint_state(cells: Sequence[str], joints: Sequence[str]) -> list[str] | None:
+def _joint_state(cells: Sequence[str]) -> list[str] | None:
     """Header for rows of a JointState: seconds, nanoseconds, frame, names, and as many positions,
     velocities and efforts; None for cells of another kind.
     """
-    if (
-        len(cells) < len(_STAMP)
-        or not (is_number(cells[0]) and is_number(cells[1]))
-        or not set(joints) <= set(cells)
-    ):
+    if len(cells) < len(_STAMP) or not (is_number(cells[0]) and is_number(cells[1])):
         return None
     behind = cells[len(_STAMP) :]
     names = behind[: next((k for k, cell in enumerate(behind) if is_number(cell)), len(behind))]
     kinds, rest = divmod(len(behind) - len(names), max(len(names), 1))
-    if rest or not 1 <= kinds <= 3:
+    if rest or not 1 <= kinds <= 3 or not all(map(is_number, behind[len(names) :])):
         return None
     values = [
         f"{name}/{kind}" for kind in ("position", "velocity", "effort")[:kinds] for name in names

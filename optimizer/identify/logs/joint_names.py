@@ -17,13 +17,16 @@ _WORDS: Mapping[ChannelName, str] = {
     "torque": "torque|tau",
     "current": "current|cur",
 }
+NAMED = "named"
+"""Format of headers with names of joints."""
 _DELIMITER = "[^a-z0-9]+"
 
 
 def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None:
-    """Columns of a header with the names of the robot's joints.
+    """Columns of a header with the names of the robot's joints, or with other names that are
+    numbered from base to flange.
 
-    Examples are `/joint_states/elbow_joint/position` and `elbow_joint_velocity`.
+    Examples are `/joint_states/elbow_joint/position` and `elbow_joint_velocity`; `lbr_A1/position`.
 
     Args:
         names: names of the columns.
@@ -38,12 +41,12 @@ def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None
     found = {
         group: columns
         for group, word in _WORDS.items()
-        if (columns := _of_word(names, word, joints))
+        if (columns := _of_word(names, word, joints) or _numbered(names, word, len(joints)))
     }
     time = time_of(names)
     if "q" not in found or not time:
         return None
-    return Columns("named", names, time, found)
+    return Columns(NAMED, names, time, found)
 
 
 def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[int, ...]:
@@ -62,6 +65,19 @@ def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[in
     return tuple(columns[0] for columns in every)
 
 
+def _numbered(names: Sequence[str], word: str, count: int) -> tuple[int, ...]:
+    """Columns of joints whose names differ by a number from 0 or 1, if there is one such list."""
+    lists: dict[tuple[str, str], dict[int, int]] = {}
+    for k, name in enumerate(names):
+        match = re.fullmatch(rf"(.*?[a-z_])([0-9]{{1,2}})(_joint|){_DELIMITER}(?:{word})", name)
+        if match is not None:
+            lists.setdefault((match[1], match[3]), {})[int(match[2])] = k
+    whole = [
+        each for each in lists.values() if sorted(each) in ([*range(count)], [*range(1, count + 1)])
+    ]
+    return tuple(whole[0][number] for number in sorted(whole[0])) if len(whole) == 1 else ()
+
+
 def _matching(names: Sequence[str], word: str, joint: str) -> Iterator[int]:
     named = re.escape(joint)
     pattern = f"(?:.*[^a-z0-9])?(?:{named}{_DELIMITER}(?:{word})|(?:{word}){_DELIMITER}{named})"
@@ -70,7 +86,9 @@ def _matching(names: Sequence[str], word: str, joint: str) -> Iterator[int]:
 
 def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[str]) -> Columns:
     """Columns in the order of the robot's joints, if the first row has joint names as in a
-    JointState."""
+    JointState, and the header has none."""
+    if columns.format == NAMED:
+        return columns
     named: dict[int, str] = {}
     for k, name in enumerate(columns.names):
         match = re.fullmatch(rf"(?:.*[./])?name{JOINT_NUMBER}", name)
@@ -86,7 +104,7 @@ def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[
         for group, indices in columns.groups.items()
         if len(indices) > 1
     }
-    return replace(columns, format="named", groups={**columns.groups, **groups})
+    return replace(columns, format=NAMED, groups={**columns.groups, **groups})
 
 
 def _with_prefix(logged: Sequence[str], joints: Sequence[str]) -> list[str] | None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from joulepath.models.robot import Array, TorqueSide
+from joulepath.optimizer.identify.logs.columns import ColumnMap
 from joulepath.optimizer.identify.logs.file_rows import FILE
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.problem.arm import Payload
@@ -20,8 +21,9 @@ class LogOptions:
     """Payload of the arm; None for the logged payload, or none if it was not logged."""
     gravity: Sequence[float] | Array | None = None
     """Gravity (3,) in the base frame [m/s²]; None for that of the robot."""
-    columns: Mapping[str, str | Sequence[str]] | None = None
-    """Names of the columns of each channel; None for a header with known names."""
+    columns: ColumnMap | None = None
+    """Names of the columns of each channel, or their numbers from 1; None for a header with known
+    names."""
     units: Literal["rad", "deg"] = "rad"
     """Unit of positions, and of the angle in speeds and accelerations."""
     current_units: Literal["A", "mA"] = "A"

@@ -64,7 +64,7 @@ def check_header(source: Path | bytes, robot: Robot, options: LogOptions) -> Non
         InvalidProblem: the map of columns is wrong.
     """
     with LogSource(source, options.max_bytes) as file:
-        columns_of_header(head_of(file, robot.joint_names).names, robot, options)
+        columns_of_header(head_of(file).names, robot, options)
 
 
 def read_log(

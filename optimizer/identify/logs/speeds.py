@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +25,11 @@ class SpeedSettings:
     max_factor: float = 1.5
     """Common factor between all logged speeds and the derivatives of the positions, from which on
     the log is refused [1]."""
+    max_clock: float = 5.0
+    """Common factor up to which the clock may be wrong; units differ by more [1]."""
+    clock_tolerance: float = 0.05
+    """Difference of the factors of all joints, up to which the clock is the cause, and of a clock
+    from that of the controller [1]."""
     min_correlation: float = 0.8
     """Correlation of speeds that are right up to a factor [1]."""
     acceleration_cutoff: float = 5.0
@@ -63,7 +67,7 @@ def speeds_of(
     wrong: list[int] = []
     if v is None:
         v = derivative(q, rate)
-    elif wrong := _inconsistent_speeds(q, v, rate, [columns.names[k] for k in columns.groups["v"]]):
+    elif wrong := _inconsistent_speeds(q, v, rate, columns, remarks):
         v = _replaced(v, derivative(q[:, wrong], rate), wrong)
         remarks.append(
             f"The speeds of joints {numbers_of_joints(wrong)} do not fit their positions, and are "
@@ -89,8 +93,12 @@ def _replaced(values: Array, by: Array, joints: list[int]) -> Array:
     return values
 
 
-def _inconsistent_speeds(q: Array, v: Array, rate: float, names: Sequence[str]) -> list[int]:
+def _inconsistent_speeds(
+    q: Array, v: Array, rate: float, columns: Columns, remarks: list[str]
+) -> list[int]:
     """Joints with speeds (n, joints) [rad/s] that are not the derivatives of positions (n, joints).
+
+    Speeds that are wrong by a common factor near 1 are right, and the clock is wrong.
 
     Raises:
         InvalidTable: all speeds are wrong by a common factor, as in another unit or of opposite
@@ -111,14 +119,39 @@ def _inconsistent_speeds(q: Array, v: Array, rate: float, names: Sequence[str]) 
             if correlated or size == 0:
                 factors.append(float((logged * derived).mean() / (derived**2).mean()))
     if moved and len(factors) == len(moved):
-        _check_factor(float(np.median(factors)), names[moved[0]])
+        factor, clock = float(np.median(factors)), columns.names[columns.time[0]]
+        alike = np.ptp(factors) < SPEEDS.clock_tolerance * factor and len(moved) > 1
+        _check_factor(factor, columns.names[columns.groups["v"][moved[0]]], clock if alike else "")
+        if alike and abs(factor - 1) > SPEEDS.clock_tolerance:
+            remarks.append(
+                f"The speeds are {factor:.3g} times the change of the positions, in all joints "
+                f"alike: the clock {clock} is nominal, and not that of the controller. The speeds "
+                "are taken as they are, and durations and energies are wrong by this factor: log "
+                "the time of the controller."
+            )
+            return []
     return wrong
 
 
-def _check_factor(factor: float, name: str) -> None:
-    """Check the factor between logged speeds and derivatives of the positions."""
+def _check_factor(factor: float, name: str, clock: str) -> None:
+    """Check the factor between logged speeds and derivatives of the positions.
+
+    Args:
+        factor: the factor.
+        name: name of a column of speeds.
+        clock: name of the column of times, if it may be wrong by this factor.
+    """
     if 1 / SPEEDS.max_factor < factor < SPEEDS.max_factor:
         return
+    if clock and 1 / SPEEDS.max_clock < factor < SPEEDS.max_clock:
+        raise InvalidTable(
+            f"The speeds are {factor:.3g} times the change of the positions, in all joints alike: "
+            f"the clock {clock} is nominal, and not that of the controller. Log the time of the "
+            f"controller, or divide the times by {factor:.3g}; leave the columns of speeds out "
+            "only if the clock is right.",
+            None,
+            clock,
+        )
     relation = f"{factor:.3g} times the change of the positions"
     if factor == 0:
         relation = "0, while the positions change"

@@ -133,3 +133,22 @@ def test_no_log_is_wrong_usage(here: Here) -> None:
 def test_an_unknown_robot_is_named(here: Here, logs: list[str]) -> None:
     code, content = here.problem("identify", logs[0], "--robot", "r2d2")
     assert code == 2 and "ur5e" in json.dumps(content)
+
+
+def test_options_say_what_a_file_does_not(here: Here, tmp_path: Path) -> None:
+    """A file without header, with currents in mA, of an arm that hangs."""
+    recording = recorded(ROBOT, truth_of(ROBOT), moves=6)
+    file = tmp_path / "log.csv"
+    table = np.column_stack([recording.time, recording.q, recording.v, 1e3 * recording.current])
+    np.savetxt(file, table, delimiter=",", fmt="%.9g")
+    numbers = {"time": 1, "q": [*range(2, 8)], "v": [*range(8, 14)], "current": [*range(14, 20)]}
+    options = ("--columns", json.dumps(numbers), "--current-units", "mA", "--payload", "0")
+    output = tmp_path / "figures.json"
+    assert here.run("identify", str(file), *options, "-o", str(output))[0] == 0
+    result = RESULT.model_validate_json(output.read_bytes())
+    told = {(each.figure, each.joint) for each in result.parameters if each.identified}
+    assert ("coulomb", 1) in told
+    code, _, said = here.run("identify", str(file), *options, "--gravity", "0", "0", "9.81")
+    assert code != 0 and b"gravity" in said
+    code, _, said = here.run("identify", str(file), "--columns", "[1]")
+    assert code != 0 and b"mapping" in said

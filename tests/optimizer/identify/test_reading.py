@@ -329,7 +329,7 @@ def broken_tables(recording: Recording) -> dict[str, Case]:
         "few rows": (b"\n".join(lines[:12]), "it needs 32", None, None),
         "header only": (lines[0], "fewer than two rows", None, None),
         "nothing": (b"", "empty", None, None),
-        "no header": (b"\n".join(lines[1:]), "no joint positions", 1, None),
+        "no header": (b"\n".join(lines[1:]), "no header", 1, None),
         "two robots": (
             good.replace(b",i1,i2,i3,i4,i5,i6", b",q7,q8,q9,q10,q11,q12", 1),
             "12 columns like q1",
