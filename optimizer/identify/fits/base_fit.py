@@ -118,9 +118,10 @@ def fit_base(
 ) -> Estimate:
     """Fit base parameters and friction by ordinary, weighted or reweighted least squares.
 
-    Undetermined friction and rotors, and with the method `essential_parameters` all undetermined
-    unknowns, are held at the robot's own values, the least determined first, until all others are
-    determined. An unknown whose own value the logs reject is not held.
+    With the method `essential_parameters`, undetermined unknowns are held at the robot's own
+    values, the least determined first, until all others are determined. An unknown whose own value
+    the logs reject is not held. The other methods assume nothing of the arm: they have a reason for
+    undetermined unknowns, and fit them.
 
     Args:
         robot: the robot with its own figures.
@@ -162,7 +163,7 @@ def hold_undetermined(
     grouped: GroupedEquations,
     options: IdentificationOptions,
 ) -> Estimate:
-    """Solve for the unknowns that the rows determine, with all others at the robot's own values.
+    """Solve for the unknowns, and hold or only name those that the rows do not determine.
 
     Args:
         terms: the unknowns.
@@ -171,9 +172,8 @@ def hold_undetermined(
     """
     own, lower = terms.own, terms.lower
     free, reasons, remarks = np.ones(len(own), dtype=bool), [""] * len(own), [""] * len(own)
-    may_hold = np.arange(len(own)) >= len(terms.expressed)
-    if options.method == "essential_parameters":
-        may_hold[:] = True
+    holds = options.method == "essential_parameters"
+    judged = holds | (np.arange(len(own)) >= len(terms.expressed))
     while True:
         part, value = _free_equations(grouped, own, free), own.copy()
         gram, moment = part.gram.sum(axis=0), part.moment.sum(axis=0)
@@ -183,7 +183,7 @@ def hold_undetermined(
         solution = unbounded(part, value[free], inside, ~inside, gradient)
         rejected, sd = np.zeros(len(own)), np.zeros(len(own))
         rejected[free], sd[free] = rejections(solution, own[free]), solution.sd
-        relative = _relative_sd(terms.names, value, sd, free & may_hold)
+        relative = _relative_sd(terms.names, value, sd, free & judged)
         doubted = relative > DETERMINED.max_relative_sd
         reason = {
             k: reason_of(float(value[k]), float(sd[k])) for k in np.flatnonzero(doubted).tolist()
@@ -193,7 +193,9 @@ def hold_undetermined(
             for k in range(len(own))
         ]
         open_terms = np.flatnonzero(doubted & (rejected == 0))
-        if not len(open_terms):
+        if not holds:
+            reasons = [reason[k] if k in open_terms else "" for k in range(len(own))]
+        if not holds or not len(open_terms):
             break
         worst = int(open_terms[np.argmax(relative[open_terms])])
         free[worst], reasons[worst] = False, reason[worst]

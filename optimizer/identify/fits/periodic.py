@@ -18,7 +18,7 @@ from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import solve_bounded
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, base_regression, base_terms
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
-from joulepath.optimizer.identify.fits.determined import DETERMINED, reason_of, with_reasons
+from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -118,41 +118,23 @@ def fit_periodic(
 def _most_likely(
     terms: BaseTerms, arm: WholeArmRegression, noise: MeasuredNoise, clusters: Clusters
 ) -> tuple[Estimate, float]:
-    """Most likely unknowns, and the mean square of the residuals over that of the noise.
-
-    Friction and rotors that the log does not determine, and whose own values it does not reject,
-    are held at these, the least determined first.
-    """
+    """Most likely unknowns, and the mean square of the residuals over that of the noise."""
     deviation = np.maximum(noise.deviation[arm.block.joint], PERIODIC.min_noise)
     deviation = deviation / np.sqrt(noise.periods)
     columns, values = terms.columns(arm) / deviation[:, None], arm.values / deviation
-    whole, own = columns.T @ columns, terms.own
-    free, reasons = np.ones(len(own), dtype=bool), [""] * len(own)
-    friction = np.array([term != "offset" for term, _ in terms.names])
-    friction[: len(terms.expressed)] = False
-    while True:
-        moment = columns.T @ (values - columns[:, ~free] @ own[~free])
-        value = own.copy()
-        value[free] = solve_bounded(whole[np.ix_(free, free)], moment[free], terms.lower[free])
-        inside = free & (value > terms.lower)
-        covariance = np.zeros_like(whole)
-        covariance[np.ix_(inside, inside)] = np.linalg.pinv(
-            whole[np.ix_(inside, inside)], hermitian=True
-        )
-        sd = np.sqrt(np.diag(covariance))
-        doubt = [reason_of(float(v), float(s)) for v, s in zip(value, sd, strict=True)]
-        near = np.abs(own - value) <= DETERMINED.rejecting_sds * sd
-        near |= ~inside
-        open_terms = [k for k in np.flatnonzero(free & friction & near).tolist() if doubt[k]]
-        if not open_terms:
-            break
-        worst = max(open_terms, key=lambda k: float(sd[k]) / max(abs(float(value[k])), 1e-300))
-        free[worst], reasons[worst] = False, doubt[worst]
+    gram = columns.T @ columns
+    value = solve_bounded(gram, columns.T @ values, terms.lower)
+    inside = value > terms.lower
+    covariance = np.zeros_like(gram)
+    covariance[np.ix_(inside, inside)] = np.linalg.pinv(
+        gram[np.ix_(inside, inside)], hermitian=True
+    )
     residuals = values - columns @ value
     excess = float(residuals @ residuals / (len(values) - int(inside.sum())))
     without = np.tile(value, (clusters.count, 1))
-    found = Estimate(terms.names, value, without, tuple(reasons), covariance)
-    return with_reasons(found, range(len(terms.expressed))), excess
+    found = Estimate(terms.names, value, without, ("",) * len(value), covariance)
+    judged = [k for k, (term, _) in enumerate(terms.names) if term != "offset"]
+    return with_reasons(found, judged), excess
 
 
 def mean_period(rows: Rows, count: int) -> Rows:
