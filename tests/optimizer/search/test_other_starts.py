@@ -41,7 +41,7 @@ def explored(index: int, both: bool, bus: Bus) -> tuple[SearchState, Candidate]:
     return run.state, best
 
 
-@pytest.mark.parametrize(("index", "both"), [(5, False), (19, False), (1, False), (6, True)])
+@pytest.mark.parametrize(("index", "both"), [(4, False), (19, False), (1, False), (6, True)])
 def test_what_is_found_beside_needs_less_and_holds_the_poses(index: int, both: bool) -> None:
     state, first = explored(index, both, Bus())
     before, energy = len(state.candidates), first.energy or 0.0
@@ -57,7 +57,7 @@ def test_what_is_found_beside_needs_less_and_holds_the_poses(index: int, both: b
             )
             assert np.abs(reached - asked).max() < HELD
     # of these tasks, the first two begin in a poor local optimum
-    assert fresh or index not in (5, 19)
+    assert fresh or index not in (4, 19)
 
 
 def test_cornered_power_is_left_to_its_own_restarts() -> None:
