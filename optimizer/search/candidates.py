@@ -32,6 +32,11 @@ Each pair takes about 400 bytes of the answer.
 """
 PAIRS_PER_CHECK = 1024
 """Number of pairs between two checks of the deadline: about ten milliseconds."""
+STANDSTILL = 3e-8
+"""Largest displacement of a joint below the resolution of any encoder [rad]: the arm stands still.
+
+The control points of such a motion differ by few roundings, and its jerk is lost in them.
+"""
 
 
 class Reason(Enum):
@@ -263,6 +268,9 @@ def bound(
     # concatenation takes half the time of an array of arrays
     q_start = np.concatenate([each.q_start for each in candidates]).reshape(len(candidates), -1)
     q_goal = np.concatenate([each.q_goal for each in candidates]).reshape(len(candidates), -1)
+    for row in np.flatnonzero(np.abs(q_goal - q_start).max(axis=1) < STANDSTILL).tolist():
+        candidates[row].q_goal = candidates[row].q_start
+        q_goal[row] = q_start[row]
     hold = prepared.holding_power(q_goal) if prepared.problem.dwell else None
     bounds, shortest = lower_bounds(prepared, q_goal - q_start, levels[:, 1] - levels[:, 0], hold)
     if prepared.problem.objective == "mechanical":

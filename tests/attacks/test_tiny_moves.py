@@ -1,0 +1,48 @@
+"""Ends that differ by rounding, or by less than any encoder resolves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import joulepath
+
+PLACES = {
+    "ur5e": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0],
+    "panda": [0.0, -0.5, 0.2, -1.9, 0.1, 1.5, 0.3],
+}
+# relative: what a displacement of 1e-7 rad may add to the energy of standing still
+MORE = 2e-3
+# s: nothing here is to end by the deadline on a loaded machine
+DEADLINE = 60.0
+
+
+def energy(robot: str, displacement: float, duration: float | None) -> float:
+    """Energy [J] of a motion of all joints."""
+    q = np.array(PLACES[robot])
+    problem = joulepath.Problem(
+        arm=joulepath.Arm(robot=joulepath.load_robot(robot)),
+        start=q,
+        goal=q + displacement,
+        duration_min=duration,
+        duration_max=duration,
+        deadline=DEADLINE,
+    )
+    return joulepath.optimize(problem, progress=False).energy.electrical.total
+
+
+@pytest.mark.parametrize("robot", PLACES)
+@pytest.mark.parametrize("duration", [None, 1.0])
+def test_a_displacement_of_nothing_needs_what_standing_still_needs(
+    robot: str, duration: float | None
+) -> None:
+    still = energy(robot, 0.0, duration)
+    for displacement in (1e-16, 1e-14, 1e-12, 1e-10, 1e-9, 1e-8):
+        assert energy(robot, displacement, duration) == pytest.approx(still, rel=MORE)
+
+
+@pytest.mark.parametrize("displacement", [1e-7, 1e-6])
+def test_the_work_of_a_tiny_motion_is_certified(displacement: float) -> None:
+    """Its mechanical work is some microjoules, whose relative error says nothing."""
+    still = energy("panda", 0.0, 1.0)
+    assert energy("panda", displacement, 1.0) == pytest.approx(still, rel=MORE)
