@@ -15,9 +15,9 @@ from joulepath.app.api.whatif.task import WhatifRequest
 from joulepath.app.schemas.common import Request, Response, by_field, described, part
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import ANSWER_PATH, CREATED, EVALUATE, JOB_ID, OPTIMIZE
+from joulepath.app.schemas.naming import Name, search_in
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.schemas.studies import Name
 
 MOST_REQUESTS = 10_000
 """Most requests of one job."""
@@ -206,6 +206,13 @@ class JobPage(Query):
     after: str | None = after_of(JOB_ID)
     state: JobState | None = described(
         "Only jobs in this state. Null: all.", None, "running", default=None
+    )
+    search: Name | None = search_in("the name")
+    identifications: bool = described(
+        "Whether identifications, which are jobs as well, are in the list.",
+        None,
+        True,
+        default=True,
     )
 
 

@@ -8,8 +8,6 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, RootModel, Tag
 
 from joulepath.app.schemas.common import (
-    NO_CONTROLS,
-    PLAIN,
     FiguresId,
     Request,
     Response,
@@ -22,11 +20,11 @@ from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.figures import FIGURES_ID
 from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
 from joulepath.app.schemas.lengths import LENGTHS
+from joulepath.app.schemas.naming import Name, search_in
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.result.energy import Objective
 
-Name = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS), PLAIN]
 IdempotencyKey = Annotated[str, Field(min_length=1, max_length=LENGTHS.key, pattern=r"^[!-~]+$")]
 
 
@@ -55,9 +53,16 @@ class StudyRequest(Request):
     )
 
 
+class StudyName(Request):
+    """Another name of a study."""
+
+    name: Name = described("The name.", None, "Pick and place, cell 5")
+
+
 class StudyPage(Query):
     """The part of the list of studies that is returned."""
 
+    search: Name | None = search_in("the name or the robot")
     limit: int = limit_of("studies")
     after: str | None = after_of(STUDY_ID)
 

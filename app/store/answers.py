@@ -15,7 +15,7 @@ from joulepath.app.access.rules import check_owner
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import AnswerInUse, UnknownAnswer
-from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.paging import having, position_after, position_of
 from joulepath.app.store.tables import Answer, Job, is_id, now
 
 
@@ -91,10 +91,7 @@ class Wanted:
         if self.job is not None:
             query = query.where(Answer.job_id == self.job)
         if self.search is not None:
-            places = (Answer.name, Answer.robot, Answer.kind)
-            query = query.where(
-                or_(*(each.icontains(self.search, autoescape=True) for each in places))
-            )
+            query = query.where(having(self.search, Answer.name, Answer.robot, Answer.kind))
         return query
 
 

@@ -25,7 +25,7 @@ from joulepath.app.store.job_events import (
     request_ended,
     set_state,
 )
-from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.paging import having, position_after, position_of
 from joulepath.app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
 
 Ts = TypeVarTuple("Ts")
@@ -110,23 +110,44 @@ def view(session: Session, job_id: str) -> JobView:
     return JobView(job, counts_of(session, [job.id])[job.id])
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """Which jobs a list has."""
+
+    state: str | None = None
+    """State of the jobs; None: any."""
+    search: str | None = None
+    """Text in the name, in upper or lower case; None: any."""
+    without: str | None = None
+    """Endpoint that their first request is not for; None: any."""
+
+    def of(self, query: Select[Job]) -> Select[Job]:
+        """The query for these jobs."""
+        if self.state is not None:
+            query = query.where(Job.state == self.state)
+        if self.search is not None:
+            query = query.where(having(self.search, Job.name))
+        if self.without is not None:
+            first = (JobRequest.job_id == Job.id) & (JobRequest.number == 0)
+            query = query.join(JobRequest, first).where(JobRequest.kind != self.without)
+        return query
+
+
 def page(
-    session: Session, limit: int, after: str | None, state: str | None
+    session: Session, limit: int, after: str | None, wanted: Wanted
 ) -> tuple[list[JobView], str | None]:
     """Up to `limit` jobs, newest first, and the `after` of the next page; None on the last page."""
-    query = select(Job)
-    if state is not None:
-        query = query.where(Job.state == state)
-    jobs = list(session.scalars(_newest_first(query, limit, after)))
+    jobs = list(session.scalars(_newest_first(wanted.of(select(Job)), limit, after)))
     more, jobs = len(jobs) > limit, jobs[:limit]
     counts = counts_of(session, [job.id for job in jobs])
     return [JobView(job, counts[job.id]) for job in jobs], position_of(jobs[-1]) if more else None
 
 
 def page_of_kind(
-    session: Session, kind: str, limit: int, after: str | None
+    session: Session, kind: str, limit: int, after: str | None, search: str | None
 ) -> tuple[list[tuple[Job, JobRequest, str | None]], str | None]:
-    """Up to `limit` jobs of one request to the endpoint `kind`, newest first.
+    """Up to `limit` jobs of one request to the endpoint `kind`, newest first. With a `search`,
+    those that have this text in their name or in the robot of their answer.
 
     Returns jobs, requests and robots of the answers, and the `after` of the next page; None on the
     last page.
@@ -136,6 +157,8 @@ def page_of_kind(
     query = query.where(Job.total == 1, JobRequest.kind == kind).options(
         defer(JobRequest.body, raiseload=True)
     )
+    if search is not None:
+        query = query.where(having(search, Job.name, Answer.robot))
     rows = session.execute(_newest_first(query, limit, after))
     found = [(job, request, robot) for job, request, robot in rows]
     more, found = len(found) > limit, found[:limit]
@@ -183,6 +206,14 @@ def whole(session: Session, job_id: str) -> Iterator[tuple[JobRequest, bytes | N
     query = query.where(JobRequest.job_id == job_id).order_by(JobRequest.number)
     rows = session.execute(query.execution_options(yield_per=_AT_A_TIME))
     return ((request, body) for request, body in rows)
+
+
+def rename(session: Session, job_id: str, name: str | None, client: Client) -> JobView:
+    """Gives a job a name, or none. Raises UnknownJob or NotOwner."""
+    job = _job(session, job_id, lock=True)
+    check_owner(client, job.owner)
+    job.name = name
+    return view(session, job_id)
 
 
 def cancel(session: Session, job_id: str, client: Client) -> None:

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, defer
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
-from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.paging import having, position_after, position_of
 from joulepath.app.store.tables import StoredLog, is_id
 
 _LIGHT = defer(StoredLog.body, raiseload=True)
@@ -34,9 +34,11 @@ def about(session: Session, log_id: str) -> StoredLog:
     return _found(session.get(StoredLog, log_id, options=[_LIGHT]) if is_id(log_id) else None)
 
 
-def page(session: Session, limit: int, after: str | None) -> tuple[list[StoredLog], str | None]:
+def page(
+    session: Session, limit: int, after: str | None, search: str | None
+) -> tuple[list[StoredLog], str | None]:
     """Up to `limit` logs without their files, newest first, and the `after` of the next page; None
-    on the last page.
+    on the last page. With a `search`, those that have this text in their name or robot.
     """
     query = (
         select(StoredLog)
@@ -44,6 +46,8 @@ def page(session: Session, limit: int, after: str | None) -> tuple[list[StoredLo
         .order_by(StoredLog.created.desc(), StoredLog.id.desc())
         .limit(limit + 1)
     )
+    if search is not None:
+        query = query.where(having(search, StoredLog.name, StoredLog.robot))
     if after is not None:
         created, log_id = position_after(after)
         query = query.where(
@@ -55,6 +59,14 @@ def page(session: Session, limit: int, after: str | None) -> tuple[list[StoredLo
     found = list(session.scalars(query))
     more, found = len(found) > limit, found[:limit]
     return found, position_of(found[-1]) if more else None
+
+
+def rename(session: Session, log_id: str, name: str | None, client: Client) -> StoredLog:
+    """Gives a log a name, or none. Raises UnknownLog or NotOwner."""
+    log = about(session, log_id)
+    check_owner(client, log.owner)
+    log.name = name
+    return log
 
 
 def delete(session: Session, log_id: str, client: Client) -> None:

@@ -1,9 +1,12 @@
-"""Positions in paged lists, newest first."""
+"""Positions in paged lists, newest first, and what a search finds."""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from typing import Protocol
+from typing import Any, Protocol
+
+from sqlalchemy import ColumnElement, or_
+from sqlalchemy.orm import InstrumentedAttribute
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
@@ -25,3 +28,8 @@ def position_after(text: str) -> tuple[datetime, str]:
     """Time and id of the row of a position."""
     microseconds, row_id = text.split("_")
     return _EPOCH + int(microseconds) * _MICROSECOND, row_id
+
+
+def having(text: str, *places: InstrumentedAttribute[Any]) -> ColumnElement[bool]:
+    """Whether a text is in one of the columns, in upper or lower case."""
+    return or_(*(each.icontains(text, autoescape=True) for each in places))

@@ -15,7 +15,7 @@ from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import KeyReused, UnknownIteration, UnknownStudy
 from joulepath.app.store import answers, cache
 from joulepath.app.store.cache import Answered
-from joulepath.app.store.paging import position_after, position_of
+from joulepath.app.store.paging import having, position_after, position_of
 from joulepath.app.store.tables import Iteration, Study, is_id, new_id, now
 
 _LIGHT = defer(Iteration.request, raiseload=True)
@@ -105,10 +105,14 @@ def state(session: Session, study_id: str) -> State:
     return _state(session, _study(session, study_id))
 
 
-def page(session: Session, limit: int, after: str | None) -> tuple[list[State], str | None]:
+def page(
+    session: Session, limit: int, after: str | None, search: str | None
+) -> tuple[list[State], str | None]:
     """Up to `limit` studies, newest first, and the `after` of the next page; None on the last
-    page."""
+    page. With a `search`, those that have this text in their name or robot."""
     query = select(Study).order_by(Study.created.desc(), Study.id.desc()).limit(limit + 1)
+    if search is not None:
+        query = query.where(having(search, Study.name, Study.robot))
     if after is not None:
         created, study_id = position_after(after)
         query = query.where(
@@ -117,6 +121,14 @@ def page(session: Session, limit: int, after: str | None) -> tuple[list[State], 
     studies = list(session.scalars(query))
     more, studies = len(studies) > limit, studies[:limit]
     return [_state(session, study) for study in studies], position_of(studies[-1]) if more else None
+
+
+def rename(session: Session, study_id: str, name: str, client: Client) -> State:
+    """Gives a study another name. Raises UnknownStudy or NotOwner."""
+    study = _study(session, study_id)
+    check_owner(client, study.owner)
+    study.name = name
+    return _state(session, study)
 
 
 def delete(session: Session, study_id: str, client: Client) -> None:

@@ -1,4 +1,4 @@
-"""Requests and answers of the routes under `/answers`."""
+"""What the routes under `/answers` take and answer."""
 
 from __future__ import annotations
 
@@ -7,18 +7,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from joulepath.app.schemas.common import NO_CONTROLS, Request, Response, described, part
+from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, JOB_ID
 from joulepath.app.schemas.lengths import LENGTHS
+from joulepath.app.schemas.naming import Name, search_in
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
-
-Name = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS)]
-
-
-class AnswerName(Request):
-    """The name of an answer."""
-
-    name: Name | None = described("The name. Null: none.", None, "Night cell")
 
 
 class KeptAnswer(Response):
@@ -81,11 +74,6 @@ class AnswerPage(Query):
     job: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
         "Id of a job: only its answers. Null: those of all.", None, JOB_ID, default=None
     )
-    search: Name | None = described(
-        "A text in the name, the robot or the kind, in upper or lower case. Null: any.",
-        None,
-        "night",
-        default=None,
-    )
+    search: Name | None = search_in("the name, the robot or the kind")
     limit: int = limit_of("answers")
     after: str | None = after_of(ANSWER_ID)

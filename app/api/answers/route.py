@@ -1,4 +1,4 @@
-"""GET /answers, GET and DELETE /answers/{id}."""
+"""GET /answers, GET, PATCH and DELETE /answers/{id}."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from fastapi import APIRouter, Path, Query, Response
 
 from joulepath.app.api.answers.models import (
     AnswerList,
-    AnswerName,
     AnswerPage,
     AnswerSummary,
     KeptAnswer,
@@ -24,6 +23,7 @@ from joulepath.app.exceptions.stored import AnswerInUse, StoreUnavailable, Unkno
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import ANSWER_ID
+from joulepath.app.schemas.naming import NewName
 from joulepath.app.store import answers
 from joulepath.app.store.tables import Answer
 
@@ -71,7 +71,7 @@ async def show(id: AnswerId, store: ServiceStore) -> Response:
     responses=problem_responses(InvalidRequest, UnknownAnswer, NotOwner, StoreUnavailable),
 )
 async def rename(
-    id: AnswerId, body: AnswerName, store: ServiceStore, client: ServiceClient
+    id: AnswerId, body: NewName, store: ServiceStore, client: ServiceClient
 ) -> AnswerSummary:
     """Gives the answer a name, by which `GET /answers` finds it."""
     rename = partial(answers.rename, answer_id=id, name=body.name, client=client)

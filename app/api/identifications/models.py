@@ -12,6 +12,7 @@ from joulepath.app.api.identifications.answer import IdentificationResult
 from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.figures import FIGURES_ID
 from joulepath.app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
+from joulepath.app.schemas.naming import Name, search_in
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 
 _RESULT: Any = model_of(IdentificationResult)
@@ -23,6 +24,9 @@ class IdentificationSummary(Response):
     """An identification and its state."""
 
     id: str = described("Its id.", None, IDENTIFICATION_ID)
+    name: str | None = described(
+        "Its name, see `PATCH /identifications/{id}`.", None, "Arm 3, after the gearbox"
+    )
     state: State = described("Its state.", None, "done")
     created: datetime = described("Time at which it was sent, in UTC.", None, CREATED)
     owner: str | None = described(
@@ -53,6 +57,7 @@ class IdentificationList(Response):
 class IdentificationPage(Query):
     """A page of the list of identifications."""
 
+    search: Name | None = search_in("the name or the robot")
     limit: int = limit_of("identifications")
     after: str | None = after_of(IDENTIFICATION_ID)
 

@@ -1,4 +1,4 @@
-"""POST and GET /identifications, GET /identifications/{id} and /identifications/{id}/residuals."""
+"""POST and GET /identifications, GET, PATCH and DELETE /identifications/{id}, and its residuals."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from sqlalchemy.orm import Session
 
+from joulepath.app.access.client import Client
 from joulepath.app.api.identifications.models import (
     Identification,
     IdentificationList,
@@ -23,6 +24,7 @@ from joulepath.app.api.shared.later import deadlines
 from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, set_location
 from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.result import TaskResult
+from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import Busy
 from joulepath.app.exceptions.stored import (
@@ -35,6 +37,7 @@ from joulepath.app.exceptions.stored import (
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import IDENTIFICATION_ID
+from joulepath.app.schemas.naming import NewName
 from joulepath.app.store import answers
 from joulepath.app.store import jobs as stored_jobs
 from joulepath.app.store import logs as stored_logs
@@ -97,8 +100,9 @@ async def add(
 async def list_identifications(
     page: Annotated[IdentificationPage, Query()], store: ServiceStore
 ) -> IdentificationList:
-    """All identifications, newest first, page by page. They are deleted with their jobs."""
-    found, following = await store.read(partial(_page, limit=page.limit, after=page.after))
+    """All identifications, newest first, page by page, or those that are searched for."""
+    read = partial(_page, limit=page.limit, after=page.after, search=page.search)
+    found, following = await store.read(read)
     return IdentificationList(identifications=found, next=following)
 
 
@@ -111,6 +115,35 @@ async def list_identifications(
 async def show(id: IdentificationId, store: ServiceStore) -> IdentificationSummary:
     """The state of an identification and, once it is done, its result."""
     return await _shown(store, id)
+
+
+@router.patch(
+    "/{id}",
+    summary="Name an identification",
+    response_model=Identification,
+    responses=problem_responses(InvalidRequest, UnknownIdentification, NotOwner, StoreUnavailable),
+)
+async def rename(
+    id: IdentificationId, body: NewName, store: ServiceStore, client: ServiceClient
+) -> IdentificationSummary:
+    """Gives the identification another name, or none."""
+    await store.write(partial(_rename, job_id=id, name=body.name, client=client))
+    return await _shown(store, id)
+
+
+@router.delete(
+    "/{id}",
+    summary="Delete an identification",
+    status_code=204,
+    responses=problem_responses(UnknownIdentification, NotOwner, StoreUnavailable),
+)
+async def delete(
+    id: IdentificationId, jobs: ServiceJobs, store: ServiceStore, client: ServiceClient
+) -> None:
+    """Deletes an identification with its residuals, and stops it if it runs. The figures that were
+    found stay."""
+    await store.read(partial(_found, job_id=id))
+    await jobs.delete(id, client)
 
 
 @router.get(
@@ -147,10 +180,16 @@ def _curves(session: Session, job_id: str) -> bytes | None:
     return answers.of_job(session, job.id, RESIDUALS)
 
 
+def _rename(session: Session, job_id: str, name: str | None, client: Client) -> None:
+    """Names an identification. Raises UnknownIdentification or NotOwner."""
+    _found(session, job_id)
+    stored_jobs.rename(session, job_id, name, client)
+
+
 def _page(
-    session: Session, limit: int, after: str | None
+    session: Session, limit: int, after: str | None, search: str | None
 ) -> tuple[list[ListedIdentification], str | None]:
-    found, following = stored_jobs.page_of_kind(session, IDENTIFY, limit, after)
+    found, following = stored_jobs.page_of_kind(session, IDENTIFY, limit, after, search)
     listed = [
         ListedIdentification(**_summary(session, job, request), robot=robot)
         for job, request, robot in found
@@ -176,6 +215,7 @@ def _summary(session: Session, job: Job, request: JobRequest) -> dict[str, Any]:
     has_figures = request.figures is not None and session.get(Figures, request.figures) is not None
     return {
         "id": job.id,
+        "name": job.name,
         "state": _STATES.get(request.state, request.state),
         "created": job.created,
         "owner": job.owner,

@@ -1,4 +1,4 @@
-"""POST and GET /jobs, GET and DELETE /jobs/{id}, and what is done with a job."""
+"""POST and GET /jobs, GET, PATCH and DELETE /jobs/{id}, and what is done with a job."""
 
 from __future__ import annotations
 
@@ -44,8 +44,10 @@ from joulepath.app.jobs.events import events_after
 from joulepath.app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
 from joulepath.app.schemas.examples.values import JOB_ID
 from joulepath.app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
+from joulepath.app.schemas.naming import NewName
 from joulepath.app.store import jobs as stored_jobs
 from joulepath.app.tasks.job_body import JobBodyTask, Validated
+from joulepath.app.tasks.job_request import IDENTIFY
 from joulepath.optimizer.exceptions import DeadlineExceeded
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
@@ -124,8 +126,10 @@ async def create(
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> JobList:
-    """All jobs with their progress, newest first, page by page."""
-    read = partial(stored_jobs.page, limit=page.limit, after=page.after, state=page.state)
+    """Jobs with their progress, newest first, page by page: all, or those that are asked for."""
+    without = None if page.identifications else IDENTIFY
+    wanted = stored_jobs.Wanted(page.state, page.search, without)
+    read = partial(stored_jobs.page, limit=page.limit, after=page.after, wanted=wanted)
     found, following = await store.read(read)
     return JobList(jobs=[Job(**summary(view)) for view in found], next=following)
 
@@ -144,6 +148,18 @@ async def show(
     view = await jobs.view(id)
     read = partial(stored_jobs.requests, job_id=id, limit=page.limit + 1, after=page.after)
     return JobDetail(**detail(view, await store.read(read), page.limit))
+
+
+@router.patch(
+    "/{id}",
+    summary="Name a job",
+    response_model=Job,
+    responses=problem_responses(InvalidRequest, *_OF_ONE, NotOwner),
+)
+async def rename(id: JobId, body: NewName, store: ServiceStore, client: ServiceClient) -> Job:
+    """Gives the job another name, or none."""
+    rename = partial(stored_jobs.rename, job_id=id, name=body.name, client=client)
+    return Job(**await store.write(lambda session: summary(rename(session))))
 
 
 @router.delete(

@@ -8,6 +8,7 @@ from typing import Literal
 from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.values import CREATED, LOG_ID
 from joulepath.app.schemas.log_file import EffortMeaning
+from joulepath.app.schemas.naming import Name, search_in
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 
 
@@ -107,6 +108,7 @@ class LogDetail(LogSummary):
 class LogPage(Query):
     """The part of the list of logs that is returned."""
 
+    search: Name | None = search_in("the name or the robot")
     limit: int = limit_of("logs")
     after: str | None = after_of(LOG_ID)
 

@@ -1,4 +1,4 @@
-"""POST /logs, GET /logs, GET and DELETE /logs/{id}."""
+"""POST /logs, GET /logs, GET, PATCH and DELETE /logs/{id}."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import LOG_ID
+from joulepath.app.schemas.naming import NewName
 from joulepath.app.store import logs
 from joulepath.app.store.tables import StoredLog, new_id, now
 from joulepath.optimizer.exceptions import InvalidTable
@@ -116,8 +117,9 @@ async def add(
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> LogList:
-    """All logs, newest first, page by page."""
-    found, following = await store.read(partial(logs.page, limit=page.limit, after=page.after))
+    """All logs, newest first, page by page, or those that are searched for."""
+    read = partial(logs.page, limit=page.limit, after=page.after, search=page.search)
+    found, following = await store.read(read)
     shown = [_detail(log).model_dump(include=set(LogSummary.model_fields)) for log in found]
     return LogList(logs=[LogSummary(**each) for each in shown], next=following)
 
@@ -132,6 +134,18 @@ async def show(id: LogId, store: ServiceStore) -> LogDetail:
     """What is known of a log: its channels, moves, efforts, and what is odd in it. Not its
     samples."""
     return _detail(await store.read(partial(logs.about, log_id=id)))
+
+
+@router.patch(
+    "/{id}",
+    summary="Name a log",
+    response_model=LogDetail,
+    responses=problem_responses(InvalidRequest, UnknownLog, NotOwner, StoreUnavailable),
+)
+async def rename(id: LogId, body: NewName, store: ServiceStore, client: ServiceClient) -> LogDetail:
+    """Gives the log another name, or none."""
+    rename = partial(logs.rename, log_id=id, name=body.name, client=client)
+    return await store.write(lambda session: _detail(rename(session)))
 
 
 @router.delete(

@@ -1,4 +1,4 @@
-"""POST /studies, GET /studies, GET and DELETE /studies/{id}."""
+"""POST /studies, GET /studies, GET, PATCH and DELETE /studies/{id}."""
 
 from __future__ import annotations
 
@@ -30,7 +30,14 @@ from joulepath.app.exceptions.stored import (
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.studies import STUDY_CSV
-from joulepath.app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
+from joulepath.app.schemas.studies import (
+    Study,
+    StudyList,
+    StudyName,
+    StudyPage,
+    StudyRequest,
+    StudySummary,
+)
 from joulepath.app.store import studies
 from joulepath.app.studies.answers import as_csv, full, summary
 from joulepath.app.tasks.arm_engine import identified, robot_in
@@ -90,8 +97,9 @@ async def create(
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore) -> StudyList:
-    """All studies with their state, newest first, page by page."""
-    found, following = await store.read(partial(studies.page, limit=page.limit, after=page.after))
+    """All studies with their state, newest first, page by page, or those that are searched for."""
+    read = partial(studies.page, limit=page.limit, after=page.after, search=page.search)
+    found, following = await store.read(read)
     return StudyList(studies=[StudySummary(**summary(state)) for state in found], next=following)
 
 
@@ -111,6 +119,20 @@ async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Respon
     if wanted == "csv":
         return Response(await run_in_threadpool(as_csv, history), media_type="text/csv")
     return Response(await run_in_threadpool(_document, history), media_type="application/json")
+
+
+@router.patch(
+    "/{id}",
+    summary="Name a study",
+    response_model=StudySummary,
+    responses=problem_responses(InvalidRequest, UnknownStudy, NotOwner, StoreUnavailable),
+)
+async def rename(
+    id: StudyId, body: StudyName, store: ServiceStore, client: ServiceClient
+) -> StudySummary:
+    """Gives the study another name."""
+    rename = partial(studies.rename, study_id=id, name=body.name, client=client)
+    return StudySummary(**await store.write(lambda session: summary(rename(session))))
 
 
 @router.delete(

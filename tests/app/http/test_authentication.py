@@ -28,6 +28,7 @@ from tests.app.routes.test_problems import refused
 from tests.app.store.test_store import put, with_store
 
 STUDY = {"name": "press", "threshold": 60.0}
+NAME = {"name": "Mine"}
 ARM = PUT_EXAMPLES["makers_figures"]["value"]
 STEP = {"evaluate": {"configurations": [[0.0] * 6, [0.1] * 6], "time_per_segment": 1.5}}
 
@@ -212,7 +213,12 @@ def test_a_reader_only_reads(guarded: Guarded) -> None:
 def test_a_study_is_its_owners(guarded: Guarded) -> None:
     study = guarded.study("press")
     assert guarded.send("cell", "GET", study).json()["owner"] == "press"
-    for method, path, body in (("DELETE", study, None), ("POST", f"{study}/iterations", STEP)):
+    theirs = (
+        ("DELETE", study, None),
+        ("PATCH", study, NAME),
+        ("POST", f"{study}/iterations", STEP),
+    )
+    for method, path, body in theirs:
         assert refused(guarded.send("cell", method, path, body), NotOwner)["owner"] == "press"
     assert guarded.send("press", "POST", f"{study}/iterations", STEP).status_code == 201
     assert guarded.send("press", "DELETE", study).status_code == 204
@@ -243,6 +249,8 @@ def test_a_job_is_its_owners(guarded: Guarded) -> None:
     sent = guarded.send("press", "POST", "/jobs", {"requests": [STEP]})
     job = sent.headers["location"]
     assert (sent.status_code, sent.json()["owner"]) == (202, "press")
+    refused(guarded.send("cell", "PATCH", job, NAME), NotOwner)
+    assert guarded.send("press", "PATCH", job, NAME).json()["name"] == "Mine"
     for method, path in (("POST", f"{job}/cancel"), ("POST", f"{job}/retry"), ("DELETE", job)):
         assert refused(guarded.send("cell", method, path), NotOwner)["owner"] == "press"
         refused(guarded.send("viewer", method, path), RoleTooLow)
@@ -266,6 +274,7 @@ def test_an_answer_is_its_owners(guarded: Guarded) -> None:
     assert guarded.send("viewer", "GET", owned).json()["owner"] == "press"
     for path in (owned, free):
         refused(guarded.send("cell", "DELETE", path), NotOwner)
+        refused(guarded.send("cell", "PATCH", path, NAME), NotOwner)
     assert guarded.send("press", "DELETE", owned).status_code == 204
     refused(guarded.send("press", "DELETE", free), NotOwner)
     assert guarded.send("boss", "DELETE", free).status_code == 204

@@ -39,6 +39,7 @@ from tests.identification_logs import (
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
 CSV = {"Content-Type": "text/csv"}
+JSON = {"Content-Type": "application/json"}
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +195,7 @@ def test_limits_of_size_and_number(recording: Recording, tmp_path: Path) -> None
         assert client.post("/logs", content=short, headers=CSV).status_code == 201
 
 
-def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
+def test_only_owners_and_admins_name_and_delete(tmp_path: Path) -> None:
     file = tmp_path / "keys.yaml"
     roles: tuple[tuple[str, Role], ...] = (
         ("mine", "compute"),
@@ -219,6 +220,10 @@ def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
         ]
         assert client.get(paths[0], headers=as_("reader")).json()["owner"] == "mine"
         assert refused(client.delete(paths[0], headers=as_("other")), NotOwner)["owner"] == "mine"
+        name = {"name": "night"}
+        refused(client.patch(paths[0], json=name, headers=as_("other") | JSON), NotOwner)
+        renamed = client.patch(paths[0], json=name, headers=as_("mine") | JSON)
+        assert renamed.json()["name"] == "night"
         assert client.delete(paths[0], headers=as_("mine")).status_code == 204
         assert client.delete(paths[1], headers=as_("boss")).status_code == 204
 
