@@ -70,11 +70,12 @@ class StepsDone:
 
 
 Event = CandidatesFound | CandidateTried | Improved
+Told = Event | StepsDone
 Tell = Callable[[Event], None]
 TellSteps = Callable[[StepsDone], None]
 
 
-def no_listener(event: Event | StepsDone) -> None:
+def no_listener(event: Told) -> None:
     """No-op listener."""
 
 

@@ -23,7 +23,7 @@ from joulepath.app.engine.warm_up import warm
 from joulepath.app.engine.work import Ended, Work, taking
 from joulepath.app.exceptions.queue import WorkerLost
 from joulepath.app.settings import read_settings
-from joulepath.optimizer.progress import Event, no_listener
+from joulepath.optimizer.progress import Told, no_listener
 
 if TYPE_CHECKING:
     from distributed import Worker
@@ -86,7 +86,7 @@ async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
     from distributed import Reschedule, get_worker
 
     worker = get_worker()
-    engine, found, ended = _engines[worker], list[tuple[int, Event]](), dict[int, Ended]()
+    engine, found, ended = _engines[worker], list[tuple[int, Told]](), dict[int, Ended]()
     works = [_work(index, each, found, ended) for index, each in enumerate(asked)]
     working = asyncio.create_task(_all(works, ended, engine))
     try:
@@ -106,9 +106,7 @@ async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
         await asyncio.gather(working, return_exceptions=True)
 
 
-def _work(
-    index: int, asked: Asked, found: list[tuple[int, Event]], ended: dict[int, Ended]
-) -> Work:
+def _work(index: int, asked: Asked, found: list[tuple[int, Told]], ended: dict[int, Ended]) -> Work:
     task, deadline, is_heard = asked
     tell = (lambda event: found.append((index, event))) if is_heard else no_listener
     return Work(task, deadline, partial(ended.__setitem__, index), stoppable=False, tell=tell)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from joulepath.app.engine.fair_queue import FairQueue, Place
 from joulepath.app.engine.forkserver import start_forkserver
+from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.spare import SpareWorkers
 from joulepath.app.engine.task import Task
@@ -20,7 +21,7 @@ from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.progress import Tell, no_listener
+from joulepath.optimizer.progress import no_listener
 
 logger = logging.getLogger(__name__)
 
@@ -125,7 +126,7 @@ class Engine:
         return ClientEngine(self, client)
 
     async def run(
-        self, task: Task, deadline: float, client: str = "", tell: Tell = no_listener
+        self, task: Task, deadline: float, client: str = "", tell: Listener = no_listener
     ) -> TaskResult:
         """The task's result, within `deadline` seconds plus `settings.deadline_grace`.
 
@@ -162,7 +163,7 @@ class Engine:
             raise (ShuttingDown() if self._draining.is_set() else DeadlineExceeded([])) from None
 
     async def _run_in_worker(
-        self, task: Task, end: float, limit: asyncio.Timeout, place: Place, tell: Tell
+        self, task: Task, end: float, limit: asyncio.Timeout, place: Place, tell: Listener
     ) -> TaskResult:
         deaths = 0
         while True:
@@ -252,6 +253,6 @@ class ClientEngine:
     engine: Engine
     client: str
 
-    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
         """See `Engine.run`."""
         return await self.engine.run(task, deadline, self.client, tell)

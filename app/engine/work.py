@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
-from joulepath.optimizer.progress import Tell, no_listener
+from joulepath.optimizer.progress import no_listener
 
 SHORT = 0.05
 """Longest expected time of short work [s]."""
@@ -27,7 +28,7 @@ class Work:
     deadline: float
     ended: Callable[[Ended], object]
     stoppable: bool = True
-    tell: Tell = no_listener
+    tell: Listener = no_listener
     expected: float = float("inf")
     is_small: bool = False
 
@@ -52,7 +53,7 @@ async def result_of(
     task: Task,
     deadline: float,
     stoppable: bool = True,
-    tell: Tell = no_listener,
+    tell: Listener = no_listener,
 ) -> TaskResult:
     """The result of one task, run by a function for many. Raises the error of the task or of
     `run`."""

@@ -21,19 +21,19 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from joulepath.app.engine.forkserver import CONTEXT
-from joulepath.app.engine.listening import listening
+from joulepath.app.engine.listening import Listener, listening
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task, outcome
 from joulepath.app.engine.work import Ended, Take, Work
 from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.app.logs import configure_logging
 from joulepath.optimizer.deadline import Stopped, stoppable
-from joulepath.optimizer.progress import Event, Tell, no_listener
+from joulepath.optimizer.progress import Told, no_listener
 
 logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
-Heard = Callable[[Event], object] | None
+Heard = Callable[[Told], object] | None
 """Receiver of a task's events, called in a thread; None without a listener."""
 Turn = Callable[[Work, Ended, Work | None], object]
 """Function called with an ended work, its outcome, and the next work."""
@@ -103,7 +103,7 @@ class Worker:
                 raise WorkerLost from None
             raise
 
-    async def ask(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+    async def ask(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
         """The task's result. If cancelled, the task is stopped.
 
         Args:
@@ -202,7 +202,7 @@ class Worker:
 
     def _receive(self, number: int, heard: Heard) -> Ended:
         """Outcome of the running task. Raises Preempted if it was stopped."""
-        while isinstance(received := self._pipe.recv(), Event):
+        while isinstance(received := self._pipe.recv(), Told):
             if heard is not None and not self._is_stopped(number):
                 heard(received)
         if isinstance(received, Stopped):
@@ -247,7 +247,7 @@ class Worker:
         self.ended.set()
 
 
-def _heard(tell: Tell, loop: asyncio.AbstractEventLoop) -> Heard:
+def _heard(tell: Listener, loop: asyncio.AbstractEventLoop) -> Heard:
     return None if tell is no_listener else lambda event: loop.call_soon_threadsafe(tell, event)
 
 

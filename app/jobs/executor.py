@@ -10,6 +10,7 @@ from typing import Protocol, TypeGuard
 from joulepath.app.api.identifications.request import IdentifyRequest
 from joulepath.app.cluster.link import Cluster
 from joulepath.app.convert.packed import unpacked
+from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
@@ -20,7 +21,7 @@ from joulepath.app.store.store import Store
 from joulepath.app.tasks.arm_engine import ArmEngine, given_log
 from joulepath.app.tasks.job_request import IDENTIFY, JobRequestTask
 from joulepath.optimizer.exceptions import DeclaredError, UnknownRobot
-from joulepath.optimizer.progress import Tell, no_listener
+from joulepath.optimizer.progress import no_listener
 
 
 class Executor(Protocol):
@@ -115,5 +116,5 @@ class _Alone:
     many: Callable[[Take], Awaitable[None]]
     stoppable: bool
 
-    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
         return await result_of(self.many, task, deadline, self.stoppable, tell)

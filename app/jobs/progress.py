@@ -1,13 +1,14 @@
-"""Progress within one request of a job, from the events of its search."""
+"""Progress within one request of a job, from the events of its search or its steps."""
 
 from __future__ import annotations
 
 import math
 
 from joulepath.app.store.job_events import Report
-from joulepath.optimizer.progress import CandidateTried, Event, Improved, only_news
+from joulepath.app.tasks.job_request import CYCLE, IDENTIFY
+from joulepath.optimizer.progress import CandidateTried, Event, Improved, StepsDone, Told, only_news
 
-HEARD = ("cycle", "placement", "pareto")
+HEARD = (CYCLE, "placement", "pareto", IDENTIFY)
 """Endpoints with long requests, whose progress is reported by events."""
 
 
@@ -17,7 +18,15 @@ class Found:
     def __init__(self, attempt: int) -> None:
         self.report = Report(attempt)
         self.is_news = False
-        self.tell = only_news(self._note)
+        self._of_search = only_news(self._note)
+
+    def tell(self, event: Told) -> None:
+        """Notes an event."""
+        if not isinstance(event, StepsDone):
+            self._of_search(event)
+        elif event.total:
+            self.report = self.report.with_steps(event.done / event.total)
+            self.is_news = True
 
     def _note(self, event: Event) -> None:
         if isinstance(event, CandidateTried):

@@ -23,18 +23,23 @@ Counts = dict[str, int]
 
 @dataclass(frozen=True)
 class Report:
-    """Progress within an attempt at a request: energy [J] of the best answer, its bound [J], and
-    candidates tried.
+    """Progress within an attempt at a request: energy [J] of the best answer, its bound [J],
+    candidates tried, and the share of its steps that are done.
     """
 
     attempt: int
     found: float | None = None
     bound: float | None = None
     solved: int = 0
+    share: float | None = None
 
     def with_one_solved(self) -> Report:
         """The report after one more candidate."""
         return replace(self, solved=self.solved + 1)
+
+    def with_steps(self, share: float) -> Report:
+        """The report after this share of the steps."""
+        return replace(self, share=share)
 
     def with_best(self, found: float, bound: float | None) -> Report:
         """The report with another best answer."""
@@ -109,7 +114,9 @@ def record_progress(
     counts = counts_of(session, [job.id])[job.id]
     job.progressed = now
     requests = [{"index": index, **vars(report)} for index, report in sorted(reports.items())]
-    known = {"counts": counts, "progress": progress(job, counts), "eta": eta(job, counts, now)}
+    within = sum(report.share or 0.0 for report in reports.values())
+    left = eta(job, counts, now, within)
+    known = {"counts": counts, "progress": progress(job, counts), "eta": left}
     record(session, job, "progress", known | {"requests": requests})
     return counts
 
@@ -119,9 +126,11 @@ def progress(job: Job, counts: Counts) -> float:
     return sum(counts[state] for state in ENDED) / job.total
 
 
-def eta(job: Job, counts: Counts, now: datetime) -> float | None:
-    """Time [s] until the job ends at its present speed; None before 5 % of its work is done."""
-    ended = sum(counts[state] for state in ENDED)
+def eta(job: Job, counts: Counts, now: datetime, within: float = 0.0) -> float | None:
+    """Time [s] until the job ends at its present speed; None before 5 % of its work is done.
+    `within` is the work that is done of running requests, in requests.
+    """
+    ended = sum(counts[state] for state in ENDED) + within
     done, work = ended - job.ended_before, job.total - job.ended_before
     if job.ended is not None or job.started is None or done <= 0 or done < 0.05 * work:
         return None

@@ -12,6 +12,7 @@ from joulepath.app.api.report.request import MOST_ROWS
 from joulepath.app.convert.identified import Identified, identified_as
 from joulepath.app.convert.own_robots import own_robot_named, own_robot_of
 from joulepath.app.convert.recorded import GivenLog, log_given
+from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
 from joulepath.app.exceptions.stored import PartsNeeded, UnknownFigures, UnknownLog
@@ -22,13 +23,13 @@ from joulepath.app.tasks.kept_answers import answers_given
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.progress import Tell, no_listener
+from joulepath.optimizer.progress import no_listener
 
 
 class Runner(Protocol):
     """A runner of tasks: the engine, or a process running its own tasks."""
 
-    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
         """The result of a task in at most `deadline` [s]; `tell` receives its events."""
         ...
 
@@ -105,7 +106,7 @@ class ArmEngine:
     engine: Runner
     store: Store
 
-    async def run(self, task: Task, deadline: float, tell: Tell = no_listener) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Listener = no_listener) -> TaskResult:
         """The task's result; `tell` receives its events.
 
         Raises UnknownRobot, UnknownFigures, UnknownLog, UnknownAnswer, and the errors of the

@@ -1,3 +1,4 @@
+import { busyAfter } from "../src/logs/model";
 import { expect, it } from "vitest";
 import { costsOf, DEFAULT_ECONOMICS } from "../src/store/economics";
 import { parseMoves, requestsOf } from "../src/store/moves";
@@ -96,4 +97,18 @@ it("rows that do not fit are named", () => {
   expect(parseMoves(`${HEAD}\n${Array(12).fill(1).join(";")}\n1;2`, 6)).toEqual({
     why: "Row 2 has 2 numbers, the first one 11.",
   });
+});
+
+it("an identification says which fits are done, and how long the rest takes", () => {
+  const queued = busyAfter({ text: "", share: null }, "state", { state: "running" });
+  expect(queued).toEqual({ text: "Identification: running …", share: null });
+  const first = busyAfter(queued, "progress", { eta: null, requests: [{ share: 0 }] });
+  expect(first).toEqual({ text: "Identification: 0 % of the fits", share: 0 });
+  const second = busyAfter(first, "progress", { eta: 12.3, requests: [{ share: 0.25 }] });
+  expect(second).toEqual({
+    text: "Identification: 25 % of the fits, about 12 s left",
+    share: 0.25,
+  });
+  expect(busyAfter(second, "progress", { eta: 1, requests: [] })).toBe(second);
+  expect(busyAfter(second, "state", { state: "done" })).toBe(second);
 });

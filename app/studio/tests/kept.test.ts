@@ -7,6 +7,7 @@ import {
   jobNotes,
   keepJob,
   projects,
+  renameProject,
   saveNow,
 } from "../src/store/persist";
 import { cellOf, link, presentCell, shared } from "../src/store/share";
@@ -78,4 +79,17 @@ it("a file holds a project or a request", () => {
   expect(cellOf(JSON.stringify(MOVE)).request).toEqual(MOVE);
   expect(cellOf(JSON.stringify(presentCell()))).toEqual(presentCell());
   for (const text of ["3", "[]", "null", "{"]) expect(() => cellOf(text)).toThrow();
+});
+
+it("a project has another name, whether it is open or not", async () => {
+  replaceCell({ project: { id: "m", name: "closed" }, request: MOVE });
+  await saveNow();
+  replaceCell({ project: { id: "n", name: "open" }, request: MOVE });
+  await saveNow();
+  const named = async (id: string) => (await projects()).find((each) => each.id === id)!;
+  await renameProject(await named("m"), "shut");
+  await renameProject(await named("n"), "ajar");
+  await saveNow();
+  expect((await named("m")).name).toBe("shut");
+  expect((await named("n")).name).toBe("ajar");
 });

@@ -30,7 +30,7 @@ from joulepath.app.engine.work import Ended, Work, result_of, taking
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.exceptions import OutsideLimits
-from joulepath.optimizer.progress import CandidatesFound, Event
+from joulepath.optimizer.progress import Told
 from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId
 from tests.app.live import ROOT, alive
 
@@ -95,10 +95,10 @@ def hold(folder: Path) -> Hold:
 
 def test_results_errors_and_what_is_found_come_back(monkeypatch: pytest.MonkeyPatch) -> None:
     async def test(cluster: Cluster, _: Scheduler) -> None:
-        told: list[Event] = []
+        told: list[Told] = []
         first = int((await result_of(cluster.run, Count(100), LONG, tell=told.append)).document)
         await until(lambda: len(told) == 100)
-        assert told == [CandidatesFound(number) for number in range(100)]
+        assert told == Count(100).told
         assert first == await start(cluster, ProcessId()), "the same warm process"
         limits = OutsideLimits("start", 1, 9.0, -1.0, 1.0)
         with pytest.raises(OutsideLimits) as raised:
@@ -215,7 +215,7 @@ def test_short_works_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """
 
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        ended, told = list[Ended](), list[Event]()
+        ended, told = list[Ended](), list[Told]()
         works = [short(task, ended) for task in (ProcessId(), Count(3), Die(), ProcessId())]
         works[1].tell = told.append
         before = len(scheduler.tasks)

@@ -12,7 +12,7 @@ from pathlib import Path
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.optimizer.deadline import Deadline, checkpoint
-from joulepath.optimizer.progress import CandidatesFound
+from joulepath.optimizer.progress import CandidatesFound, StepsDone, Told
 
 
 def text(value: object) -> TaskResult:
@@ -126,14 +126,23 @@ class Fail:
 
 @dataclass(frozen=True)
 class Count:
-    """Tells numbers up to `total`, then its process id."""
+    """Tells numbers up to `total`, as events of a search or as steps, then its process id."""
 
     total: int
     request_id: str = "count"
 
+    @property
+    def told(self) -> list[Told]:
+        """What it tells."""
+        numbers = range(self.total)
+        return [
+            StepsDone(number, self.total, "numbers") if number % 2 else CandidatesFound(number)
+            for number in numbers
+        ]
+
     def run(self, deadline: float) -> TaskResult:
-        for number in range(self.total):
-            listener()(CandidatesFound(number))
+        for each in self.told:
+            listener()(each)
         return text(os.getpid())
 
 

@@ -23,7 +23,7 @@ from joulepath.app.exceptions.base import InternalError, InvalidRequest
 from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.app.settings import Settings
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
-from joulepath.optimizer.progress import CandidatesFound, Event
+from joulepath.optimizer.progress import Told
 from tests.app.engine.simple_tasks import (
     Count,
     Fail,
@@ -282,9 +282,9 @@ def test_is_not_ready_without_a_warm_worker(
 def test_what_a_task_finds_comes_before_its_result(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         for tells in (bench.engine.run, partial(result_of, bench.engine.spare.run)):
-            told: list[Event] = []
+            told: list[Told] = []
             await tells(Count(1000), LONG, tell=told.append)
-            assert told == [CandidatesFound(number) for number in range(1000)]
+            assert told == Count(1000).told
         await bench.engine.run(Count(1000), LONG)
         await bench.engine.run(ProcessId(), LONG, tell=told.append)
         assert len(told) == 1000, "nobody is told of a task that nobody listens to"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from joulepath.app.access.client import OPERATOR
 from joulepath.app.convert.packed import packed, unpacked
+from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.work import Take
 from joulepath.app.exceptions.queue import ClusterUnavailable, Preempted, WorkerLost
@@ -25,7 +26,7 @@ from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import JobRequest, now
 from joulepath.app.tasks.job_request import JobRequestTask, JobResult
-from joulepath.optimizer.progress import Tell, no_listener
+from joulepath.optimizer.progress import no_listener
 
 PATIENCE = 60.0
 BODY = packed(b"{}")
@@ -46,7 +47,7 @@ class Work:
         self.stopped: list[int] = []
         self.stoppable: list[bool] = []
         self.errors: list[Exception] = []
-        self.tell: Tell = no_listener
+        self.tell: Listener = no_listener
         self.answer: Callable[[JobRequestTask], TaskResult] = lambda task: answer(name)
 
     async def run(self, take: Take) -> None:

@@ -26,9 +26,13 @@ from joulepath.optimizer.progress import (
     CandidateTried,
     Event,
     Improved,
+    StepsDone,
     no_listener,
 )
 from tests.app.jobs.test_dispatcher import Service, is_done, requests, sent, until, with_store
+
+TRIED = {"solved": 1, "share": None}
+"""Progress within a request that has tried one candidate."""
 
 
 def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
@@ -54,9 +58,9 @@ def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
 
         service.dispatcher.start()
         await until(lambda: service.work.begun == [0])
-        first = {"index": 0, "attempt": 1, "found": None, "bound": None, "solved": 1}
+        first = {"index": 0, "attempt": 1, "found": None, "bound": None, **TRIED}
         await tells(first, CandidatesFound(3), CandidateTried(1, "solved", 1.0, 9.0))
-        best = {"index": 0, "attempt": 1, "found": 9.0, "bound": None, "solved": 1}
+        best = {"index": 0, "attempt": 1, "found": 9.0, "bound": None, **TRIED}
         await tells(
             best,
             Improved(9.0, bound=-math.inf),
@@ -68,6 +72,47 @@ def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
         await until(lambda: is_done(service, job_id))
         found = await reports()
         assert len(found) == 3, "what is no news is no event, and the end has none"
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_time_left_of_an_identification(tmp_path: Path) -> None:
+    """From its fits: before the first one has ended, nothing is said."""
+
+    async def test(store: Store) -> None:
+        service = Service("only", store)
+        job_id = await sent(service, kind=IDENTIFY)
+
+        async def told() -> list[tuple[float | None, float | None]]:
+            found, _ = await store.read(
+                partial(job_events.after, job_id=job_id, number=0, limit=100)
+            )
+            data = [each.data for each in found if each.name == "progress"]
+            return [
+                (each["requests"][0]["share"], each["eta"]) for each in data if each["requests"]
+            ]
+
+        async def tells(done: float, count: int) -> None:
+            service.work.tell(StepsDone(done, 4.0, "fits"))
+            service.moved += timedelta(seconds=10)
+            await until(lambda: has(count))
+
+        async def has(count: int) -> bool:
+            return len(await told()) == count
+
+        service.dispatcher.start()
+        await until(lambda: service.work.begun == [0])
+        await tells(0.0, 1)
+        await tells(1.0, 2)
+        await tells(3.0, 3)
+        shares, left = zip(*await told(), strict=True)
+        assert shares == (0.0, 0.25, 0.75)
+        assert left[0] is None
+        # 20 s and 30 s after the start, a fourth and three fourths are done
+        assert left[1:] == (pytest.approx(60, rel=0.1), pytest.approx(10, rel=0.1))
+        service.work.free.set()
+        await until(lambda: is_done(service, job_id))
         await service.dispatcher.stop()
 
     with_store(tmp_path, test)

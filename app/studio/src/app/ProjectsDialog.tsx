@@ -1,7 +1,7 @@
 import { useEffect, useState } from "preact/hooks";
-import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
-import { deleteProject, projects, saveNow, type Saved } from "../store/persist";
+import { KeptRow } from "../ui/KeptRow";
+import { deleteProject, projects, renameProject, saveNow, type Saved } from "../store/persist";
 import { project } from "../store/state";
 import { when } from "../store/units";
 import { openProject } from "../store/open";
@@ -15,9 +15,15 @@ export function ProjectsDialog({ onClose }: { onClose: () => void }) {
       .then(projects)
       .then(setAll, () => setAll([]));
   }, []);
-  const open = (each: Saved) => {
+  const isOpen = ({ id }: Saved) => id === project.value.id;
+  const open = async (each: Saved) => {
     onClose();
-    void openProject(each);
+    await openProject(each);
+  };
+  const rename = async (each: Saved, name: string | null) => {
+    if (!name) return;
+    await renameProject(each, name);
+    setAll((all ?? []).map((one) => (one === each ? { ...each, name } : one)));
   };
   const drop = async (each: Saved) => {
     await deleteProject(each.id);
@@ -37,28 +43,15 @@ export function ProjectsDialog({ onClose }: { onClose: () => void }) {
       {all && !shown.length && <p class="hint">None.</p>}
       <ul class="kept">
         {shown.map((each) => (
-          <li key={each.id}>
-            <button
-              type="button"
-              class="choice"
-              aria-current={each.id === project.value.id ? "true" : undefined}
-              onClick={() => open(each)}
-            >
-              <b>{each.name}</b>
-              <small>
-                {when(new Date(each.savedAt).toISOString())}
-                {each.id === project.value.id ? " · open" : ""}
-              </small>
-            </button>
-            {each.id !== project.value.id && (
-              <Button
-                kind="quiet"
-                icon="trash"
-                label={`Delete ${each.name}`}
-                onClick={() => drop(each)}
-              />
-            )}
-          </li>
+          <KeptRow
+            key={each.id}
+            name={each.name}
+            facts={`${when(new Date(each.savedAt).toISOString())}${isOpen(each) ? " · open" : ""}`}
+            current={isOpen(each)}
+            onOpen={() => open(each)}
+            onRename={(name) => rename(each, name)}
+            onDelete={isOpen(each) ? undefined : () => drop(each)}
+          />
         ))}
       </ul>
     </Dialog>

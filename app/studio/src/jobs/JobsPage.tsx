@@ -1,18 +1,19 @@
 import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
-import { remove } from "../store/client";
+import { KeptRow } from "../ui/KeptRow";
+import { SearchField } from "../ui/SearchField";
+import { patch, remove } from "../store/client";
 import { trouble } from "../store/state";
-import { tell, trying } from "../store/trouble";
+import { tell } from "../store/trouble";
 import { figure, when } from "../store/units";
 import { JobView } from "./JobView";
-import { isOver, jobs, loadJob, loadJobs, opened, type Job } from "./model";
+import { isOver, jobs, jobSearch, loadJob, loadJobs, opened, type Job } from "./model";
 import { NewJob } from "./NewJob";
 
 const PAUSE = 1000; // between two looks at what runs [ms]
 
 /** Tables of moves that the service computes while nobody waits. */
 export function JobsPage() {
-  const [filter, setFilter] = useState("");
   const [making, setMaking] = useState(false);
   useEffect(() => {
     const look = async () => {
@@ -28,9 +29,12 @@ export function JobsPage() {
     }, PAUSE);
     return () => clearInterval(timer);
   }, []);
-  const shown = (jobs.value ?? []).filter(({ name, id }) =>
-    `${name ?? ""} ${id}`.toLowerCase().includes(filter.toLowerCase()),
-  );
+  const shown = jobs.value ?? [];
+  const rename = async (job: Job, name: string | null) => {
+    await patch(`jobs/${job.id}`, { name });
+    await loadJobs();
+    if (opened.value?.job.id === job.id) await loadJob(job.id);
+  };
   const drop = async (job: Job) => {
     await remove(`jobs/${job.id}`);
     if (opened.value?.job.id === job.id) opened.value = null;
@@ -42,43 +46,39 @@ export function JobsPage() {
         <Button kind="primary" icon="plus" id="new-job" onClick={() => setMaking(true)}>
           New job
         </Button>
-        <input
-          type="search"
-          class="search"
-          aria-label="Search jobs"
-          placeholder="Search jobs"
-          value={filter}
-          onInput={(event) => setFilter(event.currentTarget.value)}
+        <SearchField
+          label="Search jobs"
+          onSearch={(text) => {
+            jobSearch.value = text;
+            loadJobs().catch((error) => tell(error));
+          }}
         />
-        {jobs.value && !shown.length && <p class="hint">No job yet: paste a table of moves.</p>}
+        {jobs.value && !shown.length && (
+          <p class="hint">
+            {jobSearch.value ? "No job of this name." : "No job yet: paste a table of moves."}
+          </p>
+        )}
         <ul class="kept">
           {shown.map((job) => (
-            <li key={job.id}>
-              <button
-                type="button"
-                class="choice"
-                aria-current={opened.value?.job.id === job.id ? "true" : undefined}
-                onClick={trying(() => loadJob(job.id))}
-              >
-                <b>{job.name ?? job.id.slice(0, 8)}</b>
-                <small>{stateText(job)}</small>
-                {!isOver(job) && (
+            <KeptRow
+              key={job.id}
+              name={job.name}
+              unnamed={job.id.slice(0, 8)}
+              facts={stateText(job)}
+              current={opened.value?.job.id === job.id}
+              onOpen={() => loadJob(job.id)}
+              onRename={(name) => rename(job, name)}
+              onDelete={isOver(job) ? () => drop(job) : undefined}
+              progress={
+                !isOver(job) && (
                   <progress
                     max={1}
                     value={job.progress}
                     aria-label={`Progress of ${job.name ?? job.id}`}
                   />
-                )}
-              </button>
-              {isOver(job) && (
-                <Button
-                  kind="quiet"
-                  icon="trash"
-                  label={`Delete ${job.name ?? job.id}`}
-                  onClick={trying(() => drop(job))}
-                />
-              )}
-            </li>
+                )
+              }
+            />
           ))}
         </ul>
       </aside>

@@ -1,6 +1,6 @@
 // Jobs of the service, and what the page adds to them: names of moves, intervals and savings.
 import { signal } from "@preact/signals";
-import { get, send } from "../store/client";
+import { get, listed, send } from "../store/client";
 import { jobNotes, type JobNotes } from "../store/persist";
 import type { Interval, ProblemDetails, Solution } from "../store/types";
 
@@ -44,8 +44,15 @@ const PAGE = 1000;
 export const jobs = signal<Job[] | null>(null);
 export const opened = signal<Opened | null>(null);
 
+/** Text that the names of the listed jobs have. */
+export const jobSearch = signal("");
+
+/** Lists the jobs; identifications are with the logs. Throws Problem. */
 export const loadJobs = async () => {
-  jobs.value = (await get<{ jobs: Job[] }>("jobs?limit=200")).jobs;
+  const search = jobSearch.peek();
+  const query = { limit: "200", identifications: "false", search };
+  const found = await listed<{ jobs: Job[] }>("jobs", query);
+  if (search === jobSearch.peek()) jobs.value = found.jobs;
 };
 
 export const isOver = ({ state }: Job) => state === "done" || state === "cancelled";

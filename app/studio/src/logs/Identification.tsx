@@ -42,8 +42,9 @@ export function Identification() {
     <div id="identification">
       <header class="page-head">
         <div>
-          <h2>Identification of {robot.name}</h2>
+          <h2>{found.name ?? `Identification of ${robot.name}`}</h2>
           <p class="hint">
+            {found.name && `Identification of ${robot.name}, `}
             {new Date(found.created).toLocaleString()}, {told} of {result.parameters.length} figures
             told by the logs
           </p>

@@ -1,6 +1,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
-import { remove } from "../store/client";
+import { KeptRow } from "../ui/KeptRow";
+import { SearchField } from "../ui/SearchField";
+import { patch, remove } from "../store/client";
 import { trouble } from "../store/state";
 import { tell, trying } from "../store/trouble";
 import { figure, when } from "../store/units";
@@ -14,6 +16,7 @@ import {
   identify,
   loadLogs,
   logs,
+  logSearch,
   openedIdentification,
   openedLog,
   openIdentification,
@@ -22,15 +25,12 @@ import {
 
 /** Logs of one's own arm: measured against predicted joules, and figures found from them. */
 export function LogsPage() {
-  const [filter, setFilter] = useState("");
   const [file, setFile] = useState<File | null>(null);
   useEffect(() => {
     trouble.value = null;
     loadLogs().catch((error) => tell(error));
   }, []);
-  const shown = (logs.value ?? []).filter(({ name, robot, id }) =>
-    `${name ?? ""} ${robot} ${id}`.toLowerCase().includes(filter.toLowerCase()),
-  );
+  const shown = logs.value ?? [];
   const flip = (id: string) =>
     (chosen.value = chosen.value.includes(id)
       ? chosen.value.filter((each) => each !== id)
@@ -42,8 +42,20 @@ export function LogsPage() {
     await loadLogs();
   };
   const forget = async (id: string) => {
-    await remove(`jobs/${id}`);
+    await remove(`identifications/${id}`);
     if (openedIdentification.value?.found.id === id) openedIdentification.value = null;
+    await loadLogs();
+  };
+  const renameLog = async (id: string, name: string | null) => {
+    await patch(`logs/${id}`, { name });
+    if (openedLog.value?.id === id) openedLog.value = { ...openedLog.value, name };
+    await loadLogs();
+  };
+  const rename = async (id: string, name: string | null) => {
+    await patch(`identifications/${id}`, { name });
+    const { value } = openedIdentification;
+    if (value?.found.id === id)
+      openedIdentification.value = { ...value, found: { ...value.found, name } };
     await loadLogs();
   };
   return (
@@ -62,83 +74,75 @@ export function LogsPage() {
             }}
           />
         </label>
-        <input
-          type="search"
-          class="search"
-          aria-label="Search logs"
-          placeholder="Search logs"
-          value={filter}
-          onInput={(event) => setFilter(event.currentTarget.value)}
+        <SearchField
+          label="Search logs and identifications"
+          placeholder="Search by name or robot"
+          onSearch={(text) => {
+            logSearch.value = text;
+            loadLogs().catch((error) => tell(error));
+          }}
         />
         {logs.value && !shown.length && (
-          <p class="hint">No log yet: add a CSV file of your arm (RTDE, ROS, or t, q1 …).</p>
+          <p class="hint">
+            {logSearch.value
+              ? "No log of this name."
+              : "No log yet: add a CSV file of your arm (RTDE, ROS, or t, q1 …)."}
+          </p>
         )}
         <ul class="kept">
           {shown.map((log) => (
-            <li key={log.id}>
-              <input
-                type="checkbox"
-                aria-label={`Use ${log.name ?? log.id} for an identification`}
-                checked={chosen.value.includes(log.id)}
-                onChange={() => flip(log.id)}
-              />
-              <button
-                type="button"
-                class="choice"
-                aria-current={
-                  openedLog.value?.id === log.id && !openedIdentification.value ? "true" : undefined
-                }
-                onClick={trying(() => openLog(log.id))}
-              >
-                <b>{log.name ?? log.id.slice(0, 8)}</b>
-                <small>
-                  {log.robot} · {figure(log.duration)} s · {when(log.created)}
-                </small>
-              </button>
-              <Button
-                kind="quiet"
-                icon="trash"
-                label={`Delete ${log.name ?? log.id}`}
-                onClick={trying(() => drop(log.id))}
-              />
-            </li>
+            <KeptRow
+              key={log.id}
+              name={log.name}
+              unnamed={log.id.slice(0, 8)}
+              facts={`${log.robot} · ${figure(log.duration)} s · ${when(log.created)}`}
+              current={openedLog.value?.id === log.id && !openedIdentification.value}
+              onOpen={() => openLog(log.id)}
+              onRename={(name) => renameLog(log.id, name)}
+              onDelete={() => drop(log.id)}
+              before={
+                <input
+                  type="checkbox"
+                  aria-label={`Use ${log.name ?? log.id} for an identification`}
+                  checked={chosen.value.includes(log.id)}
+                  onChange={() => flip(log.id)}
+                />
+              }
+            />
           ))}
         </ul>
         <Button
           id="identify"
           disabled={!chosen.value.length || Boolean(busy.value)}
           title="Friction, rotors, power of your own arm"
-          onClick={trying(() => identify({ logs: chosen.value }))}
+          onClick={trying(() => identify(chosen.value))}
         >
           Identify from {chosen.value.length} {chosen.value.length === 1 ? "log" : "logs"}
         </Button>
         {busy.value && (
-          <p class="hint" role="status">
-            {busy.value}
-          </p>
+          <div role="status" id="identifying">
+            <p class="hint">{busy.value.text}</p>
+            {busy.value.share !== null && (
+              <progress max={1} value={busy.value.share} aria-label="Fits that are done" />
+            )}
+          </div>
         )}
         <h2>Identifications</h2>
-        {!identifications.value.length && <p class="hint">None yet.</p>}
+        {!identifications.value.length && (
+          <p class="hint">{logSearch.value ? "None of this name." : "None yet."}</p>
+        )}
         <ul class="kept">
           {identifications.value.map((each) => (
-            <li key={each.id}>
-              <button
-                type="button"
-                class="choice"
-                onClick={trying(() => openIdentification(each.id))}
-              >
-                <b>{each.robot ?? each.id.slice(0, 8)}</b>
-                <small>
-                  {each.state} · {when(each.created)}
-                </small>
-              </button>
-              <Button
-                kind="quiet"
-                icon="trash"
-                label={`Delete the identification of ${when(each.created)}`}
-                onClick={trying(() => forget(each.id))}
-              />
-            </li>
+            <KeptRow
+              key={each.id}
+              name={each.name}
+              unnamed={`${each.robot ?? "identification"} ${each.id.slice(0, 8)}`}
+              facts={[each.robot, each.state, when(each.created)].filter(Boolean).join(" · ")}
+              current={openedIdentification.value?.found.id === each.id}
+              onOpen={() => openIdentification(each.id)}
+              onRename={(name) => rename(each.id, name)}
+              onDelete={() => forget(each.id)}
+            />
           ))}
         </ul>
       </aside>

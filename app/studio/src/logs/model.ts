@@ -1,7 +1,8 @@
 // Logs of arms, and what is found from them.
 import { signal } from "@preact/signals";
-import { get, post, send, Problem } from "../store/client";
+import { follow, get, listed, patch, post, send, Problem } from "../store/client";
 import type { Interval, Parameter, ProblemDetails } from "../store/types";
+import { figure } from "../store/units";
 
 export interface LogSummary {
   id: string;
@@ -40,6 +41,7 @@ export interface Evaluation {
 
 export interface IdentificationSummary {
   id: string;
+  name: string | null;
   robot: string | null;
   state: string;
   created: string;
@@ -87,6 +89,7 @@ export interface Found {
 
 export interface Identification {
   id: string;
+  name: string | null;
   state: string;
   created: string;
   figures: string | null;
@@ -107,7 +110,13 @@ export interface MoveCurves {
   power: { measured: (number | null)[]; modelled: (number | null)[] } | null;
 }
 
-const PAUSE = 500; // between two looks at work that runs [ms]
+/** An identification that runs: what is said of it, and the share of its fits that are done. */
+interface Busy {
+  text: string;
+  share: number | null;
+}
+
+const LONGEST_NAME = 200;
 
 export const logs = signal<LogSummary[] | null>(null);
 export const identifications = signal<IdentificationSummary[]>([]);
@@ -117,14 +126,18 @@ export const openedLog = signal<LogDetail | null>(null);
 export const openedIdentification = signal<{ found: Identification; moves: MoveCurves[] } | null>(
   null,
 );
-export const busy = signal("");
+export const busy = signal<Busy | null>(null);
+/** Text that the listed logs and identifications have in their name or robot. */
+export const logSearch = signal("");
 
 /** Throws Problem. */
 export async function loadLogs(): Promise<void> {
+  const query = { limit: "200", search: logSearch.peek() };
   const [own, found] = await Promise.all([
-    get<{ logs: LogSummary[] }>("logs?limit=200"),
-    get<{ identifications: IdentificationSummary[] }>("identifications?limit=50"),
+    listed<{ logs: LogSummary[] }>("logs", query),
+    listed<{ identifications: IdentificationSummary[] }>("identifications", query),
   ]);
+  if (query.search !== logSearch.peek()) return;
   logs.value = own.logs;
   identifications.value = found.identifications;
 }
@@ -151,22 +164,26 @@ export const openLog = async (id: string) => {
 export const evaluated = (log: string, figures: string | null) =>
   post<Evaluation>("evaluate", { log, figures });
 
-/** Starts an identification, waits for its end and opens it. Throws Problem. */
-export async function identify(body: Record<string, unknown>): Promise<void> {
-  const { id } = await post<Identification>("identifications", body);
+/** Starts an identification named after its logs, waits for its end and opens it. Throws Problem. */
+export async function identify(ids: string[]): Promise<void> {
+  const { id } = await post<Identification>("identifications", { logs: ids });
+  const names = (logs.value ?? []).filter((log) => ids.includes(log.id)).map(({ name }) => name);
+  const name = names.filter(Boolean).join(", ").slice(0, LONGEST_NAME) || null;
+  await patch(`identifications/${id}`, { name });
   await openIdentification(id);
 }
 
 /** Opens an identification by its id, after its end. Throws Problem. */
 export async function openIdentification(id: string): Promise<void> {
   const path = `identifications/${encodeURIComponent(id)}`;
-  const began = performance.now();
   try {
     let found = await get<Identification>(path);
-    while (["queued", "running"].includes(found.state)) {
-      const passed = Math.round((performance.now() - began) / 1000);
-      busy.value = `Identification: ${found.state} for ${passed} s …`;
-      await new Promise((resolve) => setTimeout(resolve, PAUSE));
+    if (["queued", "running"].includes(found.state)) {
+      busy.value = { text: `Identification: ${found.state} …`, share: null };
+      await loadLogs();
+      await follow(id, (event, data) => {
+        busy.value = busyAfter(busy.value, event, data as JobProgress);
+      });
       found = await get<Identification>(path);
     }
     if (found.problem) throw new Problem(found.problem);
@@ -178,7 +195,23 @@ export async function openIdentification(id: string): Promise<void> {
     const { moves } = await get<{ moves: MoveCurves[] | null }>(`${path}/residuals`);
     openedIdentification.value = { found, moves: moves ?? [] };
   } finally {
-    busy.value = "";
+    busy.value = null;
     await loadLogs().catch(() => undefined);
   }
+}
+
+interface JobProgress {
+  state?: string;
+  eta?: number | null;
+  requests?: { share: number | null }[];
+}
+
+/** What is said of an identification after an event of its job. */
+export function busyAfter(now: Busy | null, event: string, data: JobProgress): Busy | null {
+  if (event === "state" && now?.share == null)
+    return { text: `Identification: ${data.state} …`, share: null };
+  const share = event === "progress" ? (data.requests?.[0]?.share ?? null) : null;
+  if (share === null) return now;
+  const left = data.eta == null ? "" : `, about ${figure(data.eta, 2)} s left`;
+  return { text: `Identification: ${Math.round(100 * share)} % of the fits${left}`, share };
 }

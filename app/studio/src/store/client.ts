@@ -24,6 +24,12 @@ export const post = async <T>(path: string, body: unknown, signal?: AbortSignal)
 export const patch = async <T>(path: string, body: unknown): Promise<T> =>
   (await send(path, { ...posting(body), method: "PATCH" })).json() as Promise<T>;
 
+/** A page of a list, with the parameters that have a value. Throws Problem. */
+export const listed = <T>(path: string, query: Record<string, string | undefined>): Promise<T> => {
+  const given = Object.entries(query).filter(([, value]) => value);
+  return get<T>(`${path}?${new URLSearchParams(given as [string, string][])}`);
+};
+
 export const remove = (path: string) => send(path, { method: "DELETE" });
 
 const posting = (
@@ -86,6 +92,19 @@ export async function stream(
     event("answer", await response.json());
     return;
   }
+  await read(response, event);
+}
+
+/** Passes the events of a job on, from the first to the last. Throws Problem, or AbortError. */
+export const follow = async (
+  job: string,
+  event: (name: string, data: unknown) => void,
+): Promise<void> => read(await send(`jobs/${encodeURIComponent(job)}/events`, {}), event);
+
+async function read(
+  response: Response,
+  event: (name: string, data: unknown) => void,
+): Promise<void> {
   const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   for (;;) {

@@ -60,6 +60,12 @@ export async function projects(): Promise<Saved[]> {
 export const deleteProject = (id: string) =>
   within("projects", "readwrite", (store) => store.delete(id));
 
+/** Gives a project of this browser another name. */
+export async function renameProject(record: Saved, name: string): Promise<void> {
+  if (record.id === project.value.id) project.value = { ...project.value, name };
+  else await write({ ...record, name });
+}
+
 /** What was asked when an answer was computed here; null for answers of others. */
 export async function askedFor(id: string): Promise<Cell | null> {
   const found = await within<Asked | undefined>("asked", "readonly", (store) =>
