@@ -1,24 +1,43 @@
 """Makes the pictures of docs/reference/studio.md: `python -m tests.browser.pictures`.
 
-They are of a service that it starts, with its own examples and a simulated log.
+They are of a service that it starts, with its own examples, a job of moves between a grid of poses,
+and a simulated log.
 """
 
 from __future__ import annotations
 
+import base64
 import json
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+
+from playwright.sync_api import Browser, Page
 
 from joulepath.models.registry import load_robot
 from tests.app.live import GRACE, ROOT, serving
-from tests.browser.pages import MESHES, SHOWN, ask, go, opened, type_into, until
+from tests.browser.pages import FIRST, MESHES, SHOWN, ask, go, opened, type_into, until
 from tests.browsers import SOFTWARE, chromium
 from tests.identification_logs import csv_of, recorded, truth_of
 
 DOCS = ROOT / "docs" / "images"
 SIZE = {"width": 1440, "height": 900}
+PHONE = {"width": 390, "height": 844}
 SETTLED = 1500
 """Time after which a still picture is drawn in full [ms]."""
+BACK = 45
+"""Samples before the end of the motion, where its picture is taken."""
+POSTURES = "() => studio.state.postures?.every(({ state }) => state !== 'computing')"
+START = "-420;280;300;0;3.142;0"
+MOVES = [
+    *(
+        f"bin;shelf {row}.{column};0.8;{START};{-410 + 60 * column};-440;{350 + 60 * row};1.571;0;0"
+        for row in range(3)
+        for column in range(4)
+    ),
+    f"bin;floor of the next cell;0.8;{START};-1800;-440;350;1.571;0;0",
+]
+"""Moves from the bin to a grid of poses over the shelf, and one that is out of reach."""
 
 
 def main() -> None:
@@ -26,44 +45,105 @@ def main() -> None:
     with (
         serving(workers=1, deadline_grace=GRACE) as service,
         chromium(*SOFTWARE) as browser,
-        opened(browser, f"{service.url}/studio", viewport=SIZE) as page,
-        tempfile.TemporaryDirectory() as folder,
     ):
+        url = f"{service.url}/studio"
+        with opened(browser, url, viewport=SIZE) as page:
+            of_cells(page)
+            of_a_job(page)
+            of_an_identification(page)
+        with opened(browser, url, viewport=SIZE, color_scheme="dark") as page:
+            in_the_middle(page)
+            picture(page, "studio_dark")
+        with opened(browser, url, viewport=PHONE, device_scale_factor=1.5) as page:
+            of_a_phone(browser, page)
 
-        def picture(name: str) -> None:
-            page.wait_for_timeout(SETTLED)
-            page.screenshot(path=DOCS / f"{name}.png")
 
-        until(page, SHOWN)
-        until(page, MESHES)
-        until(page, "() => studio.state.postures?.every(({ state }) => state !== 'computing')")
-        page.locator("#view").press("End")
-        for _ in range(45):
-            page.locator("#view").press("ArrowLeft")
-        page.locator("#view").evaluate("it => it.blur()")
-        picture("studio")
-        type_into(page, "/payload/mass", "1.6")
-        type_into(page, "/goal/pose/position/2", "500")
-        picture("studio_stale")
-        page.get_by_label("Name of the project").fill("Pick and place")
-        ask(page, json.loads((ROOT / "examples" / "cycle" / "pick_and_place.json").read_text()))
-        page.get_by_role("button", name="Leave out").wait_for()
-        page.locator("#scrub").fill("2.4")
-        picture("studio_round")
-        page.locator("#export").click()
-        page.locator("#preview").wait_for()
-        picture("studio_export")
-        page.get_by_role("button", name="Close").click()
+def picture(page: Page, name: str) -> None:
+    """Write what is seen once it is still."""
+    page.wait_for_timeout(SETTLED)
+    page.screenshot(path=DOCS / f"{name}.png")
+
+
+def in_the_middle(page: Page) -> None:
+    """Show the first example some samples before the end of its motion."""
+    until(page, SHOWN)
+    until(page, MESHES)
+    until(page, POSTURES)
+    page.locator("#view").press("End")
+    for _ in range(BACK):
+        page.locator("#view").press("ArrowLeft")
+    page.locator("#view").evaluate("it => it.blur()")
+
+
+def of_cells(page: Page) -> None:
+    """A move, the same with changes, a round, and its export."""
+    in_the_middle(page)
+    picture(page, "studio")
+    type_into(page, "/payload/mass", "1.6")
+    type_into(page, "/goal/pose/position/2", "500")
+    picture(page, "studio_stale")
+    page.get_by_label("Name of the project").fill("Pick and place")
+    ask(page, json.loads((ROOT / "examples" / "cycle" / "pick_and_place.json").read_text()))
+    page.get_by_role("button", name="Leave out").wait_for()
+    page.locator("#scrub").fill("2.4")
+    picture(page, "studio_round")
+    page.locator("#export").click()
+    page.locator("#preview").wait_for()
+    picture(page, "studio_export")
+    page.get_by_role("button", name="Close").click()
+
+
+def of_a_job(page: Page) -> None:
+    """A table of moves, one of which has no answer, with intervals and savings."""
+    ask(page, FIRST)
+    go(page, "Jobs")
+    page.locator("#new-job").click()
+    page.get_by_role("dialog").get_by_label("Name").fill("Shelf, all places")
+    page.locator("#moves-text").fill("\n".join(MOVES))
+    page.locator("#job-readings").get_by_role("button", name="rad").click()
+    page.locator("#start-job").click()
+    page.locator("#job-progress", has_text=f"{len(MOVES)} of {len(MOVES)}").wait_for()
+    page.get_by_role("button", name="Intervals and savings").click()
+    page.locator("#job-totals", has_text="less than").wait_for()
+    picture(page, "studio_jobs")
+
+
+def of_an_identification(page: Page) -> None:
+    """The figures that a simulated log tells."""
+    robot = load_robot("ur5e")
+    go(page, "Logs")
+    with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "monday.csv"
-        robot = load_robot("ur5e")
         file.write_bytes(csv_of(recorded(robot, truth_of(robot), moves=6)))
-        go(page, "Logs")
         page.locator("#log-file").set_input_files(file)
         page.locator("#add-log").click()
         page.locator("#measured").wait_for()
-        page.locator("#identify").click()
-        page.locator("#identification").wait_for()
-        picture("identification")
+    page.locator("#identify").click()
+    page.locator("#identification").wait_for()
+    picture(page, "identification")
+
+
+def of_a_phone(browser: Browser, page: Page) -> None:
+    """The three tabs of a cell, side by side."""
+    until(page, SHOWN)
+    seen = list[bytes]()
+    for name in ("Task", "Picture", "Answer"):
+        page.get_by_role("tab", name=name, exact=True).click()
+        page.wait_for_timeout(SETTLED)
+        seen.append(page.screenshot())
+    beside(browser, seen, DOCS / "studio_phone.png")
+
+
+def beside(browser: Browser, pictures: Sequence[bytes], file: Path) -> None:
+    """Write pictures of a phone side by side."""
+    count, gap = len(pictures), 20
+    width = count * PHONE["width"] + (count - 1) * gap
+    page = browser.new_page(viewport={"width": width, "height": PHONE["height"]})
+    sources = (f"data:image/png;base64,{base64.b64encode(each).decode()}" for each in pictures)
+    shown = "".join(f'<img src="{each}" width="{PHONE["width"]}">' for each in sources)
+    page.set_content(f'<body style="margin:0;display:flex;gap:{gap}px;background:#888">{shown}')
+    page.screenshot(path=file)
+    page.close()
 
 
 if __name__ == "__main__":

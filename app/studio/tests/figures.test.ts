@@ -2,7 +2,10 @@ import { busyAfter } from "../src/logs/model";
 import { expect, it } from "vitest";
 import { costsOf, DEFAULT_ECONOMICS } from "../src/store/economics";
 import { parseMoves, requestsOf } from "../src/store/moves";
-import { atMost, figure, parseNumber, shown, typedValue } from "../src/store/units";
+import { Problem } from "../src/store/client";
+import { trouble } from "../src/store/state";
+import { tell } from "../src/store/trouble";
+import { asShown, atMost, figure, parseNumber, shown, typedValue } from "../src/store/units";
 import { MOVE } from "./cells";
 
 it("numbers are read as people type them", () => {
@@ -111,4 +114,22 @@ it("an identification says which fits are done, and how long the rest takes", ()
   });
   expect(busyAfter(second, "progress", { eta: 1, requests: [] })).toBe(second);
   expect(busyAfter(second, "state", { state: "done" })).toBe(second);
+});
+
+it("what the service says has the units and the names of the page", () => {
+  expect(asShown("elbow_joint needs 155 N·m, 0.2969 m short of 12 m, in 3 moves")).toBe(
+    "elbow needs 155 N·m, 297 mm short of 12 m, in 3 moves",
+  );
+  const errors = [
+    { loc: ["body", "goal", "pose", "position", 0], msg: "Too large" },
+    { loc: ["body", "payload", "mass"], msg: "Too heavy" },
+  ];
+  tell(new Problem({ title: "Invalid request", detail: "See `errors`.", errors }), MOVE);
+  expect(trouble.value).toMatchObject({
+    text: "Correct what is marked.",
+    fields: [
+      { pointer: "/goal/pose/position/0", text: "Too large (in SI units, not mm)" },
+      { pointer: "/payload/mass", text: "Too heavy" },
+    ],
+  });
 });

@@ -159,7 +159,7 @@ export function LogsPage() {
           </p>
         )}
       </section>
-      {file && <AddLog file={file} onClose={() => setFile(null)} />}
+      {file && <AddLog file={file} onClose={() => setFile((now) => (now === file ? null : now))} />}
     </main>
   );
 }

@@ -5,7 +5,7 @@ import { at, type Pointer } from "./pointer";
 import { robotName, rowsOf, targetAt, poseAt } from "./request";
 import { request } from "./state";
 import type { ApiRequest, IkSolution, Pose } from "./types";
-import { figure } from "./units";
+import { asShown } from "./units";
 
 export type Reach =
   | { state: "asking" }
@@ -85,15 +85,11 @@ async function ask(asked: ApiRequest, pose: Pose): Promise<Reach | null> {
   } catch (error) {
     // fields that are wrong elsewhere are told when the request is sent
     const about = error instanceof Problem && error.details.status === 422 && !error.details.errors;
-    return about ? { state: "refused", text: withoutFigures(error.message) } : null;
+    return about
+      ? {
+          state: "refused",
+          text: asShown(error.message).replace(/^The .*? pose is /, "The pose is "),
+        }
+      : null;
   }
-}
-
-/** "The goal pose is 0.09433 m out of reach …" in the units of the page. */
-function withoutFigures(text: string): string {
-  return text
-    .replace(/^The .*? pose is /, "The pose is ")
-    .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b/g, (whole, metres: string) =>
-      Number(metres) < 5 ? `${figure(Number(metres) * 1000, 2)} mm` : whole,
-    );
 }

@@ -1,9 +1,11 @@
 // Errors, as sentences at the fields that caused them.
 import { Problem } from "./client";
+import { unitAt } from "./diff";
 import { located, type Pointer } from "./pointer";
 import { kindOf, listOf, stopName } from "./request";
 import { request, trouble } from "./state";
 import type { ApiRequest, ProblemDetails } from "./types";
+import { asShown, UNITS } from "./units";
 
 // the field that a problem without one is about
 const FIELDS: Record<string, Pointer> = {
@@ -38,12 +40,14 @@ export function tell(error: unknown, asked: ApiRequest = request.value): void {
   if (error instanceof DOMException && error.name === "AbortError") return;
   if (!(error instanceof Problem)) console.error(error);
   const details = error instanceof Problem ? error.details : {};
-  const fields = (details.errors ?? []).map(({ loc, msg }) => ({
-    pointer: located(asked, loc),
-    text: msg,
-  }));
+  const fields = (details.errors ?? []).map(({ loc, msg }) => {
+    const pointer = located(asked, loc);
+    const { factor, sign } = UNITS[unitAt(pointer)];
+    return { pointer, text: factor === 1 ? msg : `${msg} (in SI units, not ${sign})` };
+  });
   const pointer = pointerOf(details, asked);
-  const text = error instanceof Error ? error.message : String(error);
+  const said = error instanceof Error ? error.message : String(error);
+  const text = fields.length ? "Correct what is marked." : asShown(said);
   if (pointer !== null && !fields.length) fields.push({ pointer, text });
   trouble.value = {
     title: details.title ?? "Something went wrong",

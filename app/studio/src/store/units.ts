@@ -75,5 +75,15 @@ export const words = (name: string) => name.replaceAll("_", " ");
 /** The name of a joint, in short. */
 export const jointName = (name: string) => words(name.replace(/_joint$/, ""));
 
+const LONGEST = 5; // what is longer is told in metres [m]
+
+/** What the service says, in the units and the names of joints of the page. */
+export const asShown = (text: string): string =>
+  text
+    .replace(/\b[a-z0-9_]+_joint\b/g, jointName)
+    .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b(?![²³])/g, (whole, metres: string) =>
+      Number(metres) < LONGEST ? `${figure(Number(metres) * 1000, 2)} mm` : whole,
+    );
+
 export const when = (time: string) =>
   new Date(time).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
