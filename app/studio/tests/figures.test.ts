@@ -133,3 +133,15 @@ it("what the service says has the units and the names of the page", () => {
     ],
   });
 });
+
+it("a mass of a table that is no number is named, and not left out", () => {
+  const six = "-420;280;300;0;3.142;0";
+  for (const text of [
+    `from;to;kg;x mm;y;z;rx rad;ry;rz;x;y;z;rx;ry;rz\na;b;heavy;${six};${six}`,
+    `from;to;kg;x mm;y;z;rx rad;ry;rz;x;y;z;rx;ry;rz\na;b;-2;${six};${six}`,
+    `a;b;NaN;${six};${six}`,
+  ])
+    expect(parseMoves(text, 6)).toMatchObject({ why: expect.stringMatching(/Row 1: .*no mass/) });
+  const read = parseMoves(`from;to;kg;x;y;z;rx;ry;rz;x;y;z;rx;ry;rz\na;b;;${six};${six}`, 6);
+  expect(read).toMatchObject({ moves: [{ from: "a", to: "b", mass: 0 }] });
+});

@@ -2,6 +2,7 @@
 // unasked.
 import { effect, signal, untracked } from "@preact/signals";
 import { post } from "../store/client";
+import { named } from "../store/run";
 import { ikBody } from "../store/reach";
 import { rowsOf, targetAt } from "../store/request";
 import { answered, stale, type Answered } from "../store/state";
@@ -125,6 +126,7 @@ async function motionTo(shown: Answered, posture: Posture, signal: AbortSignal):
   try {
     const solution = await post<Solution>("optimize", body, signal);
     const { q } = solution.branch.goal;
+    void named(solution.id, "posture");
     return {
       ...posture,
       q,

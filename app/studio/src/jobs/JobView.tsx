@@ -8,7 +8,7 @@ import { costsFor, report, type ReportFormat } from "../store/report";
 import { save } from "../store/share";
 import { economics } from "../store/state";
 import { trying } from "../store/trouble";
-import { figure, percent } from "../store/units";
+import { asShown, figure, percent } from "../store/units";
 import { csvOfJob, isOver, loadDetails, loadJob, namesOf, type JobRow, type Opened } from "./model";
 
 type Filter = "all" | JobRow["state"];
@@ -202,7 +202,7 @@ function MoveRow({ row, shown }: { row: JobRow; shown: Opened }) {
       <tr class="failed">
         {head}
         <td colSpan={5}>
-          {row.problem.detail ?? row.problem.title}{" "}
+          {asShown(row.problem.detail ?? row.problem.title ?? "")}{" "}
           {asked && (
             <Button kind="link" onClick={trying(open)}>
               Open in cell

@@ -1,9 +1,11 @@
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
 import { Problem } from "../store/client";
 import { robotName } from "../store/request";
+import { robotList, type RobotSummary } from "../store/service";
 import { request } from "../store/state";
+import { tell } from "../store/trouble";
 import { parseNumber } from "../store/units";
 import { addLog, chosen, openedIdentification, openedLog } from "./model";
 
@@ -20,6 +22,12 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
   });
   const [why, setWhy] = useState<{ text: string; link: string | null } | null>(null);
   const [busy, setBusy] = useState(false);
+  const [robots, setRobots] = useState<Pick<RobotSummary, "name" | "title">[]>([
+    { name: settings.robot, title: settings.robot },
+  ]);
+  useEffect(() => {
+    robotList().then(setRobots, (error) => tell(error));
+  }, []);
   const set = (field: keyof typeof settings) => (event: { currentTarget: { value: string } }) =>
     setSettings({ ...settings, [field]: event.currentTarget.value });
   const send = async () => {
@@ -82,7 +90,14 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
           Name <input type="text" value={settings.name} onChange={set("name")} />
         </label>
         <label>
-          Robot <input type="text" value={settings.robot} onChange={set("robot")} />
+          Robot{" "}
+          <select value={settings.robot} onChange={set("robot")}>
+            {robots.map(({ name, title }) => (
+              <option key={name} value={name}>
+                {title}
+              </option>
+            ))}
+          </select>
         </label>
         <label>
           Payload that it carried, kg{" "}

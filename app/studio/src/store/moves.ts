@@ -2,6 +2,7 @@
 import { parsePose, type Reading } from "./parsePose";
 import { poseOfSix } from "./request";
 import type { ApiRequest, Payload } from "./types";
+import { parseNumber } from "./units";
 
 export interface Move {
   from: string;
@@ -32,6 +33,9 @@ export function parseMoves(text: string, joints: number): MovesRead {
   const head = headed ? first.map((cell) => cell.toLowerCase()) : null;
   const rows = (headed ? lines.slice(1) : lines).map((cells) => rowOf(cells, head));
   if (!rows.length) return { why: "The table has a head, and no rows." };
+  const odd = rows.findIndex(({ odd }) => odd !== null);
+  if (odd >= 0)
+    return { why: `Row ${odd + 1}: “${rows[odd]!.odd}” is no mass in kg. Correct or delete it.` };
   const units = head ? unitsOf(head.join(" ")) : "";
   const count = rows[0]!.numbers.length;
   const wrong = rows.findIndex(({ numbers }) => numbers.length !== count);
@@ -52,16 +56,23 @@ interface Row {
   names: string[];
   mass: number | null;
   numbers: number[];
+  /** What stands where a mass should; null if nothing is wrong. */
+  odd: string | null;
 }
 
 function rowOf(cells: string[], head: string[] | null): Row {
   const massAt = head?.findIndex((name) => /\b(kg|mass|payload)\b/.test(name)) ?? -1;
   const idAt = head?.findIndex((name) => /^(no\.?|nr\.?|id|#)$/.test(name)) ?? -1;
   const rest = cells.filter((_, k) => k !== massAt && k !== idAt);
-  const mass = massAt >= 0 ? Number((cells[massAt] ?? "").replace("−", "-") || 0) : null;
+  const names = rest.filter((cell) => cell && !isNumber(cell));
+  const given = massAt >= 0 ? cells[massAt] || "0" : null;
+  const mass = given === null ? null : parseNumber(given);
+  // without a head, a third text stands where the mass would
+  const odd = given !== null && !(mass !== null && mass >= 0) ? given : head ? null : names[2];
   return {
-    names: rest.filter((cell) => cell && !isNumber(cell)),
-    mass: Number.isFinite(mass) ? mass : null,
+    names,
+    mass,
+    odd: odd ?? null,
     numbers: rest.filter(isNumber).map((cell) => Number(cell.replace("−", "-"))),
   };
 }

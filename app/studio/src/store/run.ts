@@ -23,6 +23,7 @@ import {
 } from "./state";
 import type { ApiRequest, Cycle, Solution } from "./types";
 
+const LONGEST_NAME = 200;
 const PATIENCE = 3; // times that a busy service is asked again
 let running: AbortController | null = null;
 
@@ -33,14 +34,17 @@ export async function optimise(asked: ApiRequest = request.value): Promise<void>
   const began = performance.now();
   const answer = await compute(endpointOf(asked), asked);
   if (!answer) return;
-  const { id } = answer as Solution;
-  const fresh = id !== null && !(await askedFor(id));
+  await named((answer as Solution).id);
   await showAnswer(answer, asked, (performance.now() - began) / 1000);
-  if (fresh)
-    void patch(`answers/${id}`, { name: project.value.name.slice(0, 200) || null }).catch(
-      () => undefined,
-    );
   if (tab.value === "task") tab.value = "answer";
+}
+
+/** Names a kept answer after the project, unless this browser has asked for it before. */
+export async function named(id: string | null, what?: string): Promise<void> {
+  if (id === null || (await askedFor(id))) return;
+  const after = what ? `, ${what}` : "";
+  const name = project.value.name.slice(0, LONGEST_NAME - after.length) + after;
+  void patch(`answers/${id}`, { name }).catch(() => undefined);
 }
 
 /** Shows an answer of `POST /optimize` or `POST /cycle` with its request. Throws Problem. */
