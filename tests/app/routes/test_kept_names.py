@@ -96,7 +96,7 @@ def test_a_search_has_pages(recorded: TestClient) -> None:
     name, ids = f"Shift {uuid4().hex[:6]}", [add_log(recorded) for _ in range(3)]
     for id in ids:
         recorded.patch(f"/logs/{id}", json={"name": name})
-    query = {"limit": 2, "search": name}
+    query: dict[str, Any] = {"limit": 2, "search": name}
     first = recorded.get("/logs", params=query).json()
     rest = recorded.get("/logs", params=query | {"after": first["next"]}).json()
     assert [each["id"] for each in first["logs"] + rest["logs"]] == ids[::-1]
