@@ -6,8 +6,8 @@ still page drawn again, or axe has a serious finding.
 
 Each visit has an empty cache, and the service and the browser are warm. The first picture is there
 when the arm has been drawn; the first answer, when the energy of the example is. Without a graphics
-card, WebGL is drawn by the processor (SwiftShader), and no frame rate is required. The time that the
-page's own code takes for a frame (arms, path, labels, charts; not the drawing itself) is required
+card, WebGL is drawn by the processor (SwiftShader), and no frame rate is required. The time of the
+page's own code for a frame (arms, path, labels, charts; not the drawing itself) is required
 everywhere: the rest of 1/60 s is left to the graphics card.
 """
 

@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from joulepath.models.registry import load_robot
 from tests.app.live import GRACE, ROOT, serving
@@ -31,7 +31,7 @@ POSTURES = "() => studio.state.postures?.every(({ state }) => state !== 'computi
 START = "-420;280;300;0;3.142;0"
 MOVES = [
     *(
-        f"bin;shelf {row}.{column};0.8;{START};{-410 + 60 * column};-440;{350 + 60 * row};1.571;0;0"
+        f"bin;shelf {row}.{column};0.8;{START};{-410 + 60 * column};-440;{360 + 50 * row};1.571;0;0"
         for row in range(3)
         for column in range(4)
     ),
@@ -85,7 +85,9 @@ def of_cells(page: Page) -> None:
     page.get_by_label("Name of the project").fill("Pick and place")
     ask(page, json.loads((ROOT / "examples" / "cycle" / "pick_and_place.json").read_text()))
     page.get_by_role("button", name="Leave out").wait_for()
+    expect(page.locator("#targets")).not_to_contain_text("checking")
     page.locator("#scrub").fill("2.4")
+    page.mouse.move(0, 0)
     picture(page, "studio_round")
     page.locator("#export").click()
     page.locator("#preview").wait_for()
