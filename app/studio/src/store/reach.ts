@@ -13,6 +13,8 @@ export type Reach =
   | { state: "refused"; text: string };
 
 const PAUSE = 300; // after the last edit [ms]
+const AGAIN = 3000; // after the service was busy or away [ms]
+const LATER = [undefined, 503, 504]; // statuses of answers that may come later
 const MOST = 24; // rows that are asked about
 
 export const reached = signal<Record<Pointer, Reach>>({});
@@ -74,18 +76,24 @@ async function askAll(asked: ApiRequest): Promise<void> {
     if (known.has(keys[k]!)) continue;
     const found = await ask(asked, pose);
     if (own !== round) return;
-    if (found) known.set(keys[k]!, found);
-    reached.value = { ...reached.value, [pointer]: found ?? { state: "asking" } };
+    if (found && found.state !== "asking") known.set(keys[k]!, found);
+    const { [pointer]: _, ...others } = reached.value;
+    reached.value = found ? { ...others, [pointer]: found } : others;
   }
+  if (Object.values(reached.value).some(({ state }) => state === "asking"))
+    waiting = setTimeout(() => void askAll(asked), AGAIN);
 }
 
+/** What is known of a pose: still being asked while the service is busy; null for a request in which a field is wrong. */
 async function ask(asked: ApiRequest, pose: Pose): Promise<Reach | null> {
   try {
     return { state: "reached", solutions: await solutionsOf(asked, pose) };
   } catch (error) {
+    if (!(error instanceof Problem)) return null;
+    const { status, errors } = error.details;
+    if (LATER.includes(status)) return { state: "asking" };
     // fields that are wrong elsewhere are told when the request is sent
-    const about = error instanceof Problem && error.details.status === 422 && !error.details.errors;
-    return about
+    return status === 422 && !errors
       ? {
           state: "refused",
           text: asShown(error.message).replace(/^The .*? pose is /, "The pose is "),
