@@ -46,7 +46,7 @@ class NoSequence(JoulepathError):
 class CycleTooShort(JoulepathError):
     """No cycle as fast as `time` asks for was found: the fastest one found takes `shortest`."""
 
-    title = "Dwell too short"
+    title = "Cycle too short"
     remedy = "Allow at least `shortest`."
 
     shortest: Seconds

@@ -1,6 +1,8 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { followReach, reached } from "../src/store/reach";
+import { deadlineOf } from "../src/store/request";
 import { edit } from "../src/store/state";
+import { leftOf } from "../src/task/RunBar";
 import { MOVE } from "./cells";
 
 const answers: [number, unknown][] = [];
@@ -33,4 +35,14 @@ it("a pose is asked about again after the service was busy, and not where a fiel
   expect(reached.value).toEqual({
     "/goal": { state: "refused", text: "The pose is 400 mm out of reach." },
   });
+});
+
+it("the time left is that of the search, and never beyond the deadline", () => {
+  expect(leftOf(2, 0.5, 10)).toBe(", about 2 s left");
+  expect(leftOf(2, 0.01, 60)).toBe(", at most 58 s left");
+  expect(leftOf(2, 0.1, 10)).toBe(", at most 8 s left");
+  expect(leftOf(70, 0.1, 60)).toBe(", at most 0 s left");
+  expect([leftOf(2, 0, null), leftOf(2, 1, null)]).toEqual(["", ""]);
+  expect([deadlineOf(MOVE), deadlineOf({ ...MOVE, deadline: 3 })]).toEqual([10, 3]);
+  expect(deadlineOf({ ...MOVE, stops: [{ target: { q: [] } }] })).toBe(60);
 });

@@ -13,7 +13,9 @@ from xml.etree import ElementTree
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.api.cycle.request import LONG_CYCLE, CycleRequest
 from joulepath.app.exceptions.transport import NotFound
+from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.exceptions import UnknownRobot
 from tests.app.live import ROOT
 from tests.app.routes.test_problems import refused
@@ -27,6 +29,14 @@ OURS = sorted(path for kind in ("ts*", "css") for path in (SOURCES / "src").rglo
 def test_the_root_leads_there_behind_any_path(client: TestClient) -> None:
     answer = client.get("/", follow_redirects=False)
     assert answer.status_code == 307 and answer.headers["location"] == "studio"
+
+
+def test_the_deadlines_that_the_page_tells_are_those_of_the_service() -> None:
+    text = (SOURCES / "src" / "store" / "request.ts").read_text("utf-8")
+    fields = (OptimizeRequest.model_fields, CycleRequest.model_fields)
+    move, cycle = (int(each["deadline"].default) for each in fields)
+    told = f"{{ optimize: {move}, cycle: {cycle}, long: {int(LONG_CYCLE.deadline)} }}"
+    assert told in text and f"const LONG = {LONG_CYCLE.stops};" in text
 
 
 def test_the_page_allows_its_own_files_only(client: TestClient) -> None:

@@ -23,12 +23,8 @@ async function ask(): Promise<void> {
   const asked = answered.value!.asked!;
   const range = typeof asked.duration === "number" ? null : (asked.duration ?? null);
   const deadline = Math.max(30, typeof asked.deadline === "number" ? asked.deadline : 10);
-  const answer = (await compute("pareto", {
-    ...asked,
-    duration: range,
-    candidates: "none",
-    deadline,
-  })) as { points: Point[] } | null;
+  const body = { ...asked, duration: range, candidates: "none", deadline };
+  const answer = (await compute("pareto", body, deadline)) as { points: Point[] } | null;
   if (answer) front.value = { points: answer.points, asked };
 }
 

@@ -41,8 +41,18 @@ export function kindOf(request: ApiRequest): Kind {
 export const robotName = (request: ApiRequest) =>
   typeof request.robot === "string" ? request.robot : DEFAULT_ROBOT;
 
-export const endpointOf = (request: ApiRequest) =>
+export const endpointOf = (request: ApiRequest): "cycle" | "optimize" =>
   kindOf(request) === "round" ? "cycle" : "optimize";
+
+/** Deadlines of the API where a request has none [s]; a test holds them to its schema. */
+const DEADLINES = { optimize: 10, cycle: 60, long: 120 };
+const LONG = 100; // stops of a round, above which its deadline is the long one
+
+/** How long the service computes at most [s]. */
+export function deadlineOf(asked: ApiRequest): number {
+  if (typeof asked.deadline === "number") return asked.deadline;
+  return DEADLINES[listOf(asked.stops).length > LONG ? "long" : endpointOf(asked)];
+}
 
 export const stopName = (stop: unknown, index: number): string =>
   isObject(stop) && typeof stop.name === "string" ? stop.name : `${index + 1}`;

@@ -6,7 +6,7 @@ import { cycleAnswered } from "./cycle";
 import { askedFor } from "./persist";
 import { robotOf } from "./service";
 import { dressedLater } from "./tools";
-import { endpointOf } from "./request";
+import { deadlineOf, endpointOf } from "./request";
 import {
   answered,
   ghosts,
@@ -32,7 +32,7 @@ export const cancel = () => running?.abort();
 /** Sends the request, shows its progress, then its answer. Throws Problem. */
 export async function optimise(asked: ApiRequest = request.value): Promise<void> {
   const began = performance.now();
-  const answer = await compute(endpointOf(asked), asked);
+  const answer = await compute(endpointOf(asked), asked, deadlineOf(asked));
   if (!answer) return;
   await named((answer as Solution).id);
   await showAnswer(answer, asked, (performance.now() - began) / 1000);
@@ -79,12 +79,17 @@ async function moveAnswered(
 }
 
 /** The answer to a POST with progress; null if it was cancelled. Throws Problem. */
-export async function compute(endpoint: string, body: unknown): Promise<unknown> {
+export async function compute(
+  endpoint: string,
+  body: unknown,
+  deadline: number | null = null,
+): Promise<unknown> {
   running?.abort();
   const own = (running = new AbortController());
   batch(() => {
     trouble.value = null;
-    run.value = { endpoint, began: performance.now(), done: 0, total: 0, incumbents: [] };
+    const began = performance.now();
+    run.value = { endpoint, began, deadline, done: 0, total: 0, incumbents: [] };
   });
   try {
     return await patiently(() => streamed(endpoint, body, own.signal));

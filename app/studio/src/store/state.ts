@@ -39,6 +39,8 @@ export interface Racer {
 export interface Run {
   endpoint: string;
   began: number;
+  /** Time after which it ends in any case [s]; null: unknown. */
+  deadline: number | null;
   done: number;
   total: number;
   incumbents: {

@@ -17,6 +17,7 @@ const FIELDS: Record<string, Pointer> = {
   "torque-infeasible": "/payload/mass",
   "payload-too-heavy": "/payload/mass",
   "duration-too-short": "/duration",
+  "cycle-too-short": "/time",
 };
 
 const slugOf = (details: ProblemDetails) => details.type?.split("/").at(-1) ?? "";

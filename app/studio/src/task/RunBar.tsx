@@ -99,6 +99,16 @@ function Wrong() {
   );
 }
 
+const EARLY = 0.05; // share of the search before which its speed tells nothing
+
+/** How long it still takes, in words: from the share that is done, at most until the deadline. */
+export function leftOf(passed: number, share: number, deadline: number | null): string {
+  const most = deadline === null ? Infinity : Math.max(0, deadline - passed);
+  const left = share > EARLY && share < 1 ? (passed * (1 - share)) / share : Infinity;
+  if (left < most) return `, about ${figure(left, 1)} s left`;
+  return most < Infinity ? `, at most ${Math.ceil(most)} s left` : "";
+}
+
 function Progress() {
   const [, again] = useState(0);
   useEffect(() => {
@@ -110,7 +120,7 @@ function Progress() {
   const passed = (performance.now() - now.began) / 1000;
   const best = now.incumbents.at(-1);
   const share = now.total ? Math.min(1, now.done / now.total) : null;
-  const left = share && share > 0.05 && share < 1 ? (passed * (1 - share)) / share : null;
+  const left = leftOf(passed, share ?? 0, now.deadline);
   return (
     <div class="progress" id="progress">
       <progress max={1} value={share ?? undefined} aria-label="Progress" />
@@ -119,7 +129,7 @@ function Progress() {
           ? `Best so far ${figure(best.energy)} J, ${best.bound > 0 ? `at least ${figure(best.bound)} J: at most ${atMost(best.energy / best.bound - 1)} above the least possible` : "no bound yet"}`
           : "Searching for a first motion"}
         {` · ${passed.toFixed(1)} s`}
-        {left !== null && `, about ${figure(left, 1)} s left`}
+        {left}
       </p>
       <Button id="cancel" onClick={cancel}>
         Cancel
