@@ -46,7 +46,7 @@ def add_job(service: Server) -> str:
 
 
 def add_study(service: Server) -> str:
-    return str(service.post("/studies", {"name": "press", "threshold": 60.0}).json()["id"])
+    return str(service.post("/studies", {"name": "A study", "threshold": 60.0}).json()["id"])
 
 
 KEPT: dict[str, tuple[Callable[[Server], str], str, str, str]] = {
