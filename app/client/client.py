@@ -176,6 +176,11 @@ class Client:
         """All parameters of a robot: `GET /robots/{name}`."""
         return self.get(f"/robots/{name}")
 
+    def mjcf(self, name: str) -> str:
+        """The MJCF of a robot, for MuJoCo: `GET /robots/{name}/mjcf`."""
+        text: str = self._send("GET", f"/robots/{name}/mjcf").text
+        return text
+
     def robot_names(self) -> tuple[str, ...]:
         """Names of all robots: `GET /robots`."""
         return tuple(each["name"] for each in self.get("/robots")["robots"])

@@ -19,10 +19,6 @@ Json = dict[str, Any]
 class ServiceUnreachable(ServiceError, JoulepathError):
     """No service answers at this address, or the connection broke."""
 
-    title = "Service unreachable"
-    remedy = "Check the address, and that the service runs: `joulepath serve` starts one."
-    status = 503
-
     url: str
     """Address of the service."""
     reason: str

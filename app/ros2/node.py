@@ -22,6 +22,7 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from joulepath.app.client.client import Client
+from joulepath.app.client.errors import ServiceUnreachable
 from joulepath.app.engine.result import json_document
 from joulepath.app.http.problems import problem_of
 from joulepath.app.ros2.messages import JointNames, Json, pose_target, refusal, summary_of
@@ -31,6 +32,8 @@ from joulepath.optimizer.deadline import Stopped
 from joulepath.optimizer.exceptions import DeclaredError
 from joulepath.optimizer.optimize import warm_up
 
+UNREACHABLE = "service-unreachable"
+"""Type of the problem that no service answers."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Late subscribers get the last message, too: that of `robot_description` likewise."""
 
@@ -236,6 +239,9 @@ def _trajectory(fields: Json) -> JointTrajectory:
 
 
 def _refused(error: Exception) -> Json:
+    if isinstance(error, ServiceUnreachable):
+        # no answer of a service, and so none of its types of problems
+        return {"state": "refused", "problem": {"type": UNREACHABLE, "detail": str(error)}}
     document = getattr(error, "document", None) or problem_of(error, "")
     return {"state": "refused", "problem": document}
 

@@ -14,8 +14,8 @@ def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
     The energy of a motion or cycle is the one of its objective, electrical for `evaluate`; that of
     a placement is the one of the best place.
     """
-    if "best" in answer:
-        best = answer["best"]
+    best = answer.get("best")
+    if isinstance(best, Mapping):
         return AnswerFigures(answer["robot"], best["energy"], best["duration"], answer["status"])
     given = answer.get("total", answer)
     energy, objective = given.get("energy"), answer.get("objective", "electrical")

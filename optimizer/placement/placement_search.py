@@ -147,8 +147,10 @@ class PlacementSearch:
         found = self.rounds.solved(place, end, known, compared)
         self.evaluated += 1
         if found.is_decided:
-            self._times.append(self.clock() - began)
             self._memo[key] = found.summary
+        # a place out of reach takes no time, and says nothing of others
+        if found.energy is not None:
+            self._times.append(self.clock() - began)
         if found.energy is not None and found.energy < self._least:
             self.best, self._known = found, known
             self.tell(Improved(found.energy, self.duration(found), self.lower_bound))

@@ -46,6 +46,7 @@ def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
     assert service.tool_names() == joulepath.tool_names()
     robot = joulepath.load_robot("ur10e")
     assert service.load_robot("ur10e")["joints"] == list(robot.joint_names)
+    assert service.mjcf("ur10e") == joulepath.mjcf(robot)
     tool = service.load_tool(joulepath.tool_names()[0])
     assert tool["name"] == joulepath.tool_names()[0]
 

@@ -121,9 +121,10 @@ def test_the_page_for_newcomers_shows_what_its_script_prints(server: Server) -> 
     assert json.loads(request) == json.loads(
         (ROOT / "examples" / "optimize" / "pick_to_place.json").read_text()
     )
-    (command,) = re.findall(r"```bash\npython3 (\S+) (\S+) \S+\n```", page)
+    assert "python3 first_saving.py pick_to_place.json http://127.0.0.1:8000\n```" in page
+    command = ["python3", "examples/first_saving.py", "examples/optimize/pick_to_place.json"]
     run = subprocess.run(
-        ["python3", *command, server.url], cwd=ROOT, capture_output=True, text=True, check=True
+        [*command, server.url], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert f"```text\n{run.stdout}```" in page
 

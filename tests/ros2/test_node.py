@@ -18,6 +18,7 @@ from geometry_msgs.msg import PoseStamped
 import joulepath
 from benchmarks.tasks import as_pose, flange
 from joulepath.app.exceptions.base import InvalidRequest
+from joulepath.app.ros2.node import UNREACHABLE
 from joulepath.app.ros2.planner import LocalPlanner, Plan
 from joulepath.models.robot import Array
 from joulepath.models.urdf import urdf_of
@@ -208,7 +209,7 @@ def test_a_dead_service_is_told_and_the_node_goes_on() -> None:
         own.stand(JOINTS, START)
         for _ in range(2):
             problem = own.go_to(JOINTS, GOAL)["problem"]
-            assert problem["type"] == "/problems/service-unreachable"
+            assert problem["type"] == UNREACHABLE
 
 
 def test_the_arm_in_robot_description_is_planned_for() -> None:
