@@ -19,8 +19,11 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},
     "/figures": {JSON: FIGURES_EXAMPLES},
-    "/answers/{id}": {
-        JSON: {"name": {"summary": "Give it a name", "value": {"name": "Night cell"}}},
+    **{
+        f"/{kept}/{{id}}": {
+            JSON: {"name": {"summary": "Give it a name", "value": {"name": "Night cell"}}},
+        }
+        for kept in ("answers", "jobs", "studies", "logs", "identifications")
     },
     "/studies/{id}/iterations": {JSON: ITERATION_EXAMPLES},
 }

@@ -96,7 +96,7 @@ def test_time_that_is_over_on_the_way() -> None:
     """Nothing is lost: every candidate can still be solved, or counts as not reached."""
     own = run()
     instants = iter(np.arange(0.0, 1e3, 0.05).tolist())
-    own.state.end = Deadline.after(1.0, lambda: next(instants))
+    own.state.end = Deadline.after(4.0, lambda: next(instants))
     assert not explore_least_work(own.state, lambda: None)
     assert own.state.cut_short
     statuses = {each.status for each in own.state.candidates if each.holdable}
