@@ -149,21 +149,26 @@ def log(client: TestClient) -> str:
     return str(answer.json()["id"])
 
 
+@pytest.fixture
+def made(client: TestClient, study: str, kept: str, log: str, job: str) -> dict[str, str]:
+    """Ids of what the service keeps, by the list that has it."""
+    answer = client.post("/identifications", json={"logs": [log]})
+    assert answer.status_code == 202, answer.text
+    identification = str(answer.json()["id"])
+    ids = {"studies": study, "answers": kept, "logs": log, "jobs": job}
+    return ids | {"identifications": identification}
+
+
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES]
 )
 def test_body_is_answered(
-    name: str, client: TestClient, study: str, kept: str, robot: str, log: str
+    name: str, client: TestClient, made: dict[str, str], robot: str, log: str
 ) -> None:
     operation, media_type, example = BODIES[name]
-    content, url = (
-        example["value"],
-        operation.path.format(
-            id=kept if operation.path.startswith("/answers") else study,
-            name=robot,
-            format=name.split()[-1],
-        ),
-    )
+    id = made.get(operation.path.split("/")[1], "")
+    url = operation.path.format(id=id, name=robot, format=name.split()[-1])
+    content = example["value"]
     if media_type == "text/csv":
         # the settings of a CSV file are query parameters, which the example's summary names
         query = re.search(r"\?\S+", example["summary"])
