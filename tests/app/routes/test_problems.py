@@ -173,7 +173,7 @@ def test_not_found(client: TestClient, path: str) -> None:
         ("POST", "/healthz", "GET"),
         ("FANCY", "/ik", "POST"),
         ("PUT", "/studies", "GET, POST"),
-        ("POST", "/studies/none", "GET, DELETE"),
+        ("POST", "/studies/none", "GET, PATCH, DELETE"),
     ],
 )
 def test_method_not_allowed(client: TestClient, method: str, path: str, allow: str) -> None:
