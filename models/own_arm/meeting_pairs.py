@@ -25,18 +25,30 @@ class OverlapSettings:
 
     samples: int = 300
     """Random configurations."""
-    share: float = 0.6
+    share: float = 0.95
     """Least share of overlapping configurations of an excluded pair."""
-    thick_share: float = 0.3
-    """The same for a pair with a guessed capsule, or of links with one between them: a maker would
-    not build joint ranges in which these collide so often, so that the capsules are too thick
-    beside the joint. In the bundled arms, such pairs that can meet do so in at most 20 %; capsules
-    of pairs that never meet overlap in 26 to 100 %."""
+    guessed_share: float = 0.3
+    """The same for a pair with a guessed capsule: a maker would not build joint ranges in which
+    links collide this often, so that the guess is too thick."""
+    doubtful_share: float = 0.3
+    """Least share of overlapping configurations of a pair that is compared, and named: its capsules
+    are likely too thick beside a joint. In the bundled arms, pairs that can meet do so in at most
+    20 %."""
     rounding: float = 1e-9
     """Margin of the bounding balls [m] for rounding."""
 
 
 OVERLAP = OverlapSettings()
+
+
+@dataclass(frozen=True)
+class MeetingPairs:
+    """Pairs of links, as their numbers, by how often their capsules overlap."""
+
+    excluded: list[list[int]]
+    """In nearly every configuration: they are not compared."""
+    doubtful: list[list[int]]
+    """Often: they are compared, and may leave hardly a motion free."""
 
 
 def pairs_that_meet(
@@ -45,8 +57,8 @@ def pairs_that_meet(
     capsules: list[Rows],
     guessed: list[bool],
     checkpoint: Checkpoint,
-) -> list[list[int]]:
-    """Pairs of non-adjacent links whose capsules overlap in most random configurations.
+) -> MeetingPairs:
+    """Pairs of non-adjacent links whose capsules overlap in many random configurations.
 
     Args:
         chain: the joints and their ranges.
@@ -86,15 +98,13 @@ def pairs_that_meet(
                 )
                 for i, j in _close(T_a, around_a, T_b, around_b)
             )
-    share = [
-        OVERLAP.thick_share if guessed[a] or guessed[b] or b == a + 2 else OVERLAP.share
-        for a, b in pairs
-    ]
-    return [
-        list(pair)
-        for pair, count, least in zip(pairs, meets, share, strict=True)
-        if count >= least * OVERLAP.samples
-    ]
+    found = MeetingPairs([], [])
+    for (a, b), share in zip(pairs, meets / OVERLAP.samples, strict=True):
+        if share >= (OVERLAP.guessed_share if guessed[a] or guessed[b] else OVERLAP.share):
+            found.excluded.append([a, b])
+        elif share >= OVERLAP.doubtful_share:
+            found.doubtful.append([a, b])
+    return found
 
 
 def _balls(rows: Rows) -> Array:
