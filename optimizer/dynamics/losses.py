@@ -30,12 +30,8 @@ from joulepath.optimizer.result.energy import (
     StorageUse,
 )
 
-ENERGY_FLOOR = 1e-3
-"""Smallest magnitude of an energy as the reference of a relative error [J].
-
-The mechanical work of a motion of 1e-7 rad is some 1e-5 J, and known to 1 %: friction changes sign
-within such a motion.
-"""
+ENERGY_FLOOR = 1e-6
+"""Smallest magnitude of an energy as the reference of a relative error [J]."""
 
 
 @dataclass(frozen=True)

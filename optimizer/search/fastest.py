@@ -261,7 +261,7 @@ def find_fastest(state: SearchState, known: Sequence[Spline] = (), improve: bool
     energy = state.confirmed_energy(candidate, spline)
     if energy is not None:
         result = SolveResult(SolveStatus.SOLVED, SolveReason.FASTEST_MOTION_RETIMED, spline=spline)
-        state.accept_if_better(candidate, result, energy)
+        state.accept_if_better(candidate, result, energy, certified=True)
     state.cut_short |= state.deadline.passed
     if improve:
         solve_from(state, candidate, sampled(spline), fine=True)
