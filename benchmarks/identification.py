@@ -272,7 +272,7 @@ def _payloads() -> list[Gate]:
     title = f"stand-in of a UR10e, {UNITS} units, payload of two days"
     return [
         Gate(f"{title}: error, greatest [%]", max(off), 0.0, 1.5),
-        Gate(f"{title}: standard deviation, median [kg]", float(np.median(sd)), 0.0, 0.03),
+        Gate(f"{title}: standard deviation, median [kg]", float(np.median(sd)), 0.0, 0.02),
     ]
 
 
