@@ -234,18 +234,15 @@ def _with_power(
     by_torques = moved[: len(others)] if torque_known else 0.0
     without, by_rows = fit.without_cluster + by_torques, fit.row_replicates + by_torques
     matrix, constant, names = _figures_of_power(robot, prior, friction_known, torque_known)
-    estimate = Estimate(
-        names,
-        matrix @ fit.value + constant,
-        by_rows @ matrix.T + constant,
-        (),
-        matrix @ (fit.prior_covariance + shifts.T @ shifts) @ matrix.T,
-    )
-    before = matrix @ np.linalg.inv(prior.precision) @ matrix.T
-    unknown = np.diag(estimate.covariance) > FIT.max_sd_ratio**2 * np.diag(before)
-    estimate = with_reasons(
-        replace(estimate, reasons=tuple(HARDLY_KNOWN if each else "" for each in unknown.tolist())),
-        range(len(names)),
+    estimate = _with_hardly_known(
+        Estimate(
+            names,
+            matrix @ fit.value + constant,
+            by_rows @ matrix.T + constant,
+            (),
+            matrix @ (fit.prior_covariance + shifts.T @ shifts) @ matrix.T,
+        ),
+        matrix @ np.linalg.inv(prior.precision) @ matrix.T,
     )
     relative = _covariance_scale(robot.nq, fit.value)
     return replace(
@@ -264,6 +261,15 @@ def _with_power(
         prior_covariance=np.outer(relative, relative) * fit.prior_covariance,
         covariance_increase=np.outer(relative, relative) * fit.covariance_increase,
     )
+
+
+def _with_hardly_known(estimate: Estimate, before: Array) -> Estimate:
+    """The estimate with a reason for each figure that it knows hardly better than the covariance
+    `before` (p, p) of the prior.
+    """
+    unknown = np.diag(estimate.covariance) > FIT.max_sd_ratio**2 * np.diag(before)
+    reasons = tuple(HARDLY_KNOWN if each else "" for each in unknown.tolist())
+    return with_reasons(replace(estimate, reasons=reasons), range(len(reasons)))
 
 
 def _parameter_changes(

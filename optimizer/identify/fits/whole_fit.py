@@ -169,13 +169,10 @@ def _determined(
         gradient = np.where(inside, 0.0, gram @ value - moment)
         solution = unbounded(grouped, value, inside, free & ~inside, gradient, precision)
         rejected = dict(zip(block.names, rejections(solution, mean)[bodies:], strict=True))
+        found = doubts_of(block, value[bodies:], solution.sd[bodies:])
         doubts = {
             name: doubt
-            for name, doubt in zip(
-                block.names,
-                doubts_of(block, value[bodies:], solution.sd[bodies:]),
-                strict=True,
-            )
+            for name, doubt in zip(block.names, found, strict=True)
             if doubt.reason and name not in held
         }
         open_terms = [name for name in doubts if not rejected[name]]
@@ -188,15 +185,12 @@ def _determined(
             )
             held[worst] = doubts[worst].reason
     moved = inverse @ gram[:, ~free] * own_deviations(block, block.names)[~free[bodies:]]
-    return _Solution(
-        value,
-        solution.replicates,
-        inverse @ precision @ inverse + moved @ moved.T,
-        {
-            name: REJECTED.format(doubt.reason, block.own[name], rejected[name])
-            for name, doubt in doubts.items()
-        },
-    )
+    by_prior = inverse @ precision @ inverse + moved @ moved.T
+    remarks = {
+        name: REJECTED.format(doubt.reason, block.own[name], rejected[name])
+        for name, doubt in doubts.items()
+    }
+    return _Solution(value, solution.replicates, by_prior, remarks)
 
 
 def _prior(robot: Robot, block: JointBlock, options: IdentificationOptions) -> tuple[Array, Array]:

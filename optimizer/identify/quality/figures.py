@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
 import numpy as np
@@ -63,17 +63,7 @@ def figures_of(
     values = {name: value for name, value in values.items() if name not in same}
     if options.knee is not None and "coulomb" in values:
         values["knee"], identified["knee"] = np.array(fitted.arm.knee), np.array(True)
-    kept = {
-        (each.figure, each.joint)
-        for each in parameters
-        if not each.identified and each.value == each.previous
-    }
-    # figures that the logs determine only together with others are part of the covariance, too
-    rows = {
-        name: row
-        for name, row in _covariance_rows(robot, fitted)
-        if (name[0] in values or name[0] in LINK_NAMES) and name not in kept
-    }
+    rows = _told_rows(robot, fitted, parameters, values)
     matrix = np.array([*rows.values()]).reshape(-1, len(fitted.estimate.names))
     covariance = matrix @ fitted.estimate.covariance @ matrix.T
     known = np.flatnonzero(np.diag(covariance) > 0)
@@ -88,6 +78,27 @@ def figures_of(
         move_sd=spread.move_sd,
         logs=logs,
     )
+
+
+def _told_rows(
+    robot: Robot,
+    fitted: FitResult,
+    parameters: Sequence[IdentifiedParameter],
+    values: Mapping[str, Array],
+) -> dict[Name, Array]:
+    """Rows from the covariance of the fit to that of its figures, without those that stay the
+    robot's own. Figures that the logs determine only together with others are among them, too.
+    """
+    kept = {
+        (each.figure, each.joint)
+        for each in parameters
+        if not each.identified and each.value == each.previous
+    }
+    return {
+        name: row
+        for name, row in _covariance_rows(robot, fitted)
+        if (name[0] in values or name[0] in LINK_NAMES) and name not in kept
+    }
 
 
 def _own(robot: Robot) -> dict[str, Array]:
