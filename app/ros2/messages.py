@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -49,13 +50,14 @@ class JointNames:
                 f"The message has {len(names)} names and {len(values)} positions: give each joint "
                 "in `name` one value in `position`.",
             )
-        missing = [name for name in self.in_ros if name not in names]
-        if missing:
-            raise refusal((topic, "name"), self._missing(missing[0], names))
-        twice = next((name for name in self.in_ros if list(names).count(name) > 1), None)
-        if twice is not None:
-            raise refusal((topic, "name"), f"The joint {twice} occurs twice: name it once.")
-        found = [float(values[list(names).index(name)]) for name in self.in_ros]
+        count = Counter(names)
+        for name in self.in_ros:
+            if not count[name]:
+                raise refusal((topic, "name"), self._missing(name, names))
+            if count[name] > 1:
+                raise refusal((topic, "name"), f"The joint {name} occurs twice: name it once.")
+        at = dict(zip(names, map(float, values), strict=True))
+        found = [at[name] for name in self.in_ros]
         for name, value in zip(self.in_ros, found, strict=True):
             if not math.isfinite(value):
                 raise refusal(

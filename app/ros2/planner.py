@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from queue import SimpleQueue
-from typing import Any, Protocol
+from typing import Protocol
 
 import orjson
 from pydantic import ValidationError
@@ -162,8 +162,8 @@ class RemotePlanner:
     def _answer(self, body: Json, done: SimpleQueue[Plan | Exception]) -> None:
         try:
             answer = self._client.optimize(body)
-            options: dict[str, Any] = {"message": "trajectory", "encoding": "json"}
-            file = self._client.export("ros2", answer, prefix=self._prefix, **options)
+            options = {"message": "trajectory", "encoding": "json", "prefix": self._prefix}
+            file = self._client.export("ros2", answer, ros2=options)
             done.put(Plan(answer, orjson.loads(file)["msg"]))
         except Exception as error:
             done.put(error)

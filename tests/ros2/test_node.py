@@ -16,6 +16,7 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 
 import joulepath
+from benchmarks.service import running
 from benchmarks.tasks import as_pose, flange
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.ros2.node import UNREACHABLE
@@ -210,6 +211,26 @@ def test_a_dead_service_is_told_and_the_node_goes_on() -> None:
         for _ in range(2):
             problem = own.go_to(JOINTS, GOAL)["problem"]
             assert problem["type"] == UNREACHABLE
+
+
+def test_a_service_computes_the_same_plan_as_the_node(ur5e: System) -> None:
+    ur5e.stand(left(JOINTS), START)
+    ours = ur5e.go_to(left(JOINTS), GOAL)
+    ur5e.until(lambda: ur5e.trajectories)
+    with (
+        running(JOULEPATH_WORKERS="1") as service,
+        system(
+            robot="ur5e", prefix="left_", url=f"http://127.0.0.1:{service.port}", deadline=60.0
+        ) as own,
+    ):
+        own.stand(left(JOINTS), START)
+        theirs = own.go_to(left(JOINTS), GOAL)
+        assert theirs["state"] == "planned", str(theirs)
+        assert theirs["energy"] == pytest.approx(ours["energy"], rel=SAME_ENERGY)
+        own.until(lambda: own.trajectories)
+        assert own.trajectories[-1] == ur5e.trajectories[-1]
+        far = own.go_to(left(JOINTS), [9.0, *GOAL[1:]])
+        assert far["problem"]["type"] == "/problems/outside-limits"
 
 
 def test_the_arm_in_robot_description_is_planned_for() -> None:
