@@ -13,6 +13,8 @@ from joulepath.app.exceptions.base import FieldError, InvalidRequest
 Json = dict[str, Any]
 BASE_FRAMES = ("base", "base_link")
 """Frames of poses in requests."""
+MOST_NAMES = 20
+"""Largest number of joints of a message that an error names."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +76,9 @@ class JointNames:
             if prefixes
             else "name all joints of the robot, or choose another `robot`"
         )
-        return (
-            f"The joint {joint} is missing; the message has {', '.join(names) or 'none'}: {remedy}."
-        )
+        known = ", ".join(names[:MOST_NAMES]) or "none"
+        more = ", …" if len(names) > MOST_NAMES else ""
+        return f"The joint {joint} is missing; the message has {known}{more}: {remedy}."
 
 
 def pose_target(
