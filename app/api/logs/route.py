@@ -117,7 +117,7 @@ async def add(
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> LogList:
-    """All logs, newest first, page by page, or those that are searched for."""
+    """All logs, or the logs found by `search`, newest first and page by page."""
     read = partial(logs.page, limit=page.limit, after=page.after, search=page.search)
     found, following = await store.read(read)
     shown = [_detail(log).model_dump(include=set(LogSummary.model_fields)) for log in found]
@@ -131,8 +131,7 @@ async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> L
     responses=problem_responses(UnknownLog, StoreUnavailable),
 )
 async def show(id: LogId, store: ServiceStore) -> LogDetail:
-    """What is known of a log: its channels, moves, efforts, and what is odd in it. Not its
-    samples."""
+    """A log without its samples: channels, moves, efforts, and warnings."""
     return _detail(await store.read(partial(logs.about, log_id=id)))
 
 
@@ -155,7 +154,7 @@ async def rename(id: LogId, body: NewName, store: ServiceStore, client: ServiceC
     responses=problem_responses(UnknownLog, NotOwner, StoreUnavailable),
 )
 async def delete(id: LogId, store: ServiceStore, client: ServiceClient) -> None:
-    """Deletes a log. What was identified from it stays."""
+    """Deletes a log. Identifications from it stay."""
     await store.write(partial(logs.delete, log_id=id, client=client), frees=True)
 
 

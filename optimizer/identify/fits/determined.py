@@ -1,7 +1,7 @@
-"""Terms that logs determine, and terms that keep the robot's own value.
+"""Decides whether a term takes its estimate or keeps the robot's own value.
 
-A term keeps the robot's own value if the logs do not determine it, and only as long as they do not
-contradict that value: a poor estimate is better than a value that the logs reject.
+An undetermined term keeps the robot's own value unless the logs contradict this value: a poor
+estimate is better than a rejected value.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from joulepath.optimizer.identify.estimates.grouped import (
 
 @dataclass(frozen=True)
 class DeterminedSettings:
-    """When a term counts as determined."""
+    """Limits for a determined term."""
 
     max_relative_sd: float = 0.3
-    """Standard deviation of a figure over its value, above which the figure is not identified."""
+    """Largest standard deviation of an identified figure over its value [1]."""
     rejecting_sds: float = 4.0
-    """Standard deviations from an estimate, from which on the logs reject the robot's own value."""
+    """Distance of a rejected own value from the estimate, in standard deviations [1]."""
 
 
 DETERMINED = DeterminedSettings()
@@ -50,7 +50,7 @@ def reason_of(value: float, sd: float) -> str:
 
 
 def with_reasons(found: Estimate, judged: Iterable[int]) -> Estimate:
-    """The estimate with a reason for each of the `judged` figures that is not identified."""
+    """The estimate with reasons for the unidentified ones among the `judged` figures."""
     deviations, reasons = np.sqrt(np.diag(found.covariance)), [*found.reasons]
     for k in judged:
         reasons[k] = reasons[k] or reason_of(float(found.value[k]), float(deviations[k]))
@@ -59,10 +59,10 @@ def with_reasons(found: Estimate, judged: Iterable[int]) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Unbounded:
-    """Solution with p unknowns in which the bounds of single unknowns are lifted."""
+    """Solution with p unknowns, each without its own bound."""
 
     value: Array
-    """Values (p,) with the bound of the unknown lifted, those of all others as they are."""
+    """Values (p,): the own bound of an unknown is lifted, and all other bounds hold."""
     replicates: Array
     """Values (G, p) without one group each, around the bounded values."""
 
@@ -80,13 +80,13 @@ def unbounded(
     gradient: Array,
     prior: Array | None = None,
 ) -> Unbounded:
-    """Lift the bounds of the unknowns that are at them, one at a time.
+    """Solve again for each unknown at its bound, with this bound lifted.
 
     Args:
         grouped: normal equations of the G groups.
         value: bounded solution (p,).
-        inside: unknowns (p,) that are estimated and not at a bound.
-        bounded: unknowns (p,) at their bound; all others are known.
+        inside: estimated unknowns (p,) away from their bounds.
+        bounded: estimated unknowns (p,) at their bounds; the remaining unknowns are known.
         gradient: gradient (p,) of the sum of squares at the solution.
         prior: precision (p, p) of a prior.
     """

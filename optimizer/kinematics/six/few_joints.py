@@ -1,9 +1,8 @@
-"""Inverse kinematics of an arm with fewer than six joints, for the poses that it can hold.
+"""Inverse kinematics of an arm with fewer than six joints.
 
-Such an arm reaches few of the poses at a position: those whose orientation its joints happen to
-allow, as a palletiser that turns its tool about the vertical. Newton's method from many starts
-finds them, as in `multi_start`, whose limit of sixteen branches holds as well: an arm with fewer
-joints is one of six whose others are fixed.
+At a position, the joints of such an arm allow few orientations: a palletiser turns its tool about
+the vertical alone. Newton's method from many starts finds the configurations, as in `multi_start`.
+The limit of sixteen branches holds, too: the arm is a six-joint arm with fixed joints.
 """
 
 from __future__ import annotations
@@ -24,8 +23,7 @@ POSITIONING_JOINTS = 3
 class FewJoints(MultiStart):
     """`PoseSolver` of an arm with one to five joints; a pose may be off by `REACH.beyond`.
 
-    Without this tolerance, a pose that is rounded in the last digit would have an orientation that
-    the arm does not have.
+    Without this tolerance, the arm could not hold the orientation of a rounded pose.
     """
 
     @classmethod
