@@ -264,9 +264,8 @@ def _with_power(
 
 
 def _with_hardly_known(estimate: Estimate, before: Array) -> Estimate:
-    """The estimate with a reason for each figure that it knows hardly better than the covariance
-    `before` (p, p) of the prior.
-    """
+    """The estimate with reasons for figures hardly better known than by the prior's covariance
+    `before` (p, p)."""
     unknown = np.diag(estimate.covariance) > FIT.max_sd_ratio**2 * np.diag(before)
     reasons = tuple(HARDLY_KNOWN if each else "" for each in unknown.tolist())
     return with_reasons(replace(estimate, reasons=reasons), range(len(reasons)))
