@@ -15,7 +15,6 @@ from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.declared import Internal, Joules, NotEmpty, Ratio, Seconds, Watts
 from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.presentation.chart import Chart, joint_curves
-from joulepath.optimizer.presentation.files import Saved
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.result.cycle import (
     CycleCertificate,
@@ -137,7 +136,7 @@ class SolvedCycle:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CycleSolution(Saved, Result):
+class CycleSolution(Result):
     """The cycle of least energy.
 
     `lower_bound` [J] bounds the objective of every cycle over these stops, of any configurations

@@ -11,7 +11,6 @@ from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
 from joulepath.optimizer.evaluate.limit_report import LimitReport
 from joulepath.optimizer.evaluate.nearest_contact import LeastClearance
 from joulepath.optimizer.presentation.chart import Chart
-from joulepath.optimizer.presentation.files import Saved
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.result.certificate import Clearance
 from joulepath.optimizer.result.energy import ENERGY_PARTS, energy_rows, energy_text
@@ -48,7 +47,7 @@ class EvaluatedMotion:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Evaluation(Saved, Result):
+class Evaluation(Result):
     """Energy of a given motion, and its use of the limits.
 
     Attributes:

@@ -1,7 +1,8 @@
 """Results in files: JSON with every field, internal ones included.
 
 A dataclass is an object with its name as `class`, a NamedTuple a list, a robot its name and its
-figures. A file is read by the types of the fields: it names no code.
+figures, a number that is not finite the text `inf`, `-inf` or `nan`. A file is read by the types of
+the fields: it names no code.
 """
 
 from __future__ import annotations
@@ -77,8 +78,8 @@ def written(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, float):
-        # a number that is not finite is an infinite limit or bound
-        return float(value) if value != math.inf else None
+        # JSON has no numbers that are not finite, such as an infinite limit
+        return float(value) if math.isfinite(value) else str(float(value))
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -117,7 +118,7 @@ def read(hint: Any, data: Any) -> Any:
     if is_dataclass(hint):
         return _dataclass(hint, dict(data))
     if hint is float:
-        return math.inf if data is None else float(data)
+        return float(data)
     if not isinstance(data, hint):
         raise ValueError(f"{data!r} is no {hint.__name__}")
     return data
@@ -144,7 +145,7 @@ def _option(options: tuple[Any, ...], data: Any) -> Any:
         get_args(each)[0] if get_origin(each) is Annotated else each for each in options
     ]
     if data is None:
-        return type(None) if type(None) in bare else float
+        return type(None)
     if isinstance(data, dict) and CLASS in data:
         for option in bare:
             if isinstance(option, type) and any(
@@ -161,15 +162,7 @@ def _option(options: tuple[Any, ...], data: Any) -> Any:
 
 def _array(hint: Any, data: Any) -> Any:
     (kind,) = get_args(get_args(hint)[1])
-    if kind is np.float64:
-        return np.array(_without_none(data), dtype=float)
     return np.array(data, dtype=kind)
-
-
-def _without_none(data: Any) -> Any:
-    if isinstance(data, list):
-        return [_without_none(each) for each in data]
-    return math.inf if data is None else data
 
 
 def _robot(name: str, figures: dict[str, Any]) -> Robot:

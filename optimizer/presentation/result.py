@@ -10,11 +10,12 @@ from joulepath.optimizer.presentation.chart import Chart, as_svg, plotted
 from joulepath.optimizer.presentation.dictionary import plain
 from joulepath.optimizer.presentation.equality import Comparable
 from joulepath.optimizer.presentation.extras import data_frame
+from joulepath.optimizer.presentation.files import Saved
 
 Rows = Sequence[Sequence[str]]
 
 
-class Result(Comparable):
+class Result(Comparable, Saved):
     """Base of the library's results.
 
     A result describes itself by the methods with an underscore; the others are made of them.

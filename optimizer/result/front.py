@@ -10,7 +10,6 @@ import numpy as np
 
 from joulepath.optimizer.declared import Count, Joules, Seconds
 from joulepath.optimizer.presentation.chart import Chart
-from joulepath.optimizer.presentation.files import Saved
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.result.solution import Solution
 
@@ -39,7 +38,7 @@ class FrontSolver:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Front(Saved, Result):
+class Front(Result):
     """Motions in ascending duration and descending energy.
 
     Attributes:

@@ -21,7 +21,6 @@ from joulepath.optimizer.declared import (
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.chart import Chart, joint_curves
 from joulepath.optimizer.presentation.equality import Comparable
-from joulepath.optimizer.presentation.files import Saved
 from joulepath.optimizer.presentation.result import Result, Rows, per_joint
 from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.candidates import (
@@ -182,7 +181,7 @@ class SolvedMotion:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution(Saved, Result):
+class Solution(Result):
     """The motion of least energy, with its lower bound and certificate.
 
     Attributes:

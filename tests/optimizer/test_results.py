@@ -66,19 +66,36 @@ def result(name: str) -> Any:
         content = csv_of(recorded(robot, truth_of(robot), moves=4))
         options = joulepath.LogOptions(payload=joulepath.Payload())
         return joulepath.identify(robot, [joulepath.read_log(content, robot, options).log])
+    if name == "PlacementSolution":
+        pose = joulepath.Pose.from_rotvec([0.4, -0.2, 0.3], [np.pi, 0.0, 0.0])
+        return joulepath.place(
+            replace(cycle(), stops=[joulepath.Stop(name="pick", target=pose)]),
+            joulepath.Places([placed(0.01)]),
+        )
+    return joulepath.plan_cycle(cycle())
+
+
+def cycle() -> joulepath.Cycle:
     stops = [
         joulepath.Stop(name="pick", target=GOAL, dwell=0.2, payload=joulepath.Payload(mass=2.0)),
         joulepath.Stop(name="place", target=START - 0.2, payload=joulepath.Payload()),
     ]
-    return joulepath.plan_cycle(
-        joulepath.Cycle(arm=problem().arm, start=START, stops=stops, windings=False, deadline=100.0)
+    return joulepath.Cycle(
+        arm=problem().arm, start=START, stops=stops, windings=False, deadline=100.0
     )
 
 
-DRAWN = ["Solution", "Evaluation", "Comparison", "Front", "CycleSolution", "WhatIf"]
+DRAWN = [
+    "Solution",
+    "Evaluation",
+    "Comparison",
+    "Front",
+    "CycleSolution",
+    "WhatIf",
+    "PlacementSolution",
+]
 TABLES = ["IKSolutions", "Replay", "Identification"]
 ALL = DRAWN + TABLES
-SAVED = ["Solution", "Evaluation", "Front", "CycleSolution"]
 LONGEST_REPR = 200
 
 
@@ -147,7 +164,7 @@ def test_the_dictionary_is_as_the_service_answers() -> None:
     assert sum(leg["duration"] for leg in cycle["legs"]) == pytest.approx(cycle["duration"])
 
 
-@pytest.mark.parametrize("name", SAVED)
+@pytest.mark.parametrize("name", ALL)
 def test_a_saved_result_is_the_same_when_it_is_loaded(name: str, tmp_path: Path) -> None:
     file, saved = tmp_path / "result.json", result(name)
     saved.save(file)
