@@ -30,8 +30,10 @@ from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.optimizer.deadline import Deadline
 
-IDENTIFY, CYCLE = "identify", "cycle"
-"""Kinds of requests with items of the database: stored logs, known motions."""
+IDENTIFY = "identify"
+"""Kind of requests with stored logs."""
+CYCLE = "cycle"
+"""Kind of requests with known motions."""
 RESIDUALS = "residuals"
 """Kind of the second answer of an identification: its curves."""
 

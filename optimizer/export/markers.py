@@ -16,7 +16,10 @@ from joulepath.optimizer.collision.cores import Core
 
 Fields = dict[str, Any]
 # constants of visualization_msgs/msg/Marker
-CUBE, SPHERE, CYLINDER, TRIANGLES = 1, 2, 3, 11
+CUBE = 1
+SPHERE = 2
+CYLINDER = 3
+TRIANGLES = 11
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,12 @@ from joulepath.optimizer.export.ros_messages import joint_trajectory
 from joulepath.optimizer.export.rows import times
 from joulepath.optimizer.problem.arm import Arm
 
-STRING, FLOAT = "std_msgs/msg/String", "std_msgs/msg/Float64"
-JOINT_STATE, TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
-TF, MARKER_ARRAY = "tf2_msgs/msg/TFMessage", "visualization_msgs/msg/MarkerArray"
+STRING = "std_msgs/msg/String"
+FLOAT = "std_msgs/msg/Float64"
+JOINT_STATE = "sensor_msgs/msg/JointState"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+TF = "tf2_msgs/msg/TFMessage"
+MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 DEFAULTS: dict[str, type] = {
     "string": str,
     "bool": bool,

@@ -44,7 +44,8 @@ class DrawingSettings:
 
 DRAWING = DrawingSettings()
 _MOST_POINTS = 600
-_MOST_BARS, _MOST_LABELS = 1000, 25
+_MOST_BARS = 1000
+_MOST_LABELS = 25
 _TICKS = (
     0.05,
     0.1,

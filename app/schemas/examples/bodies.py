@@ -11,7 +11,8 @@ from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES
 
-JSON, CSV = "application/json", "text/csv"
+JSON = "application/json"
+CSV = "text/csv"
 BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     **{path: body_examples(path) for path in shown()},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},

@@ -6,7 +6,8 @@ from math import cos, pi
 
 from joulepath.app.schemas.examples.files import Example
 
-_PERIOD, _ROWS = 0.05, 61
+_PERIOD = 0.05
+_ROWS = 61
 _REACH = [0.4, 0.5, -0.6, 0.3, 0.2, 0.5]
 _HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 
