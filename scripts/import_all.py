@@ -7,6 +7,7 @@ python scripts/import_all.py
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import pkgutil
 import sys
 from pathlib import Path
@@ -15,6 +16,9 @@ LATE = ("mujoco",)
 """Packages that are imported only when they are needed."""
 ONLY_INSIDE = ("joulepath.app.store.migrations.env",)
 """Modules that only their caller can import: Alembic runs this one."""
+OF_EXTRAS = {"joulepath.app.ros2.": "rclpy"}
+"""Beginning of the names of modules, and the package of an extra without which they cannot be
+imported."""
 
 
 def main() -> None:
@@ -22,8 +26,12 @@ def main() -> None:
     sys.path.insert(0, str(Path.cwd()))
     import joulepath
 
+    left_out = (
+        *ONLY_INSIDE,
+        *(name for name, needed in OF_EXTRAS.items() if importlib.util.find_spec(needed) is None),
+    )
     for module in pkgutil.walk_packages(joulepath.__path__, "joulepath."):
-        if not module.name.endswith("__main__") and module.name not in ONLY_INSIDE:
+        if not module.name.endswith("__main__") and not module.name.startswith(left_out):
             importlib.import_module(module.name)
     for name in LATE:
         importlib.import_module(name)
