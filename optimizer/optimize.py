@@ -50,7 +50,7 @@ def optimize(
         InvalidProblem: the payload is beyond the robot's rating, or an end outside the tool's cone.
     """
     with one_thread(), progress_bar("Optimising", tell, progress) as tell:
-        return Run(problem, clock=clock, tell=only_news(tell)).solution()
+        return Run(problem, clock=clock, tell=only_news(tell), seeks_baselines=True).solution()
 
 
 def warm_up(robot_name: str) -> None:

@@ -22,14 +22,21 @@ class Standing(Comparable):
 
 
 BaselineName = Literal[
-    "trapezoid", "quintic", "ruckig", "ruckig_slowed", "straight", "controller_default"
+    "trapezoid",
+    "quintic",
+    "ruckig",
+    "ruckig_slowed",
+    "straight",
+    "controller_default",
+    "waypoints",
+    "blended",
 ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """The energy of another planner's motion from the same start to the nearest goal
-    configuration."""
+    """The energy of another planner's motion from the same start to the nearest goal configuration;
+    `waypoints` and `blended` go to the goal configuration of the answer."""
 
     name: BaselineName
     """`trapezoid`: trapezoidal velocity, in the duration of the answer. `quintic`: polynomial of
@@ -38,7 +45,10 @@ class Baseline:
     duration of the answer. `straight`: the fastest motion within the same limits along the straight
     line in joints, all joints in step, slowed down to the duration of the answer.
     `controller_default`: the robot's own controller with its default speed
-    and acceleration."""
+    and acceleration. `waypoints`: from waypoint to waypoint of a planned path without collisions,
+    straight in joints, with a rest at each. `blended`: along the same path without a rest, its
+    corners rounded. The last two are computed if fewer than two others are within every limit; they
+    are as fast as the limits allow, but not faster than the answer."""
     duration: Seconds
     """Duration of this motion."""
     electrical: Joules

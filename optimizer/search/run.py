@@ -29,6 +29,8 @@ class Run:
         clock: function that returns the time [s].
         tell: receives the progress.
         models: models of the problem's arm, if they are built already.
+        seeks_baselines: whether baselines along planned paths are sought where the usual ones break
+            a limit.
     """
 
     def __init__(
@@ -38,8 +40,10 @@ class Run:
         clock: Clock = time.perf_counter,
         tell: Tell = no_listener,
         models: ArmModels | None = None,
+        seeks_baselines: bool = False,
     ) -> None:
         self.state = SearchState.of(problem, known, clock, tell, models)
+        self.state.seeks_baselines = seeks_baselines
 
     @property
     def problem(self) -> Problem:

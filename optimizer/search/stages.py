@@ -29,6 +29,7 @@ from joulepath.optimizer.search.sampled_ends import between
 from joulepath.optimizer.search.state import FoundMotion, SearchState
 from joulepath.optimizer.search.tightened_limits import retry_within_tighter_limits
 from joulepath.optimizer.search.warm_start import warm_start
+from joulepath.optimizer.search.waypoint_baselines import waypoint_baselines
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
 Stage = Callable[[SearchState], None]
@@ -123,7 +124,9 @@ def compare_best_with_baselines(state: SearchState) -> None:
     """Compute the baselines of the best motion, and start solves from cheaper baselines."""
     best = state.best()
     assert best is not None
-    state.baselines = compare_with_baselines(state, best)
+    table = compare_with_baselines(state, best)
+    best = state.best() or best
+    state.baselines = [*table, *waypoint_baselines(state, best, table)]
     # a coarse motion that was not refined is no optimum
     state.cut_short |= state.deadline.passed
 

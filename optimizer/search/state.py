@@ -86,6 +86,8 @@ class SearchState:
     """Whether the search had no motion to one of the best goals of free orientation."""
     may_rest: bool = False
     """Whether the motion of the longest duration is still to be compared."""
+    seeks_baselines: bool = False
+    """Whether baselines along planned paths are sought where the usual ones break a limit."""
     baselines: list[Baseline] = field(default_factory=list)
     """Baselines of the best motion."""
     answer: Solution | None = None

@@ -104,7 +104,10 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
         claim = ". No usual way is known that keeps every limit: no saving is claimed."
     elif best["saving"] < -EQUAL:
         more = percent(-best["saving"])
-        claim = f", {more} more than {_words(best)}, the wait included: ask for that time."
+        claim = (
+            f", {more} more than “{rival_name(best)}” in {digits(best['duration'])} s, the wait "
+            "until then included: ask for that time."
+        )
     elif best["saving"] < EQUAL:
         claim = f", as much as the nearest usual way that keeps every limit, {_words(best)}."
     else:

@@ -27,6 +27,8 @@ _RIVALS = {
     "ruckig_slowed": "Fastest motion, slowed",
     "straight": "Straight line in joints",
     "controller_default": "Controller's default",
+    "waypoints": "Via points, with rests",
+    "blended": "Via points, rounded",
     "stopping": "With a rest at every stop",
     "move_by_move": "Each move by itself",
     "same_factor": "All moves slowed alike",

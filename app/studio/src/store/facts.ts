@@ -9,6 +9,8 @@ export const BASELINES: Record<string, string> = {
   ruckig_slowed: "Fastest, slowed",
   straight: "Straight in joints",
   controller_default: "Controller default",
+  waypoints: "Via points, with rests",
+  blended: "Via points, rounded",
   stopping: "Rests at every stop",
   move_by_move: "Each move by itself",
   same_factor: "All moves slowed alike",

@@ -1,0 +1,107 @@
+"""Baselines along planned paths, where the usual ones hit an obstacle or are too fast."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from joulepath.app.convert.request import to_problem
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.motion.ruckig_motion import straight
+from joulepath.optimizer.motion.spline import peak_rates, sample
+from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.result.baseline import Baseline
+from joulepath.optimizer.search.baselines import standing
+from joulepath.optimizer.search.run import Run
+from joulepath.optimizer.search.waypoint_baselines import in_a_row, waypoint_baselines, without_rest
+from tests.app.live import ROOT
+from tests.optimizer.moves import AMPLE, GOAL, START, changed, fixed, problem
+
+EXACT = 1e-12  # relative; sums and cubic laws in double precision
+RUCKIG_POSITION = 1e-7  # rad; Ruckig accepts a position within 1e-8 of its target
+ON_A_LIMIT = 1e-9  # relative; rounding of a time scale
+BETWEEN = 1e-3  # relative; a peak between samples of a motion
+LIMITS = load_robot("ur5e").limits
+CORNERS = np.array([START, START + 0.3, GOAL + [0.2, 0, 0, -0.4, 0, 0], GOAL])
+
+
+def example(name: str, **given: Any) -> Problem:
+    body = json.loads((ROOT / "examples" / "optimize" / f"{name}.json").read_text())
+    return changed(to_problem(OptimizeRequest.model_validate(body), AMPLE), **given)
+
+
+def compared(task: Problem) -> dict[str, Baseline]:
+    return {each.name: each for each in optimize(task, progress=False).baselines}
+
+
+def test_around_a_post_two_ways_keep_every_limit() -> None:
+    """What is shorter waits for the longer one, so that each saving is of the same time."""
+    task = example("over_a_post")
+    answer = optimize(task, progress=False)
+    ways = [each for each in answer.baselines if each.within_limits]
+    assert [each.name for each in ways] == ["waypoints", "blended"]
+    prepared = Run(task).state.prepared
+    power = standing(task.arm, answer.goal.q, prepared.torques).power
+    ours = answer.energy.electrical.total
+    for way in ways:
+        assert way.duration > answer.duration
+        waited = ours + power * (way.duration - answer.duration)
+        assert way.saving == pytest.approx(1 - waited / way.electrical, rel=ON_A_LIMIT)
+        assert way.saving_interval is not None
+    assert ways[1].duration < ways[0].duration, "without rests it is faster"
+
+
+def test_they_keep_the_limits_on_speeds_of_points() -> None:
+    ways = compared(example("collaborative_speeds"))
+    assert all(ways[name].within_limits for name in ("waypoints", "blended"))
+    assert not ways["ruckig_slowed"].within_limits
+
+
+def test_none_is_longer_than_the_problem_allows() -> None:
+    assert not {"waypoints", "blended"} & compared(example("over_a_post", **fixed(0.9))).keys()
+
+
+def test_none_is_computed_where_two_others_keep_every_limit() -> None:
+    assert not {"waypoints", "blended"} & compared(problem()).keys()
+
+
+def test_none_is_computed_where_none_is_sought() -> None:
+    run = Run(example("over_a_post"))
+    run.solution()
+    best = run.state.best()
+    assert best is not None and waypoint_baselines(run.state, best, []) == []
+    run.state.seeks_baselines = True
+    assert len(waypoint_baselines(run.state, best, [])) == 2
+
+
+def test_legs_in_a_row_rest_at_every_waypoint() -> None:
+    legs = [straight(LIMITS, a, b) for a, b in pairwise(CORNERS)]
+    motion = in_a_row(legs)
+    ends = np.cumsum([leg.duration for leg in legs])
+    assert motion.duration == pytest.approx(ends[-1], rel=EXACT)
+    assert motion.weights.sum() == pytest.approx(ends[-1], rel=EXACT)
+    for end, corner in zip(ends, CORNERS[1:], strict=True):
+        at = int(np.abs(motion.t - end).argmin())
+        assert motion.q[at] == pytest.approx(corner, abs=RUCKIG_POSITION)
+        assert np.abs(motion.v[at]).max() < ON_A_LIMIT
+    assert motion.peak_v == pytest.approx(np.max([leg.peak_v for leg in legs], axis=0))
+
+
+def test_a_motion_without_rest_uses_a_limit_and_keeps_them_all() -> None:
+    at = np.linspace(0, 3, 20)
+    points = np.stack([np.interp(at, range(4), joint) for joint in CORNERS.T], axis=1)
+    motion = without_rest(points, LIMITS.rates)
+    assert (peak_rates(motion) / LIMITS.rates).max() == pytest.approx(1.0, rel=ON_A_LIMIT)
+    t = np.linspace(0, motion.duration, 2001)
+    q, v, a = sample(motion, t)
+    assert q[[0, -1]] == pytest.approx(CORNERS[[0, -1]])
+    assert np.abs([v[[0, -1]], a[[0, -1]]]).max() < ON_A_LIMIT
+    assert (np.abs(np.diff(a, axis=0)).max(axis=0) / t[1] <= LIMITS.j_max * (1 + BETWEEN)).all()
+    even = without_rest(points, LIMITS.rates * np.array([[1], [1], [1e6]]))
+    assert even.duration < motion.duration
