@@ -23,6 +23,7 @@ from joulepath.app.cli.keys import keys
 from joulepath.app.cli.optimize import optimize
 from joulepath.app.cli.pareto import pareto
 from joulepath.app.cli.placement import placement
+from joulepath.app.cli.rename import rename
 from joulepath.app.cli.replay import replay
 from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
@@ -78,6 +79,7 @@ for command in (
     identify,
     jobs,
     studies,
+    rename,
     report,
     check,
     robots,

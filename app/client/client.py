@@ -297,6 +297,19 @@ class Client:
         """The JSON at any path of the service, such as that in the field `answer`."""
         return self._json("GET", path, params=query)
 
+    def rename(self, path: str, name: str | None) -> Json:
+        """Give another name to something that the service keeps: `PATCH` of its path.
+
+        Args:
+            path: its path, such as `/jobs/ID`, `/studies/ID`, `/logs/ID`, `/identifications/ID`, or
+                the field `answer` of an answer.
+            name: the name; None for none.
+
+        Returns:
+            What is renamed, as lists show it.
+        """
+        return self._json("PATCH", path, json={"name": name})
+
     def _listed(self, name: str) -> Iterator[Json]:
         """The entries of all pages of a list."""
         after: Any = None

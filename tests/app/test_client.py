@@ -110,6 +110,7 @@ def test_a_job_from_begin_to_end(service: joulepath.Client) -> None:
     assert [each["index"] for each in results] == [0, 1]
     assert len(service.job_table(sent["id"]).splitlines()) == 3
     assert service.retry_job(sent["id"])["state"] == "done"
+    assert service.rename(f"/jobs/{sent['id']}", "both")["name"] == "both"
     service.delete_job(sent["id"])
     with pytest.raises(joulepath.ServiceError, match="job") as caught:
         service.job(sent["id"])
