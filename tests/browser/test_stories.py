@@ -358,7 +358,7 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
         total = page.locator("#job-totals dd").first.inner_text()
         assert float(total.split()[0]) == pytest.approx(sum(joules), rel=0.01)
         text = report(page, "html").decode()
-        assert "<td>bin to shelf</td>" in text and "1 of 3 moves have no answer" in text
+        assert "<td>bin to shelf</td>" in text and "1 of 3 moves has no answer" in text
         assert f"<strong>{digits(sum(joules))}</strong> J" in text
         assert report(page, "pdf").startswith(b"%PDF")
         page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from joulepath.app.api.report.bundle import Bundle
-from joulepath.app.api.report.numbers import JOULES_PER_KWH, digits, down, percent, up
+from joulepath.app.api.report.numbers import JOULES_PER_KWH, amount, digits, down, percent, up
 from joulepath.app.api.report.report import Change, Cost, Fact
 
 SHIFT = 8 * 3600.0
@@ -41,8 +41,8 @@ class Money:
     def in_words(self, joules: float) -> str:
         """An energy as kilowatt-hours, and as money where its price is given."""
         kwh = joules / JOULES_PER_KWH
-        money = "" if self.price is None else f" ({digits(kwh * self.price, 2)} {self.currency})"
-        return f"{digits(kwh)} kWh{money}"
+        price = "" if self.price is None else f" ({amount(kwh * self.price)} {self.currency})"
+        return f"{digits(kwh)} kWh{price}"
 
     @classmethod
     def of(cls, bundle: Bundle) -> Money:
@@ -111,8 +111,9 @@ def facts(bundle: Bundle, money: Money) -> tuple[Fact, ...]:
             if money.carbon is None
             else f"and {digits(_kwh(money, yearly) * money.carbon)} kg CO2e "
         )
-        cost = digits(_kwh(money, yearly) * money.price, 2)
-        found.append(Fact(cost, money.currency, f"{carbon}a year"))
+        cost = _kwh(money, yearly) * money.price
+        shown = amount(cost) if cost < 10 else digits(cost, 2)
+        found.append(Fact(shown, money.currency, f"{carbon}a year"))
     elif money.carbon is not None:
         found.append(Fact(digits(_kwh(money, yearly) * money.carbon), "kg", "CO2e a year"))
     return tuple(found)
@@ -134,7 +135,7 @@ def advice_table(bundle: Bundle, money: Money) -> tuple[Change, ...]:
             f"saves {percent(each['share'])}",
             ""
             if yearly is None
-            else f"{digits(each['saving'] * yearly * money.price, 2)} {money.currency} a year"
+            else f"{amount(each['saving'] * yearly * money.price)} {money.currency} a year"
             if money.price is not None
             else f"{digits(each['saving'] * yearly, 2)} kWh a year",
         )
@@ -163,7 +164,7 @@ def cost_table(bundle: Bundle, money: Money) -> tuple[Cost, ...]:
         Cost(
             period,
             digits(_kwh(money, count)),
-            "–" if money.price is None else digits(_kwh(money, count) * money.price),
+            "–" if money.price is None else amount(_kwh(money, count) * money.price),
             "–" if money.carbon is None else digits(_kwh(money, count) * money.carbon),
         )
         for period, count in rows

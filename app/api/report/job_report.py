@@ -95,7 +95,8 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
         f"{_against(1 - ours / theirs)} the nearest such way of each, in the same time."
     )
     left = [row for row in bundle.moves if row["answer"] is None]
-    others = f" {len(left):,} of {len(bundle.moves):,} moves have no answer." if left else ""
+    have = "has" if len(left) == 1 else "have"
+    others = f" {len(left):,} of {len(bundle.moves):,} moves {have} no answer." if left else ""
     least = above_least("No way to make them", total, answer["energy"]["lower_bound"])
     return first + claim, least + others
 
@@ -130,6 +131,7 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
                 ratios[name] / most,
                 saved(1 - ours / theirs),
                 True,
+                saves=ours < theirs,
             )
             for name, (count, theirs, ours) in sorted(
                 found.items(), key=lambda each: (each[0] != "nearest", -each[1][0])

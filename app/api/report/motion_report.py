@@ -103,35 +103,49 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     if best is None:
         claim = ". No usual way is known that keeps every limit: no saving is claimed."
     elif best["saving"] < -EQUAL:
-        more = percent(-best["saving"])
+        more = percent(-_share(answer, best, held))
+        name, time = rival_name(best), digits(best["duration"])
         claim = (
-            f", {more} more than “{rival_name(best)}” in {digits(best['duration'])} s, the wait "
-            "until then included: ask for that time."
+            f": {more} more than a usual way that keeps every limit, {_words(best)}. What needs "
+            "less is below."
+            if held
+            else f". With a wait until the {time} s of a usual way that keeps every limit, “{name}”, "
+            f"it needs {more} more: ask for a {word} over that time."
         )
     elif best["saving"] < EQUAL:
         claim = f", as much as the nearest usual way that keeps every limit, {_words(best)}."
     else:
-        less = percent(_of_all(best["saving"], total, held))
+        less = percent(_share(answer, best, held))
         claim = (
             f": *{less} less* than the nearest usual way that keeps every limit, {_words(best)}."
-            f"{_yearly(bundle, best['saving'])}"
+            f"{_yearly(bundle, best)}"
         )
     return first + claim, above_least(f"No {word} of any kind", total, bound)
 
 
-def _of_all(saving: float, total: float, held: float) -> float:
-    """The saving of a motion of `total` [J] as a share of motion and wait, `held` [J] for both."""
-    saved_joules = total * saving / (1 - saving)
-    return saved_joules / (total + held + saved_joules)
+def _saved(answer: dict[str, Any], rival: dict[str, Any]) -> float:
+    """What is saved against a rival [J], in the time of the longer of both."""
+    objective, saving = answer["objective"], float(rival["saving"])
+    if rival["duration"] > answer["duration"]:
+        return saving * float(rival[objective])
+    return float(answer["energy"][objective]["total"]) * saving / (1 - saving)
 
 
-def _yearly(bundle: Bundle, saving: float) -> str:
+def _share(answer: dict[str, Any], rival: dict[str, Any], held: float) -> float:
+    """The saving as a share of the rival's energy, with a wait of `held` [J] for our motion."""
+    if not held:
+        return float(rival["saving"])
+    saved = _saved(answer, rival)
+    return saved / (float(answer["energy"][answer["objective"]]["total"]) + held + saved)
+
+
+def _yearly(bundle: Bundle, rival: dict[str, Any]) -> str:
     """What the saving is in a year, where its shifts are given."""
     money = Money.of(bundle)
     if bundle.answer["objective"] != "electrical" or money.shifts is None:
         return ""
-    joules = bundle.answer["energy"]["electrical"]["total"] * saving / (1 - saving)
-    return f" In a year that is {money.in_words(joules * money.cycles * money.shifts)}."
+    joules = _saved(bundle.answer, rival) * money.cycles * money.shifts
+    return f" In a year that is {money.in_words(joules)}."
 
 
 def _words(rival: dict[str, Any]) -> str:
@@ -163,6 +177,7 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
                 max(each[objective] / most, 0.0),
                 _broken(each) if each["saving"] is None else saved(each["saving"]),
                 each["saving"] is not None,
+                saves=(each["saving"] or 0.0) > 0,
             )
             for each in table
         ),

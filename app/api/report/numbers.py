@@ -34,6 +34,13 @@ def up(value: float, count: int = 3) -> str:
     return _written(value, count, math.ceil)
 
 
+def amount(value: float) -> str:
+    """An amount of money: with cents below 100, and with a digit more below one cent."""
+    if not 0.005 <= abs(value) < 99.995:
+        return digits(value, 1 if abs(value) < 1 else 3)
+    return f"{value:.2f}".replace("-", "−")
+
+
 def percent(share: float, rounding: str = "nearest") -> str:
     """A share with one digit after the point."""
     whole = _ROUNDINGS[rounding](1000 * share)

@@ -132,6 +132,7 @@ def _fact(fact: Fact) -> str:
 
 def _rival(rival: Rival) -> str:
     kind = "ours" if rival.ours else ("claimed" if rival.claimed else "broken")
+    kind += " saves" if rival.saves else ""
     time = escape(rival.time).replace(" ", "&nbsp;")
     return (
         f'<tr class="{kind}"><th scope="row">{escape(rival.name)} <small>{time}</small></th>'

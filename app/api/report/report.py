@@ -27,6 +27,8 @@ class Rival:
     """The saving, or why none is claimed."""
     claimed: bool
     ours: bool = False
+    saves: bool = False
+    """Whether less is needed than by this way."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ const change: Change = {
   request: null,
 };
 
+const way = (energy: number, duration = 1) => ({ energy, duration });
+
 it("every change says its joules", () => {
   expect(wordsOf(change)).toBe("A round from the last stop: 607 J in 11.4 s, 20 % less.");
   expect(wordsOf({ ...change, name: "brakes", share: 0.0533 })).toMatch(
@@ -21,10 +23,12 @@ it("every change says its joules", () => {
 });
 
 it("a saving is one of the cycle where the motion waits", () => {
-  expect(ofCycle(0.07, 74.4, 0)).toBeCloseTo(0.07);
+  expect(ofCycle(0.07, way(74.4), way(80), 0)).toBeCloseTo(0.07);
   // 80 J against 74.4 J, and 209 J of waiting for both
-  expect(ofCycle(0.07, 74.4, 209)).toBeCloseTo(5.6 / 289, 3);
-  expect(ofCycle(-0.1, 110, 90)).toBeCloseTo(-10 / 190);
+  expect(ofCycle(0.07, way(74.4), way(80), 209)).toBeCloseTo(5.6 / 289, 3);
+  expect(ofCycle(-0.1, way(110), way(100), 90)).toBeCloseTo(-10 / 190);
+  // the longer way has waited less: 93 J against 74 J and 20 J of waiting, then 80 J for both
+  expect(ofCycle(1 - 94 / 93, way(74), way(93, 1.5), 100)).toBeCloseTo(-1 / 173);
 });
 
 it("a motion waits that is shorter than its cycle and has no time of its own", () => {

@@ -74,7 +74,7 @@ def test_a_job_is_summed_and_listed(page: bytes) -> None:
     for total in totals:
         assert f"<td>{digits(total)}</td>" in text
     assert '<td colspan="7" class="remark">' in text, "the motion that cannot be says why"
-    assert "no motion" in text and "1 of 5 moves have no answer" in text
+    assert "no motion" in text and "1 of 5 moves has no answer" in text
 
 
 def test_savings_of_a_job_are_those_of_its_moves(page: bytes) -> None:

@@ -94,16 +94,29 @@ function Own({ shown }: { shown: Answered }) {
   );
 }
 
-/** A saving as a share of the cycle: where one waits, both wait from then on. */
-export function ofCycle(saving: number, total: number, waiting: number): number {
-  const saved = (total * saving) / (1 - saving);
-  return saved / (total + waiting + saved);
+interface Way {
+  duration: number;
+  energy: number;
 }
 
-function Saving({ of: { saving: own, saving_interval: known } }: { of: Baseline }) {
+/** A saving as a share of the cycle: where one waits, both wait from then on. */
+export function ofCycle(saving: number, ours: Way, theirs: Way, waiting: number): number {
+  if (!waiting) return saving;
+  const saved =
+    theirs.duration > ours.duration
+      ? saving * theirs.energy
+      : (ours.energy * saving) / (1 - saving);
+  return saved / (ours.energy + waiting + saved);
+}
+
+function Saving({ of: way }: { of: Baseline }) {
+  const { saving: own, saving_interval: known } = way;
   if (own === null) return <>–</>;
   const waiting = advised.value?.waiting ?? 0;
-  const saving = ofCycle(own, energyOf(answered.value!), waiting);
+  const { solution } = answered.value!;
+  const ours = { duration: solution.duration, energy: energyOf(answered.value!) };
+  const theirs = { duration: way.duration, energy: way[solution.objective] };
+  const saving = ofCycle(own, ours, theirs, waiting);
   const interval = waiting ? null : known;
   const likely = interval
     ? `likely ${percent(interval.p5)} to ${percent(interval.p95)}`
