@@ -109,8 +109,8 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
             f": {more} more than a usual way that keeps every limit, {_words(best)}. What needs "
             "less is below."
             if held
-            else f". With a wait until the {time} s of a usual way that keeps every limit, “{name}”, "
-            f"it needs {more} more: ask for a {word} over that time."
+            else f". With a wait until the {time} s of a usual way that keeps every limit, “{name}”"
+            f", it needs {more} more: ask for a {word} over that time."
         )
     elif best["saving"] < EQUAL:
         claim = f", as much as the nearest usual way that keeps every limit, {_words(best)}."

@@ -28,7 +28,7 @@ RUCKIG_POSITION = 1e-7  # rad; Ruckig accepts a position within 1e-8 of its targ
 ON_A_LIMIT = 1e-9  # relative; rounding of a time scale
 BETWEEN = 1e-3  # relative; a peak between samples of a motion
 LIMITS = load_robot("ur5e").limits
-CORNERS = np.array([START, START + 0.3, GOAL + [0.2, 0, 0, -0.4, 0, 0], GOAL])
+CORNERS = np.array([START, START + 0.3, GOAL + np.array([0.2, 0, 0, -0.4, 0, 0]), GOAL])
 
 
 def example(name: str, **given: Any) -> Problem:
