@@ -183,4 +183,4 @@ def test_measured_joules_stand_beside_those_that_are_predicted(
         assert float(cells[2]) == pytest.approx(measured, rel=DIGITS)
         assert float(cells[4]) == pytest.approx(predicted, rel=DIGITS)
         difference = float(cells[6].strip(" %").replace("−", "-"))
-        assert difference == pytest.approx(100 * (predicted / measured - 1), rel=0.06, abs=0.01)
+        assert difference == pytest.approx(100 * (measured / predicted - 1), rel=0.06, abs=0.01)

@@ -425,7 +425,7 @@ def test_an_engineer_compares_a_log_with_what_was_predicted(
         page.get_by_label("Search robots").fill("ur10e")
         page.get_by_role("button", name="Universal Robots UR10e").click()
         go(page, "Logs")
-        expect(page.locator("#logs")).to_contain_text("This log is of a ur5e")
+        expect(page.locator("#logs")).to_contain_text("This log is of a Universal Robots UR5e")
         drawn = attached_to(page_of_log).answer["total"]["measured"]["electrical"]
         assert measured == pytest.approx(drawn, rel=0.01)
         assert checked(page_of_log, True, "test").agrees

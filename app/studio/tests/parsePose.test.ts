@@ -86,7 +86,8 @@ describe("joint positions", () => {
 it("what is far away says so", () => {
   expect(why("p[-4200000, 280, 100, 0, 3.1, 0]")).toContain("check the units");
   expect(why("hello")).toContain("No number");
-  expect(why("1 2 3")).toContain("3 numbers");
+  expect(why("1 2 3")).toContain("Numbers found: 3.");
+  expect(why("1e999 0 0 0 0 0")).toContain("Numbers found: 5.");
 });
 
 it("a table has names and rows", () => {

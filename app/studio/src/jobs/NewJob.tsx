@@ -68,7 +68,7 @@ export function NewJob({ onClose }: { onClose: () => void }) {
             disabled={!reading || !moves.length || busy}
             onClick={start}
           >
-            Start {moves.length || ""} moves
+            Start {moves.length === 1 ? "1 move" : `${moves.length || ""} moves`}
           </Button>
         </>
       }

@@ -9,6 +9,27 @@ import { tell } from "../store/trouble";
 import { parseNumber } from "../store/units";
 import { addLog, chosen, openedIdentification, openedLog } from "./model";
 
+// the words of this dialog for the settings that the service names
+const WORDS: Record<string, string> = {
+  effort: "Efforts are",
+  columns: "Names of columns",
+  units: "Angles in",
+  current_units: "Currents in",
+  payload: "Payload that it carried",
+};
+
+/** What the service says of a log, in the words of this dialog. */
+const inWords = (text: string) =>
+  text
+    .replace(/effort=(\w+)/g, "“$1”")
+    .replace(/`(\w+)`/g, (_, name: string) => (WORDS[name] ? `“${WORDS[name]}”` : name));
+
+interface Why {
+  text: string;
+  link: string | null;
+  field: "effort" | null;
+}
+
 /** How a file is to be read. */
 export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
   const [settings, setSettings] = useState({
@@ -20,7 +41,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
     mass: "",
     columns: "",
   });
-  const [why, setWhy] = useState<{ text: string; link: string | null } | null>(null);
+  const [why, setWhy] = useState<Why | null>(null);
   const [busy, setBusy] = useState(false);
   const [robots, setRobots] = useState<Pick<RobotSummary, "name" | "title">[]>([
     { name: settings.robot, title: settings.robot },
@@ -34,7 +55,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
     const { mass, columns, ...plain } = settings;
     const weight = parseNumber(mass);
     if (mass.trim() && weight === null)
-      return setWhy({ text: "The payload is a number of kg.", link: null });
+      return setWhy({ text: "The payload is a number of kg.", link: null, field: null });
     setBusy(true);
     try {
       const carried: Record<string, string> =
@@ -56,7 +77,8 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
         .map(({ loc, msg }) => `${loc.slice(1).join(".")}: ${msg}`)
         .join(" ");
       setWhy({
-        text: `${(error as Error).message} ${fields}`,
+        text: inWords(`${(error as Error).message} ${fields}`),
+        field: details.type?.endsWith("effort-not-usable") ? "effort" : null,
         link: details.type?.includes("problems/")
           ? details.type.slice(details.type.indexOf("problems/"))
           : null,
@@ -74,6 +96,11 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
         ))}
       </select>
     </label>
+  );
+  const told = why && (
+    <p class="error" role="alert" id="log-error">
+      {why.text} {why.link && <a href={why.link}>What this means</a>}
+    </p>
   );
   return (
     <Dialog
@@ -112,6 +139,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
         {choice("units", "Angles in", ["rad", "deg"])}
         {choice("current_units", "Currents in", ["A", "mA"])}
         {choice("effort", "Efforts are", ["auto", "current", "torque", "external"])}
+        {why?.field === "effort" && told}
         <label>
           Names of columns, as JSON, where they are unusual{" "}
           <input
@@ -121,11 +149,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
             onChange={set("columns")}
           />
         </label>
-        {why && (
-          <p class="error" role="alert" id="log-error">
-            {why.text} {why.link && <a href={why.link}>What this means</a>}
-          </p>
-        )}
+        {why?.field !== "effort" && told}
       </div>
     </Dialog>
   );

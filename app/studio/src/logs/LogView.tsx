@@ -5,6 +5,7 @@ import { Table } from "../ui/Table";
 import { plain } from "../store/facts";
 import { report } from "../store/report";
 import { robotName } from "../store/request";
+import { robotOf } from "../store/service";
 import { request } from "../store/state";
 import { tell } from "../store/trouble";
 import { figure } from "../store/units";
@@ -16,6 +17,15 @@ export function LogView({ log }: { log: LogDetail }) {
   const usable = own !== null && robotName(request.value) === log.robot;
   const [withOwn, setWithOwn] = useState(false);
   const [found, setFound] = useState<Evaluation | null>(null);
+  const [titles, setTitles] = useState([log.robot, robotName(request.value)]);
+  useEffect(() => {
+    const names = [log.robot, robotName(request.value)];
+    const known = Promise.all(names.map(robotOf));
+    known.then(
+      (robots) => setTitles(robots.map(({ title }) => title)),
+      () => setTitles(names),
+    );
+  }, [log.robot, robotName(request.value)]);
   useEffect(() => {
     setFound(null);
     evaluated(log.id, withOwn ? own : null).then(setFound, (error) => tell(error));
@@ -27,7 +37,7 @@ export function LogView({ log }: { log: LogDetail }) {
         <div>
           <h2>{log.name ?? log.id.slice(0, 8)}</h2>
           <p class="hint">
-            {log.robot} · {figure(log.duration)} s · {moving} moves · {figure(log.rate)} Hz ·
+            {titles[0]} · {figure(log.duration)} s · {moving} moves · {figure(log.rate)} Hz ·
             carried {figure(log.payload)} kg
             {log.effort && ` · efforts are a ${log.effort.meaning}`}
           </p>
@@ -52,7 +62,7 @@ export function LogView({ log }: { log: LogDetail }) {
       ))}
       {robotName(request.value) !== log.robot && (
         <Note kind="warning">
-          This log is of a {log.robot}; the cell has a {robotName(request.value)}.
+          This log is of a {titles[0]}; the cell has a {titles[1]}.
         </Note>
       )}
       <h3>Measured and predicted joules</h3>
@@ -71,8 +81,7 @@ export function LogView({ log }: { log: LogDetail }) {
   );
 }
 
-const differs = (measured: number, predicted: number) =>
-  `${predicted >= measured ? "+" : "−"}${figure(Math.abs(100 * (predicted / measured - 1)), 2)} %`;
+const signed = (share: number) => `${share >= 0 ? "+" : "−"}${figure(Math.abs(100 * share), 2)} %`;
 
 function Measured({ found: { segments, total } }: { found: Evaluation }) {
   const electrical = total.measured?.electrical != null;
@@ -91,7 +100,7 @@ function Measured({ found: { segments, total } }: { found: Evaluation }) {
       ...(efforts ? [worked] : []),
       predicted,
       interval ? `${figure(interval.p5, 2)} to ${figure(interval.p95, 2)}` : "",
-      drawn ? differs(drawn, predicted) : worked ? differs(worked, predicted) : "–",
+      part.difference === null ? "–" : signed(part.difference),
     ];
   };
   const head = [
@@ -125,7 +134,7 @@ function Measured({ found: { segments, total } }: { found: Evaluation }) {
         {electrical && "Measured: power at the arm’s bus over time. "}
         {efforts &&
           "By currents: shaft work, copper loss and the electronics of the robot’s figures. "}
-        The difference is that of the prediction.
+        Difference: measured beyond predicted.
       </p>
     </>
   );

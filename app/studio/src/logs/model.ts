@@ -30,6 +30,8 @@ export interface Evaluated {
     mechanical: { total: number };
   };
   measured: { electrical: number | null; by_efforts: number | null } | null;
+  /** Measured / predicted - 1. */
+  difference: number | null;
 }
 
 export interface Evaluation {

@@ -32,7 +32,8 @@ export function parseMoves(text: string, joints: number): MovesRead {
   const headed = first.filter(isNumber).length < joints;
   const head = headed ? first.map((cell) => cell.toLowerCase()) : null;
   const rows = (headed ? lines.slice(1) : lines).map((cells) => rowOf(cells, head));
-  if (!rows.length) return { why: "The table has a head, and no rows." };
+  if (!rows.length)
+    return { why: "No row of numbers was found below the first line: paste one move in a row." };
   const odd = rows.findIndex(({ odd }) => odd !== null);
   if (odd >= 0)
     return { why: `Row ${odd + 1}: “${rows[odd]!.odd}” is no mass in kg. Correct or delete it.` };

@@ -43,7 +43,7 @@ export function parsePose(text: string, joints = 6, prefer?: Reading["kind"]): P
   if (readings.length) return { readings };
   if (numbers.length !== 6 && numbers.length !== joints)
     return {
-      why: `${numbers.length} numbers were found: a pose has 6, this arm has ${joints} joints.`,
+      why: `Numbers found: ${numbers.length}. A pose has 6, this arm has ${joints} joints.`,
     };
   return { why: farAway(numbers) };
 }
@@ -65,7 +65,9 @@ function numbersOf(text: string): number[] {
   // where blanks or semicolons separate values, a comma between digits is a decimal sign
   const decimal = !plain.includes(".") && /\d,\d/.test(plain) && !/\d,\d+,/.test(plain);
   const read = decimal ? plain.replace(/(\d),(\d)/g, "$1.$2") : plain;
-  return [...read.matchAll(NUMBER)].map(([each]) => Number(each.replace("−", "-")));
+  return [...read.matchAll(NUMBER)]
+    .map(([each]) => Number(each.replace("−", "-")))
+    .filter(Number.isFinite);
 }
 
 function posesOf(text: string, numbers: number[]): Reading[] {

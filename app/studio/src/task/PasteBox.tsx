@@ -5,6 +5,10 @@ import { answer, pasteWrong, question, read, rowOfPaste } from "./paste";
 /** A place for what is copied from a pendant, a program or a table. */
 export function PasteBox() {
   const asked = question.value;
+  // what is not understood stays, to be corrected
+  const take = (input: HTMLInputElement, text: string) => {
+    input.value = read(text, rowOfPaste()) ? "" : text;
+  };
   return (
     <div class="paste-box">
       <input
@@ -14,12 +18,12 @@ export function PasteBox() {
         placeholder="Paste p[…], six numbers, or rows of a table"
         onPaste={(event) => {
           event.preventDefault();
-          read(event.clipboardData?.getData("text/plain") ?? "", rowOfPaste());
+          take(event.currentTarget, event.clipboardData?.getData("text/plain") ?? "");
         }}
+        onInput={() => (pasteWrong.value = "")}
         onKeyDown={(event) => {
-          if (event.key !== "Enter" || event.ctrlKey) return;
-          read(event.currentTarget.value, rowOfPaste());
-          event.currentTarget.value = "";
+          if (event.key !== "Enter" || event.ctrlKey || !event.currentTarget.value.trim()) return;
+          take(event.currentTarget, event.currentTarget.value);
         }}
       />
       {pasteWrong.value && (

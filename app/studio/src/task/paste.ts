@@ -38,8 +38,8 @@ export function rowOfPaste(): Row | null {
   return chosen ?? rows.find((row) => targetAt(request.value, row).kind === "empty") ?? null;
 }
 
-/** Understands a text, or asks how it is meant. */
-export function read(text: string, row: Row | null): void {
+/** Understands a text, or asks how it is meant; false where it is neither. */
+export function read(text: string, row: Row | null): boolean {
   pasteWrong.value = "";
   question.value = null;
   const table = parseTable(text);
@@ -48,11 +48,12 @@ export function read(text: string, row: Row | null): void {
   const parsed = parsePose(table ? table[0]!.text : text, joints(), prefer);
   if ("why" in parsed) {
     pasteWrong.value = parsed.why;
-    return;
+    return false;
   }
   const asked: Question = { text, row, readings: parsed.readings, table };
   if (parsed.readings.length > 1) question.value = asked;
   else answer(asked, parsed.readings[0]!);
+  return true;
 }
 
 /** Writes what was pasted as it is meant. */
