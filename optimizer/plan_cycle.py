@@ -95,7 +95,8 @@ def plan_cycle(
         cycle = _divided(cycle, clock)
         found = with_free_orientations(cycle, lambda other: _valued(other, clock, tell), clock)
         _tell_found(tell, found)
-        return replace(in_equal_times(cycle, found), wall_time=clock() - began)
+        end = Deadline.after(cycle.deadline, clock).earlier_by(clock() - began)
+        return replace(in_equal_times(cycle, found, end), wall_time=clock() - began)
 
 
 def _valued(cycle: Cycle, clock: Clock, tell: Tell) -> CycleSolution:

@@ -61,6 +61,8 @@ CycleBaselineName = Literal[
     "without_storage",
     "ruckig_slowed",
     "straight",
+    "waypoints",
+    "blended",
 ]
 
 
@@ -80,7 +82,9 @@ class CycleBaseline:
     order, where it is allowed: `given_order`, the best cycle in the order of `stops`. With an
     energy storage on the bus: `without_storage`, the best cycle on the same bus without it, beside
     `move_by_move` alone. In the configurations and times of the answer: `ruckig_slowed` and
-    `straight`, every move but lines and paths by the motion of this name of `POST /optimize`."""
+    `straight`, every move but lines and paths by the motion of this name of `POST /optimize`.
+    `waypoints` and `blended` alike, in their own times, if fewer than two others keep every
+    limit."""
     duration: Seconds
     """Duration of this cycle."""
     electrical: Joules = field(init=False)

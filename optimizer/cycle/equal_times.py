@@ -10,29 +10,41 @@ import numpy as np
 from joulepath.optimizer.cycle.cycle_baselines import cycle_baseline
 from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleEnergies, CycleSolution
+from joulepath.optimizer.cycle.move_problem import problem_of
 from joulepath.optimizer.cycle.rest_energy import rest_energy, rest_sensitivity
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
+from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.waypoint_baselines import WAYPOINTS, along_waypoints
 
+WAYS: tuple[Literal["waypoints", "blended"], ...] = ("waypoints", "blended")
 OTHER_MOTIONS: tuple[Literal["ruckig_slowed", "straight"], ...] = ("ruckig_slowed", "straight")
 
 
-def in_equal_times(cycle: Cycle, found: CycleSolution) -> CycleSolution:
-    """The cycle with savings in equal cycle times, and with further baselines of the same times.
+def in_equal_times(cycle: Cycle, found: CycleSolution, end: Deadline) -> CycleSolution:
+    """The cycle with savings in equal cycle times, and with more baselines of its configurations.
 
     A baseline beyond a limit has no saving. Without a requested `time`, cycles differ in duration:
     the shorter one then waits for the end of the longer one at the cheapest stop of the answer.
+
+    Args:
+        cycle: the cycle.
+        found: its solution.
+        end: time at which paths around obstacles are planned at the latest.
     """
     if not found.baselines:
         return found
     others = [_by_motions(cycle, found, name) for name in OTHER_MOTIONS]
     table = [*found.baselines, *(each for each in others if each is not None)]
+    if sum(each.within_limits for each in table) < WAYPOINTS.enough:
+        table += _along_waypoints(cycle, found, end)
     return replace(found, baselines=[_priced(cycle, found, each) for each in table])
 
 
@@ -103,6 +115,49 @@ def _by_motions(
         return None
     held = all(part.within_limits for part in changed)
     return cycle_baseline(cycle, name, found.duration, energies, held, ours)
+
+
+def _along_waypoints(cycle: Cycle, found: CycleSolution, end: Deadline) -> list[CycleBaseline]:
+    """Baselines whose moves go along planned paths between the same configurations.
+
+    Lines, paths and moves through passes keep the motions of the answer. A cycle that waits, a
+    storage and mechanical work have none: other baselines then keep every limit.
+    """
+    waits = any(move.wait for move in found.moves)
+    if waits or found.storage is not None or cycle.objective != "electrical":
+        return []
+    table = list[CycleBaseline]()
+    try:
+        with watch(end):
+            ways = [_ways_of(cycle, move, end) for move in found.moves]
+    except DeadlinePassed:
+        return []
+    for name in WAYS:
+        changed = [
+            (move, way) for move, way in zip(found.moves, ways, strict=True) if way is not None
+        ]
+        if not changed or not all(name in way for _, way in changed):
+            continue
+        energies, duration = found.energies, found.duration
+        for move, way in changed:
+            energies = _with_motion(energies, move.solution, way[name])
+            duration += way[name].duration - move.solution.duration
+        if cycle.clamped_duration(duration) != duration:
+            continue
+        held = all(way[name].within_limits for _, way in changed)
+        table.append(cycle_baseline(cycle, name, duration, energies, held, found.energies))
+    return table
+
+
+def _ways_of(cycle: Cycle, move: CycleMove, end: Deadline) -> dict[str, Baseline] | None:
+    """Baselines of a move along a planned path, by name; None for a move that keeps its motion."""
+    if move.planned.tool_path is not None or move.passes:
+        return None
+    q_start, q_goal = move.solution.start.q, move.solution.goal.q
+    problem = problem_of(cycle, move.planned, q_start, q_goal, end.left)
+    least, ours = move.solution.duration, move.solution.energy.electrical.total
+    found = along_waypoints(PreparedProblem.of(problem), q_start, q_goal, least, ours, end)
+    return {each.name: each for each in found}
 
 
 def _with_motion(energies: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:

@@ -18,7 +18,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.planner.path_planner import Effort
-from joulepath.optimizer.deadline import DeadlinePassed, watch
+from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.quadrature import lobatto_nodes
 from joulepath.optimizer.motion.ruckig_motion import straight
@@ -54,6 +54,9 @@ class WaypointSettings:
     stretch: float = 0.3
     """Power of the factor that a span needs by which it is stretched in a round."""
 
+    same: float = 1e-6
+    """Relative difference of two equal durations or energies."""
+
 
 WAYPOINTS = WaypointSettings()
 
@@ -62,6 +65,9 @@ def waypoint_baselines(
     state: SearchState, best: Candidate, table: Sequence[Baseline]
 ) -> list[Baseline]:
     """The baselines along a planned path, if they are sought and too few others keep every limit.
+
+    Those whose duration the problem does not allow are left out, and so is `waypoints` without a
+    waypoint between the ends, which is `straight`.
 
     Args:
         state: state of the search.
@@ -72,52 +78,71 @@ def waypoint_baselines(
     through = state.problem.tool_path is not None or state.problem.passes
     if not state.seeks_baselines or through or len(held) >= WAYPOINTS.enough:
         return []
+    assert best.energy is not None
+    ends = best.q_start, best.q_goal
     try:
         with watch(state.deadline):
-            motions = _motions(state, best, "straight" in held)
-            return [_baseline(state, best, *each) for each in motions.items()]
+            found = along_waypoints(
+                state.prepared, *ends, best.duration, best.energy, state.deadline
+            )
     except DeadlinePassed:
         return []
+    return [each for each in found if state.allows(each.duration) and not _is_among(each, table)]
 
 
-def _motions(
-    state: SearchState, best: Candidate, has_straight: bool
-) -> dict[BaselineName, SampledMotion]:
-    """The motions along a planned path whose durations the problem allows.
+def _is_among(each: Baseline, table: Sequence[Baseline]) -> bool:
+    """Whether a baseline is another one by another name."""
+    own = each.duration, each.electrical
+    others = np.array([(other.duration, other.electrical) for other in table]).reshape(-1, 2)
+    return bool(np.isclose(others, own, rtol=WAYPOINTS.same, atol=0.0).all(axis=1).any())
 
-    Without a waypoint between the ends, `waypoints` is `straight`, if there is one.
+
+def along_waypoints(
+    prepared: PreparedProblem,
+    q_start: Array,
+    q_goal: Array,
+    least: float,
+    ours: float,
+    deadline: Deadline,
+) -> list[Baseline]:
+    """The baselines along a planned path between two configurations; none without a path.
+
+    Args:
+        prepared: the problem.
+        q_start: start, shape (nq,) [rad].
+        q_goal: goal, shape (nq,) [rad].
+        least: duration of our motion, below which theirs are slowed down [s].
+        ours: objective of our motion [J].
+        deadline: time at which the planning ends at the latest.
+
+    Raises:
+        DeadlinePassed: the watched deadline passed.
     """
-    prepared, deadline = state.prepared, state.deadline
-    limits = prepared.problem.arm.active_limits
+    arm = prepared.problem.arm
+    limits = arm.active_limits
     planned = prepared.surroundings.planned_paths(
-        best.q_start,
-        best.q_goal,
+        q_start,
+        q_goal,
         deadline.within(WAYPOINTS.time_share * deadline.left),
         effort=WAYPOINTS.effort,
     )
-    paths = planned.ending_at(best.q_goal)
+    paths = planned.ending_at(q_goal)
     if not paths:
-        return {}
+        return []
     legs = [straight(limits, a, b) for a, b in pairwise(paths[0])]
-    found: dict[BaselineName, SampledMotion] = {}
-    if len(legs) > 1 or not has_straight:
-        found["waypoints"] = in_a_row(legs)
+    motions: dict[BaselineName, SampledMotion] = {"waypoints": in_a_row(legs)}
     smooth = smooth_path(prepared, paths[0])
     if smooth is not None:
-        found["blended"] = _samples_of(without_rest(smooth.control_points, limits.rates))
-    slowed = {name: _slowed(prepared, motion, best.duration) for name, motion in found.items()}
-    return {name: motion for name, motion in slowed.items() if state.allows(motion.duration)}
-
-
-def _baseline(
-    state: SearchState, best: Candidate, name: BaselineName, motion: SampledMotion
-) -> Baseline:
-    prepared, problem = state.prepared, state.problem
-    assert best.energy is not None
-    tau = prepared.torques(motion.q, motion.v, motion.a)
-    held = standing(problem.arm, best.q_goal, prepared.torques)
-    (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
-    return compared(problem, name, motion, tau, held, best.energy, prepared.potential, broken)
+        motions["blended"] = _samples_of(without_rest(smooth.control_points, limits.rates))
+    held, found = standing(arm, q_goal, prepared.torques), list[Baseline]()
+    for name, given in motions.items():
+        motion = _slowed(prepared, given, least)
+        tau = prepared.torques(motion.q, motion.v, motion.a)
+        (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
+        found.append(
+            compared(prepared.problem, name, motion, tau, held, ours, prepared.potential, broken)
+        )
+    return found
 
 
 def in_a_row(legs: Sequence[SampledMotion]) -> SampledMotion:

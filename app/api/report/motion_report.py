@@ -93,15 +93,16 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     kind = "" if objective == "electrical" else " of mechanical work"
     length = cycle_time(bundle)
     waits = length > answer["duration"] and objective == "electrical"
-    wait = f", with the wait until {digits(length)} s" if waits else ""
+    wait, within = f", with the wait until {digits(length)} s" if waits else "", ""
     if held := waiting(bundle):
+        within = " in this time"
         wait = f" and, with the wait until {digits(length)} s, *{digits(total + held)} J a cycle*"
     first = (
         f"One {word}{stops} needs *{digits(total)} J{kind}* in {digits(answer['duration'])} s{wait}"
     )
-    best = nearest_rival(answer)
+    best = nearest_rival(answer, length if length > answer["duration"] else None)
     if best is None:
-        claim = ". No usual way is known that keeps every limit: no saving is claimed."
+        claim = f". No usual way is known that keeps every limit{within}: no saving is claimed."
     elif best["saving"] < -EQUAL:
         more = percent(-_share(answer, best, held))
         name, time = rival_name(best), digits(best["duration"])
@@ -191,7 +192,8 @@ def _broken(rival: dict[str, Any]) -> str:
 
 
 def _rivals_note(bundle: Bundle) -> str:
-    best = nearest_rival(bundle.answer)
+    length = cycle_time(bundle)
+    best = nearest_rival(bundle.answer, length if length > bundle.answer["duration"] else None)
     rule = (
         "A saving is claimed only against a way that keeps every limit, in the same time: the "
         "shorter of both waits, and its wait is priced. Hatched: no saving."

@@ -46,6 +46,8 @@ LIMITS = {
 }
 EQUAL = 0.0005
 """Largest saving that is none, to the digit after the point that is written."""
+_AS_FAST = 1.05
+"""Ratio of a rival's duration to the answer's up to which it is about as fast."""
 _LEAST_PART = 0.003
 """Least share of the energy of a part with a line of its own."""
 _FULLY = 0.99
@@ -57,10 +59,17 @@ def rival_name(rival: Mapping[str, Any]) -> str:
     return _RIVALS.get(name, name)
 
 
-def nearest_rival(answer: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The rival within the limits with the least saving."""
+def nearest_rival(answer: Mapping[str, Any], period: float | None = None) -> dict[str, Any] | None:
+    """The rival within the limits with the least saving.
+
+    It is one that fits into the period [s]; without a period, one that is about as fast as the
+    answer, or any where none is.
+    """
     claimed = [each for each in answer["baselines"] if each["saving"] is not None]
-    return min(claimed, key=lambda each: float(each["saving"]), default=None)
+    time = _AS_FAST * answer["duration"] if period is None else period
+    fast = [each for each in claimed if each["duration"] <= time]
+    found = fast if fast or period is not None else claimed
+    return min(found, key=lambda each: float(each["saving"]), default=None)
 
 
 def saved(saving: float) -> str:

@@ -12,14 +12,25 @@ import pytest
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
+from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.motion.ruckig_motion import straight
 from joulepath.optimizer.motion.spline import peak_rates, sample
 from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.result.baseline import Baseline
+from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import standing
 from joulepath.optimizer.search.run import Run
-from joulepath.optimizer.search.waypoint_baselines import in_a_row, waypoint_baselines, without_rest
+from joulepath.optimizer.search.waypoint_baselines import (
+    along_waypoints,
+    in_a_row,
+    waypoint_baselines,
+    without_rest,
+)
 from tests.app.live import ROOT
 from tests.optimizer.moves import AMPLE, GOAL, START, changed, fixed, problem
 
@@ -105,3 +116,36 @@ def test_a_motion_without_rest_uses_a_limit_and_keeps_them_all() -> None:
     assert (np.abs(np.diff(a, axis=0)).max(axis=0) / t[1] <= LIMITS.j_max * (1 + BETWEEN)).all()
     even = without_rest(points, LIMITS.rates * np.array([[1], [1], [1e6]]))
     assert even.duration < motion.duration
+
+
+def test_a_cycle_past_an_obstacle_has_ways_in_times_of_their_own() -> None:
+    """There and back around the post: each way is the sum of its moves and the rests."""
+    task = example("over_a_post")
+    cycle = Cycle(
+        arm=task.arm,
+        start=task.start,
+        stops=[Stop(name="there", target=task.goal, dwell=0.2)],
+        deadline=AMPLE,
+    )
+    found = plan_cycle(cycle, progress=False)
+    ways = {each.name: each for each in found.baselines}
+    rests = sum(move.dwell_energy for move in found.moves)
+    for name in ("waypoints", "blended"):
+        parts = [
+            next(each for each in _ways(move.solution, task) if each.name == name)
+            for move in found.moves
+        ]
+        assert ways[name].within_limits and ways[name].duration > found.duration
+        own = sum(each.duration for each in parts) + cycle.dwell_time
+        assert ways[name].duration == pytest.approx(own, rel=ON_A_LIMIT)
+        joules = rests + sum(each.electrical for each in parts)
+        assert ways[name].electrical == pytest.approx(joules, rel=ON_A_LIMIT)
+        saving = ways[name].saving
+        assert saving is not None and saving < 1 - found.energy.electrical.total / joules
+
+
+def _ways(move: Solution, task: Problem) -> list[Baseline]:
+    """The ways of a move of the cycle, computed by themselves."""
+    ends = move.start.q, move.goal.q
+    prepared = PreparedProblem.of(changed(task, start=ends[0], goal=ends[1]))
+    return along_waypoints(prepared, *ends, move.duration, 0.0, NEVER)
