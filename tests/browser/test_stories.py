@@ -20,7 +20,7 @@ from joulepath.app.api.report.check import checked
 from joulepath.app.api.report.numbers import digits
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.registry import load_robot
-from tests.app.live import Server
+from tests.app.live import ROOT, Server
 from tests.browser.pages import (
     FIRST,
     SHOWN,
@@ -40,6 +40,7 @@ pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 ROBOT = load_robot("ur5e")
 PENDANT = {"start": "-420.0 280.0 300.0 0.000 3.142 0.000", "goal": "-350 -420 350 2.221 -2.221 0"}
 """Poses as a teach pendant shows them: mm, and RX RY RZ in radians."""
+SAME = 0.01  # relative; two searches for one motion
 RADIANS = "pose in mm and RX RY RZ in rad"
 
 
@@ -142,12 +143,18 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
         page.locator("[data-row='/stops/0/target'] input").nth(1).focus()
         page.get_by_role("radio", name="takes").click()
         type_into(page, "/stops/0/payload/mass", "2")
+        page.get_by_text("Centre and shape").click()
+        page.get_by_label("Shape of the payload").select_option("box")
+        type_into(page, "/stops/0/payload/shape/size/2", "60")
         type_into(page, "/stops/0/dwell", "0.3")
         page.locator("[data-row='/stops/1/target'] input").nth(1).focus()
         page.get_by_role("radio", name="puts down").click()
         optimised(page)
         legs = state(page, "answered.cycle.legs")
         expect(page.locator("#legs tbody tr")).to_have_count(len(legs))
+        carried = state(page, "answered.asked.stops")[0]["payload"]
+        assert carried["shape"]["size"] == [0.06, 0.06, 0.06] and carried["mass"] == 2
+        expect(page.locator("#notes")).not_to_contain_text("has no shape")
         total = sum(leg["electrical"] for leg in legs)
         assert float(page.locator("#joules").inner_text().split()[0]) == pytest.approx(
             total, rel=0.01
@@ -206,6 +213,32 @@ def test_a_researcher_brings_an_own_arm(browser: Browser, service: Server, tmp_p
         go(page, "Library")
         page.get_by_role("button", name="Delete two_joints").click()
         expect(page.get_by_role("region", name="Your robots")).not_to_contain_text("two_joints")
+
+
+def test_a_researcher_takes_a_front(browser: Browser, service: Server) -> None:
+    """The least energy of each duration, as a table whose least one is the answer."""
+    lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
+    asked = {name: value for name, value in lift.items() if name not in ("points", "duration")}
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        fill_json(page, asked)
+        optimised(page)
+        own = state(page, "answered.solution")
+        page.get_by_role("tab", name="Energy over time").click()
+        page.locator("#compute-front").click()
+        with page.expect_download() as download:
+            page.locator("#front-csv").click()
+        rows = list(csv.DictReader(io.StringIO(Path(download.value.path()).read_text())))
+        energies = [float(row["energy_J"]) for row in rows]
+        assert len(rows) == page.locator("#front .point").count() > 1
+        assert [float(row["duration_s"]) for row in rows] == sorted(
+            float(row["duration_s"]) for row in rows
+        )
+        assert min(energies) == pytest.approx(own["energy"]["electrical"]["total"], rel=SAME)
+        fastest = page.locator("#front .point").first
+        expect(fastest).to_have_attribute(
+            "title", re.compile(rf"{float(rows[0]['duration_s']):.3g} s")
+        )
 
 
 def test_figures_older_than_the_cell_are_marked(page: Page) -> None:

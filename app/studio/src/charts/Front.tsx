@@ -5,6 +5,7 @@ import { Button } from "../ui/Button";
 import { style } from "../ui/style";
 import { get } from "../store/client";
 import { compute, showAnswer } from "../store/run";
+import { save } from "../store/share";
 import { answered, run, stale } from "../store/state";
 import { trying } from "../store/trouble";
 import type { ApiRequest } from "../store/types";
@@ -27,6 +28,11 @@ async function ask(): Promise<void> {
   const answer = (await compute("pareto", body, deadline)) as { points: Point[] } | null;
   if (answer) front.value = { points: answer.points, asked };
 }
+
+const csvOf = (points: Point[]) =>
+  ["duration_s,energy_J", ...points.map(({ duration, energy }) => `${duration},${energy}`)].join(
+    "\n",
+  );
 
 const load = async (path: string) => {
   const { asked } = front.value!;
@@ -115,7 +121,16 @@ function Drawn({ points, own }: { points: Point[]; own: { duration: number; ener
         options={{ x, y, height: 7.6 }}
         over={over}
       />
-      <p class="hint">J over s. The large point is shown; click another to load it.</p>
+      <p class="hint">
+        J over s. The large point is shown; click another to load it.{" "}
+        <Button
+          kind="link"
+          id="front-csv"
+          onClick={() => save("front.csv", csvOf(points), "text/csv")}
+        >
+          CSV
+        </Button>
+      </p>
     </div>
   );
 }

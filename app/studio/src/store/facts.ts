@@ -53,4 +53,12 @@ export const postureWords = (label: string) =>
     .map((part) => words(part))
     .join(", ");
 
-export const plain = (text: string) => text.replaceAll("`", "");
+// fields that the service names in a sentence, in the words of the panel
+const NAMED: Record<string, string> = {
+  "`payload.shape`": "“Centre and shape” of the payload",
+  "`tool.capsules`": "the capsules of the tool",
+};
+
+/** A sentence of the service without its marks of code. */
+export const plain = (text: string) =>
+  text.replace(/`[a-z.]+`/g, (field) => NAMED[field] ?? field).replaceAll("`", "");

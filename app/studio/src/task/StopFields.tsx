@@ -4,6 +4,7 @@ import { at, put, type Pointer } from "../store/pointer";
 import { isObject } from "../store/request";
 import { edit, request } from "../store/state";
 import type { Stop } from "../store/types";
+import { PayloadFields } from "./PayloadFields";
 
 type Deed = "same" | "takes" | "puts" | "passes";
 
@@ -81,24 +82,19 @@ export function StopFields({ pointer }: { pointer: Pointer }) {
         onChange={(next) => edit(put(request.value, pointer, withDeed(stop as Stop, next)))}
       />
       {deed === "takes" && (
-        <div class="field">
-          <span>what weighs</span>
-          <NumberCell
-            label="Payload mass"
-            pointer={`${pointer}/payload/mass`}
-            value={at(request.value, `${pointer}/payload/mass`)}
-            unit="kg"
-            withUnit
-          />
-          <span>centre Z</span>
-          <NumberCell
-            label="Centre of mass Z"
-            pointer={`${pointer}/payload/com/2`}
-            value={at(request.value, `${pointer}/payload/com/2`) ?? 0}
-            unit="mm"
-            withUnit
-          />
-        </div>
+        <>
+          <div class="field">
+            <span>what weighs</span>
+            <NumberCell
+              label="Payload mass"
+              pointer={`${pointer}/payload/mass`}
+              value={at(request.value, `${pointer}/payload/mass`)}
+              unit="kg"
+              withUnit
+            />
+          </div>
+          <PayloadFields pointer={`${pointer}/payload`} />
+        </>
       )}
       {deed !== "passes" && (
         <>

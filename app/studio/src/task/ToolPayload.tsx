@@ -6,9 +6,10 @@ import { untyped } from "../picture/drag";
 import { at, join, put } from "../store/pointer";
 import { isObject, listOf, sixOf, withNumber } from "../store/request";
 import { edit, request } from "../store/state";
-import type { Payload, Pose, Shape, Tool } from "../store/types";
+import type { Pose, Tool } from "../store/types";
 import { figure } from "../store/units";
 import { dressed, toolNow } from "../store/tools";
+import { PayloadFields } from "./PayloadFields";
 import { PoseCells } from "./PoseCells";
 import { ToolPicker } from "./ToolPicker";
 
@@ -69,7 +70,7 @@ export function ToolPayload() {
           {figure(mass)} kg is more than a {robotNow.value?.title} may carry ({rated} kg).
         </p>
       )}
-      {isObject(asked.payload) && <PayloadFields payload={asked.payload as Payload} />}
+      {isObject(asked.payload) && <PayloadFields pointer="/payload" />}
       <Errors under="/tool" />
       <Errors under="/tcp" />
       <Errors under="/payload" />
@@ -159,67 +160,5 @@ function Capsules() {
         Add a capsule around the tool
       </Button>
     </>
-  );
-}
-
-const SHAPES: Record<string, Shape | null> = {
-  none: null,
-  box: { shape: "box", size: [0.06, 0.06, 0.1] },
-  cylinder: { shape: "cylinder", radius: 0.03, length: 0.1 },
-  sphere: { shape: "sphere", radius: 0.04 },
-};
-
-function PayloadFields({ payload }: { payload: Payload }) {
-  const shape = isObject(payload.shape) ? payload.shape : null;
-  const choose = (name: string) => {
-    const next = SHAPES[name];
-    // about the centre of mass
-    const placed = next
-      ? { ...next, pose: { position: payload.com ?? [0, 0, 0], rotvec: [0, 0, 0] } }
-      : null;
-    edit(put(request.value, "/payload", { ...payload, shape: placed }), untyped("/payload/shape"));
-  };
-  const cell = (name: string, pointer: string) => (
-    <NumberCell label={name} pointer={pointer} value={at(request.value, pointer) ?? 0} unit="mm" />
-  );
-  return (
-    <details class="fold">
-      <summary>
-        <span class="fold-name">Centre and shape</span>
-      </summary>
-      <div class="field">
-        <span>Centre of mass, mm</span>
-        {["X", "Y", "Z"].map((axis, k) => cell(`Centre of mass ${axis}`, `/payload/com/${k}`))}
-      </div>
-      <div class="field">
-        <span>Shape</span>
-        <select
-          aria-label="Shape of the payload"
-          value={shape ? (String(shape.shape) in SHAPES ? String(shape.shape) : "other") : "none"}
-          onChange={(event) => choose(event.currentTarget.value)}
-        >
-          {Object.keys(SHAPES).map((name) => (
-            <option key={name}>{name}</option>
-          ))}
-          {shape && !(String(shape.shape) in SHAPES) && (
-            <option value="other">{String(shape.shape)}, see JSON</option>
-          )}
-        </select>
-        {shape?.shape === "box" &&
-          ["X", "Y", "Z"].map((axis, k) =>
-            cell(`Payload size ${axis}`, `/payload/shape/size/${k}`),
-          )}
-        {shape && "radius" in shape && cell("Payload radius", "/payload/shape/radius")}
-        {shape && "length" in shape && cell("Payload length", "/payload/shape/length")}
-      </div>
-      {shape && (
-        <div class="field">
-          <span>Its middle at, mm</span>
-          {["X", "Y", "Z"].map((axis, k) =>
-            cell(`Payload middle ${axis}`, `/payload/shape/pose/position/${k}`),
-          )}
-        </div>
-      )}
-    </details>
   );
 }
