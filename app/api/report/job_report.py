@@ -131,7 +131,7 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
                 ratios[name] / most,
                 saved(1 - ours / theirs),
                 True,
-                saves=ours < theirs,
+                saves=1 - ours / theirs >= EQUAL,
             )
             for name, (count, theirs, ours) in sorted(
                 found.items(), key=lambda each: (each[0] != "nearest", -each[1][0])

@@ -178,7 +178,7 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
                 max(each[objective] / most, 0.0),
                 _broken(each) if each["saving"] is None else saved(each["saving"]),
                 each["saving"] is not None,
-                saves=(each["saving"] or 0.0) > 0,
+                saves=(each["saving"] or 0.0) >= EQUAL,
             )
             for each in table
         ),

@@ -74,7 +74,9 @@ def nearest_rival(answer: Mapping[str, Any], period: float | None = None) -> dic
 
 def saved(saving: float) -> str:
     """A saving in words."""
-    return f"saves {percent(saving)}" if saving >= 0 else f"needs {percent(-saving)} less"
+    if abs(saving) < EQUAL:
+        return "needs as much"
+    return f"saves {percent(saving)}" if saving > 0 else f"needs {percent(-saving)} less"
 
 
 def above_least(subject: str, total: float, bound: float) -> str:

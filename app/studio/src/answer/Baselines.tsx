@@ -8,6 +8,7 @@ import { baselineName, energyOf, nounOf } from "../store/facts";
 import { advised } from "./advice";
 
 const FEW = 1; // of those that break a limit, which are shown at once
+const EQUAL = 0.0005; // greatest saving that is none
 const WAITS = 1.01; // ratio of a way's time to the answer's above which the wait is worth a word
 
 /**
@@ -121,11 +122,15 @@ function Saving({ of: way }: { of: Baseline }) {
   const likely = interval
     ? `likely ${percent(interval.p5)} to ${percent(interval.p95)}`
     : undefined;
-  return saving > 0 ? (
-    <b class="good" title={likely}>
-      {percent(saving)}
-    </b>
-  ) : (
-    <span title={likely}>needs {percent(-saving)} less</span>
+  if (saving >= EQUAL)
+    return (
+      <b class="good" title={likely}>
+        {percent(saving)}
+      </b>
+    );
+  return (
+    <span title={likely}>
+      {saving > -EQUAL ? "needs as much" : `needs ${percent(-saving)} less`}
+    </span>
   );
 }

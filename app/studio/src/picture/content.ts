@@ -145,12 +145,12 @@ export class Content {
   }
 
   private nameEnds(now: Pictured): void {
-    for (const [name, q] of [
-      ["Start", now.motion?.cycle ? null : now.start],
-      ["Goal", now.goal],
+    for (const [end, name, q] of [
+      ["start", "Start", now.motion?.cycle ? null : now.start],
+      ["goal", now.goalName, now.goal],
     ] as const) {
-      if (!q || !show.value.ghosts) this.labels.drop(name);
-      else this.labels.put(name, name, positionOf(this.tcpAt(q)), `end ${name.toLowerCase()}`);
+      if (!q || !show.value.ghosts) this.labels.drop(end);
+      else this.labels.put(end, name, positionOf(this.tcpAt(q)), `end ${end}`);
     }
   }
 

@@ -21,6 +21,8 @@ export interface Pictured {
   /** Where the arm stands, and where it is to go. */
   start: number[];
   goal: number[] | null;
+  /** The name of that place: a round being edited has stops. */
+  goalName: string;
 }
 
 /**
@@ -46,7 +48,8 @@ export const pictured = computed<Pictured | null>(() => {
     const { solution, robot, cell } = shown;
     const arms = [{ name: "this motion", solution, colour: 0xffffff }, ...racers.value];
     const { q } = solution.trajectory;
-    return { robot, cell, motion: shown, arms, start: q[0]!, goal: shown.cycle ? null : q.at(-1)! };
+    const goal = shown.cycle ? null : q.at(-1)!;
+    return { robot, cell, motion: shown, arms, start: q[0]!, goal, goalName: "Goal" };
   }
   const robot = robotNow.value;
   if (!robot) return null;
@@ -65,6 +68,7 @@ export const pictured = computed<Pictured | null>(() => {
     arms: [],
     start,
     goal: rows.length > 1 ? goal : null,
+    goalName: rows.at(-1)?.name ?? "Goal",
   };
 });
 
