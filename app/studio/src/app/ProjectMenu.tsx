@@ -36,7 +36,7 @@ export function ProjectMenu() {
           (project.value = { ...project.value, name: event.currentTarget.value || "Untitled cell" })
         }
       />
-      <Menu label="" name="Project" icon="down" quiet align="left" id="project">
+      <Menu label="" name="Project" icon="down" quiet id="project">
         <Button kind="quiet" icon="plus" onClick={create}>
           New cell
         </Button>

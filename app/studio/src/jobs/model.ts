@@ -99,6 +99,8 @@ export async function loadDetails(id: string): Promise<void> {
   if (opened.value?.job.id === id) opened.value = { ...opened.value, details };
 }
 
+const AS_FAST = 1.05; // ratio of a way's duration to the answer's up to which it is about as fast
+
 function keep(
   details: Map<number, Detail>,
   { index, result }: { index: number; result: Partial<Solution> | null },
@@ -107,12 +109,14 @@ function keep(
   const kept = (result.baselines ?? []).filter(
     (each) => each.within_limits && each.saving !== null,
   );
-  // the nearest of the ways that keep every limit
-  const [rival] = kept.sort((a, b) => a.electrical - b.electrical);
+  // the nearest of the ways that keep every limit, as in the report
+  const fast = kept.filter(({ duration }) => duration <= AS_FAST * result.duration!);
+  const [rival] = (fast.length ? fast : kept).sort((a, b) => a.saving! - b.saving!);
   details.set(index, {
     interval: result.energy.electrical.interval ?? null,
     rival: rival?.name ?? null,
-    rivalEnergy: rival?.electrical ?? null,
+    // in the same time: the shorter of both waits
+    rivalEnergy: rival ? result.energy.electrical.total / (1 - rival.saving!) : null,
     saving: rival?.saving ?? null,
   });
 }

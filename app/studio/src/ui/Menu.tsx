@@ -9,12 +9,11 @@ interface Props {
   name?: string;
   icon?: IconName;
   id?: string;
-  align?: "left" | "right";
   quiet?: boolean;
 }
 
 /** A list that opens below its button; a click elsewhere and Escape close it. */
-export function Menu({ label, children, name, icon, id, align = "right", quiet }: Props) {
+export function Menu({ label, children, name, icon, id, quiet }: Props) {
   const box = useRef<HTMLDetailsElement>(null);
   useEffect(() => {
     const away = (event: Event) => {
@@ -53,7 +52,7 @@ export function Menu({ label, children, name, icon, id, align = "right", quiet }
         {icon && <Icon name={icon} />}
         {label}
       </summary>
-      <div class={`drop ${align}`}>{children}</div>
+      <div class="drop">{children}</div>
     </details>
   );
 }
