@@ -78,6 +78,17 @@ def type_into(page: Page, pointer: str, text: str) -> None:
     cell.press("Enter")
 
 
+def new_cell(page: Page) -> None:
+    until(page, SHOWN)
+    page.locator("#project > summary").click()
+    page.get_by_role("button", name="New cell").click()
+
+
+def optimised(page: Page) -> None:
+    page.keyboard.press("Control+Enter")
+    until(page, "() => !studio.state.run && studio.state.answered && !studio.state.stale")
+
+
 def go(page: Page, name: str) -> None:
     """Opens a page of the studio by its name in the bar."""
     page.locator("nav.pages").get_by_role("button", name=name, exact=True).click()

@@ -11,7 +11,6 @@ import re
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
@@ -26,7 +25,9 @@ from tests.browser.pages import (
     SHOWN,
     fill_json,
     go,
+    new_cell,
     opened,
+    optimised,
     show_json,
     state,
     type_into,
@@ -51,12 +52,6 @@ def paste(page: Page, text: str, reading: str = RADIANS) -> None:
     page.locator("#readings").get_by_role("button", name=reading, exact=True).click()
 
 
-def new_cell(page: Page) -> None:
-    until(page, SHOWN)
-    page.locator("#project > summary").click()
-    page.get_by_role("button", name="New cell").click()
-
-
 def report(page: Page, kind: Literal["html", "pdf"]) -> bytes:
     """The report of what is shown, as a file."""
     names = {"html": "Page (HTML)", "pdf": "PDF, to print"}
@@ -64,11 +59,6 @@ def report(page: Page, kind: Literal["html", "pdf"]) -> bytes:
     with page.expect_download() as download:
         page.get_by_role("button", name=names[kind]).click()
     return Path(download.value.path()).read_bytes()
-
-
-def optimised(page: Page) -> None:
-    page.keyboard.press("Control+Enter")
-    until(page, "() => !studio.state.run && studio.state.answered && !studio.state.stale")
 
 
 def test_a_programmer_takes_a_program_to_the_controller(browser: Browser, service: Server) -> None:
@@ -241,118 +231,6 @@ def test_a_researcher_takes_a_front(browser: Browser, service: Server) -> None:
         )
 
 
-def test_figures_older_than_the_cell_are_marked(page: Page) -> None:
-    """The old motion is not drawn; undo brings the answer back; a reload loses nothing."""
-    fill_json(page, FIRST)
-    show_json(page, False)
-    optimised(page)
-    paths = "() => studio.view.parts.path.children.length"
-    assert page.evaluate(paths) == 1
-    type_into(page, "/goal/pose/position/2", "500")
-    type_into(page, "/payload/mass", "1.6")
-    expect(page.locator("#stale")).to_contain_text("Goal Z 450.0 mm → 500.0 mm")
-    expect(page.locator("#stale")).to_contain_text("Payload 0.800 kg → 1.600 kg")
-    expect(page.locator("#joules s")).to_have_count(1)
-    expect(page.locator("#export")).to_be_disabled()
-    expect(page.locator("#play")).to_be_disabled()
-    assert page.evaluate(paths) == 0
-    page.locator("#undo").click()
-    page.locator("#undo").click()
-    expect(page.locator("#stale")).to_have_count(0)
-    assert page.evaluate(paths) == 1
-    page.locator("#redo").click()
-    typed = page.locator("[data-pointer='/goal/pose/position/2']")
-    expect(typed).to_have_value("500")
-    expect(page.locator("#saved")).to_have_text("Saved in this browser")
-    page.reload()
-    until(page, "() => Boolean(window.studio?.state.answered)")
-    expect(typed).to_have_value("500")
-    expect(page.locator("#stale")).to_contain_text("Goal Z")
-    page.get_by_role("button", name="Undo it").click()
-    expect(page.locator("#stale")).to_have_count(0)
-
-
-def test_projects_are_named_saved_and_opened(
-    browser: Browser, service: Server, tmp_path: Path
-) -> None:
-    """In the browser, and as files."""
-    with opened(browser, f"{service.url}/studio") as page:
-        until(page, SHOWN)
-        page.get_by_label("Name of the project").fill("Night cell")
-        page.get_by_label("Name of the project").blur()
-        type_into(page, "/payload/mass", "1,25")
-        with page.expect_download() as download:
-            page.keyboard.press("Control+s")
-        file = tmp_path / "night.joulepath.json"
-        download.value.save_as(file)
-        assert json.loads(file.read_text())["typed"]["/payload/mass"] == "1,25"
-        new_cell(page)
-        assert state(page, "project.name") == "New cell"
-        page.locator("#project > summary").click()
-        page.locator("#open-file").set_input_files(file)
-        expect(page.locator("[data-pointer='/payload/mass']")).to_have_value("1,25")
-        page.locator("#project > summary").click()
-        page.get_by_role("button", name="Open a project").click()
-        page.get_by_label("Search projects").fill("New")
-        page.get_by_role("dialog").get_by_role("button", name="New cell").first.click()
-        assert state(page, "project.name") == "New cell"
-
-
-@pytest.mark.parametrize(
-    ("pointer", "text", "told"),
-    [
-        ("/goal/pose/position/0", "800000", "give it in metres"),
-        ("/goal/pose/position/2", "1400", "out of reach in this orientation"),
-        ("/payload/mass", "40", "more than a Universal Robots UR5e may carry"),
-        ("/scene/obstacles/0/pose/position/2", "200", "in collision"),
-    ],
-)
-def test_each_mistake_leads_to_a_sentence_at_its_field(
-    page: Page, pointer: str, text: str, told: str
-) -> None:
-    fill_json(page, FIRST)
-    show_json(page, False)
-    if pointer.startswith("/scene"):
-        page.locator("#scene").get_by_role("button", name="table", exact=False).first.click()
-    type_into(page, pointer, text)
-    page.locator("#optimise").click()
-    expect(page.locator("#form")).to_contain_text(told)
-    page.locator("#undo").click()
-
-
-def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) -> None:
-    """A sentence at the button; what was typed is answered when the service is there again."""
-    url = f"{service.url}/studio"
-    with opened(browser, url, tolerated="status of (4|504)|ERR_INTERNET_DISCONNECTED") as page:
-        until(page, SHOWN)
-        page.context.set_offline(True)
-        type_into(page, "/payload/mass", "1.6")
-        page.locator("#optimise").click()
-        expect(page.locator("#problem")).to_contain_text("Your work is saved here")
-        expect(page.locator("#problem")).to_contain_text("The service does not answer")
-        expect(page.locator("#saved")).to_have_text("Saved in this browser")
-        page.context.set_offline(False)
-        optimised(page)
-        assert state(page, "answered.asked.payload.mass") == 1.6
-        expect(page.locator("#problem")).to_have_count(0)
-
-
-def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
-    """What was typed stays, with a sentence, and nothing is computed until it is a number."""
-    fill_json(page, FIRST)
-    show_json(page, False)
-    cell = page.locator("[data-pointer='/payload/mass']")
-    type_into(page, "/payload/mass", "two")
-    expect(cell).to_have_value("two")
-    expect(cell).to_have_attribute("aria-invalid", "true")
-    assert state(page, "request.payload.mass") == FIRST["payload"]["mass"]
-    expect(page.locator("#optimise")).to_be_disabled()
-    expect(page.locator("#run-state")).to_contain_text("Enter a number")
-    type_into(page, "/payload/mass", "-1")
-    page.locator("#optimise").click()
-    expect(page.locator("#form")).to_contain_text("greater than or equal to 0")
-
-
 def test_an_engineer_takes_a_table_of_moves_overnight(
     browser: Browser, service: Server, tmp_path: Path
 ) -> None:
@@ -397,28 +275,6 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
         page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()
         until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.trouble)")
         expect(page.locator("[data-row='/goal']")).to_contain_text("out of reach")
-
-
-def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:
-    """It brings its TCP, its shape and its mass, with the letters of their sources."""
-    fill_json(page, {"start": FIRST["start"], "goal": FIRST["goal"], "payload": FIRST["payload"]})
-    show_json(page, False)
-    page.locator("#tool-fold > summary").click()
-    page.locator("#tool").select_option(label="Robotiq 2F-85")
-    assert state(page, "request.tool") == "robotiq_2f_85"
-    expect(page.locator("#tool-figures")).to_contain_text("0.900 kg C")
-    expect(page.locator("[data-pointer='/tcp/position/2']")).to_have_value("142.0")
-    optimised(page)
-    flange = np.array(page.evaluate("() => studio.view.arms[0].frames.at(-1)")).reshape(4, 4)
-    tcp = np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
-    assert np.linalg.norm(tcp[:3, 3] - flange[:3, 3]) == pytest.approx(0.142)
-    meshes = "() => studio.view.arms[0].links.at(-1).children.length"
-    assert page.evaluate(meshes) == 2, "the tool and the part"
-    type_into(page, "/tcp/position/2", "150")
-    assert state(page, "request.tcp.position") == [0, 0, 0.15]
-    page.locator("#undo").click()
-    page.locator("#tool").select_option("")
-    assert state(page, "request.tool") is None
 
 
 def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:
