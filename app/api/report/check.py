@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import orjson
@@ -129,7 +129,8 @@ def _moves_of(bundle: Bundle) -> list[tuple[str, Move, Json]]:
 def _placed_sums(bundle: Bundle) -> Iterator[Line]:
     """The cycles of a placement, and the energies of its places as sums of them."""
     for row in bundle.moves:
-        yield from _sums(of_cycle(bundle, row))
+        for line in _sums(of_cycle(bundle, row)):
+            yield replace(line, what=f"{line.what}, {row['place']} place")
     objective = bundle.answer["objective"]
     for place in dict.fromkeys(row["place"] for row in bundle.moves):
         parts = (

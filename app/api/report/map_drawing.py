@@ -109,7 +109,9 @@ def drawn_map(places: Sequence[Json], best: Json, nominal: Json | None) -> str:
     parts = [*_tiles(columns, at, (scale * pitch[0], scale * pitch[1]), energies)]
     parts += [_end(*at(place), name) for name, place in named.items()]
     foot = MAP.top + scale * tall
-    parts += _ruler(middle, foot, scale * wide, wide)
+    apart = wide - pitch[0]
+    if apart > 0:
+        parts += _ruler(middle + scale * pitch[0] / 2, foot, scale * apart, apart)
     legend = _Legend(foot + 36)
     parts += legend.drawn(columns, energies, named)
     return document(legend.y + MAP.row + 10, parts, MAP.width)
@@ -165,7 +167,7 @@ def _end(x: float, y: float, name: str) -> str:
 
 
 def _ruler(left: float, y: float, wide: float, metres: float) -> Iterator[str]:
-    """The width of the map, below it."""
+    """The distance of the outermost places along x, below the map."""
     yield (
         f'<path d="M{left:.1f} {y + 6:.1f}v6m0 -3H{left + wide:.1f}m0 -3v6" fill="none" '
         f'stroke="{DRAWING.grey}"/>'

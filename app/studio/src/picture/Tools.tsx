@@ -1,9 +1,10 @@
 import { Button } from "../ui/Button";
 import { Menu } from "../ui/Menu";
 import { alone } from "../store/alone";
+import { BASE } from "../store/placement";
 import { obstaclesListed, rowsOf } from "../store/request";
 import { placing, request, selected, show } from "../store/state";
-import { BASE, tool, type Tool } from "./drag";
+import { tool, type Tool } from "./drag";
 import { picture } from "./instance";
 
 const SHOWN: [keyof typeof show.value, string][] = [

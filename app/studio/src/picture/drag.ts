@@ -12,7 +12,7 @@ import {
   poseOfMatrix,
   type Matrix,
 } from "../store/chain";
-import { look, moveBase } from "../store/placement";
+import { BASE, look, moveBase } from "../store/placement";
 import { at, put } from "../store/pointer";
 import { solutionsOf } from "../store/reach";
 import { freshName, isObject, listOf, poseAt, rowsOf, targetAt, targetOf } from "../store/request";
@@ -27,9 +27,6 @@ const HEIGHT = 0.2; // of a box that is drawn [m]
 const ROUND = 1e4; // a tenth of a millimetre
 
 export type Tool = "look" | "move" | "turn" | "box";
-
-/** The base of the robot among what can be dragged. */
-export const BASE = "/base";
 
 export const tool = signal<Tool>("look");
 /** What the drag says. */

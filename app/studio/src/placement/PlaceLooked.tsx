@@ -1,8 +1,9 @@
+import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Section } from "../ui/Section";
-import { BASE, tool } from "../picture/drag";
+import { tool } from "../picture/drag";
 import { IDENTITY } from "../store/chain";
-import { accept, COORDINATES, look, mapShown, stopLooking, UNIT } from "../store/placement";
+import { accept, BASE, COORDINATES, look, mapShown, stopLooking, UNIT } from "../store/placement";
 import type { Coordinate } from "../store/placement";
 import { coordinatesOf, movedTo, worldOf } from "../store/places";
 import { energyOf } from "../store/facts";
@@ -15,6 +16,7 @@ import { robotNow } from "../picture/pictured";
 export function PlaceLooked() {
   const now = looked.value;
   const robot = robotNow.value;
+  const [wrong, setWrong] = useState<Coordinate | null>(null);
   if (!robot) return null;
   const world = worldOf(request.value, robot);
   const pose = now?.pose ?? IDENTITY;
@@ -22,6 +24,7 @@ export function PlaceLooked() {
   const values: Record<Coordinate, number> = { x: at[0], y: at[1], z: at[2], yaw };
   const go = (name: Coordinate, text: string) => {
     const value = typedValue(text, UNIT[name]);
+    setWrong(value === null ? name : null);
     if (value === null) return;
     const next = { ...values, [name]: value };
     trying(() => look(movedTo(pose, world, { at: [next.x, next.y, next.z], yaw: next.yaw })))();
@@ -52,6 +55,7 @@ export function PlaceLooked() {
               type="text"
               inputMode="decimal"
               aria-label={`Base ${name} in ${UNITS[UNIT[name]].sign}`}
+              aria-invalid={wrong === name ? "true" : undefined}
               value={shown(values[name], UNIT[name])}
               onChange={(event) => go(name, event.currentTarget.value)}
               onKeyDown={(event) => event.key === "Enter" && event.currentTarget.blur()}
@@ -59,6 +63,11 @@ export function PlaceLooked() {
           </label>
         ))}
       </div>
+      {wrong && (
+        <p class="error" role="alert">
+          Enter a number: {wrong}.
+        </p>
+      )}
       <p role="status" id="place-joules">
         {joules()}
       </p>
@@ -67,7 +76,7 @@ export function PlaceLooked() {
           <Button
             id="accept-place"
             kind={now.state === "shown" ? "primary" : undefined}
-            disabled={now.state === "moving" || now.state === "computing"}
+            disabled={now.state !== "shown"}
             onClick={accept}
           >
             Accept this place

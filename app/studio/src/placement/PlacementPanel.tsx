@@ -2,11 +2,10 @@ import { Button } from "../ui/Button";
 import { Icon } from "../ui/icons";
 import { Note } from "../ui/Note";
 import { ReportMenu } from "../ui/ReportMenu";
-import { bestPose, COORDINATES, look, mapChanges, mapped, UNIT } from "../store/placement";
+import { bestPose, close, COORDINATES, look, mapChanges, mapped, UNIT } from "../store/placement";
 import { coordinatesOf, REASONS } from "../store/places";
 import { plain } from "../store/facts";
 import { reportPlaces } from "../store/report";
-import { placing } from "../store/state";
 import { trying } from "../store/trouble";
 import { figure, percent, shown, UNITS } from "../store/units";
 import { MapTable } from "./MapTable";
@@ -20,7 +19,7 @@ export function PlacementPanel() {
       <div class="panel-head">
         <h2>Where to put the robot</h2>
         <span class="space" />
-        <Button kind="quiet" icon="close" label="Close" onClick={() => (placing.value = false)} />
+        <Button kind="quiet" icon="close" label="Close" onClick={close} />
       </div>
       <PlaceLooked />
       <Found />
@@ -111,7 +110,7 @@ function Found() {
         <Button small disabled={stale} onClick={trying(() => look(bestPose(map)))} id="look-best">
           Look at the best place
         </Button>
-        {!stale && <ReportMenu write={reportPlaces} />}
+        {!stale && <ReportMenu write={reportPlaces} id="report-places" />}
       </div>
     </section>
   );

@@ -6,14 +6,17 @@ import { COORDINATES, refused, regionOf, regionTyped, search, UNIT } from "../st
 import type { Coordinate } from "../store/placement";
 import { MOUNTS, type Mount } from "../store/places";
 import { lackOf } from "../store/request";
-import { looked, request, run } from "../store/state";
+import { kind, looked, request, run } from "../store/state";
 import { UNITS } from "../store/units";
 
 /** Where the base may be moved, and the button that searches. */
 export function RegionFields() {
   const given = regionTyped.value;
   const checked = regionOf(given, 0);
-  const why = lackOf(request.value)?.text ?? ("why" in checked ? checked.why : null);
+  const why =
+    kind.value === "path"
+      ? "A path is placed as a stop of a round: choose Round."
+      : (lackOf(request.value)?.text ?? ("why" in checked ? checked.why : null));
   const running = run.value?.endpoint === "placement";
   const set = (next: Partial<typeof given>) => (regionTyped.value = { ...given, ...next });
   const mount = (name: Mount, on: boolean) =>

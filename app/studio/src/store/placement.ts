@@ -19,12 +19,16 @@ import {
   project,
   request,
   run,
+  selected,
   toast,
   typed,
   type Looked,
 } from "./state";
 import type { ApiRequest } from "./types";
 import { asShown, typedValue, type UnitName } from "./units";
+
+/** The base of the robot among what can be dragged. */
+export const BASE = "/base";
 
 /** The region as it is typed: from where to where the base may be moved. */
 export interface RegionTyped {
@@ -179,6 +183,7 @@ export async function moveBase(pose: Matrix): Promise<Looked> {
 export const stopLooking = () => (looking.value = null);
 
 const SAME = 1e-9; // distance of two poses that are one
+let computing = 0; // looks whose joules are awaited; a new one ends those before
 
 /** Puts the base somewhere, and shows what the task needs there. */
 export async function look(pose: Matrix): Promise<void> {
@@ -189,8 +194,10 @@ export async function look(pose: Matrix): Promise<void> {
     if (looking.value?.pose === pose) looking.value = { ...looking.value, ...more };
   };
   if (known?.reason) return next({ state: "failed", why: `${capital(REASONS[known.reason])}.` });
-  if (run.value?.endpoint === "placement") return undefined;
+  if (run.value && !computing)
+    return next({ state: "failed", why: "Something else is being computed: wait, or cancel it." });
   next({ state: "computing", energy: known?.energy ?? null });
+  computing += 1;
   try {
     const found = await motionAt(now, map);
     next(
@@ -200,6 +207,8 @@ export async function look(pose: Matrix): Promise<void> {
     );
   } catch (error) {
     next({ state: "failed", energy: null, why: said(error) });
+  } finally {
+    computing -= 1;
   }
 }
 
@@ -220,14 +229,20 @@ async function motionAt({ asked, robot, pose }: Looked, map: Mapped | null) {
   return answeredBy(answer, there, null);
 }
 
+/** Closes the panel; the base can no longer be dragged. */
+export function close(): void {
+  placing.value = false;
+  looking.value = null;
+  if (selected.value === BASE) selected.value = null;
+}
+
 /** Writes the place that is looked at into the task, as one step of undo. */
 export function accept(): void {
   const now = looked.value;
   if (!now) return;
   batch(() => {
     edit(seenFrom(now.asked, now.pose, now.robot), typed.value);
-    looking.value = null;
-    placing.value = false;
+    close();
     toast.value = "All poses are seen from the new place of the base now.";
   });
 }
