@@ -16,7 +16,17 @@ from playwright.sync_api import Browser, Page, expect
 
 from joulepath.models.registry import load_robot
 from tests.app.live import ANSWER, GRACE, ROOT, serving
-from tests.browser.pages import FIRST, MESHES, SHOWN, ask, go, opened, type_into, until
+from tests.browser.pages import (
+    FIRST,
+    MESHES,
+    SHOWN,
+    ask,
+    go,
+    opened,
+    search_places,
+    type_into,
+    until,
+)
 from tests.browsers import SOFTWARE, chromium
 from tests.identification_logs import csv_of, recorded, truth_of
 
@@ -100,14 +110,7 @@ def of_places(page: Page) -> None:
     """The map of a round between two tables, at its best place."""
     page.get_by_label("Name of the project").fill("Two tables")
     ask(page, json.loads((ROOT / "examples/placement/two_tables.json").read_text())["cycle"])
-    page.locator("#place-robot").click()
-    region = page.locator("#region")
-    for name in ("x", "y"):
-        region.get_by_label(f"{name} from in mm").fill("-300")
-        region.get_by_label(f"{name} to in mm").fill("300")
-    region.get_by_label("Distance of places").fill("100")
-    region.get_by_label("Time to search").fill("120")
-    page.locator("#search-places").click()
+    search_places(page, 300, 120)
     until(page, "() => studio.state.looked?.state === 'shown'", 2 * ANSWER)
     page.locator("#scrub").fill("1.3")
     page.mouse.move(0, 0)

@@ -19,7 +19,17 @@ from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import members
 from tests.app.live import ROOT, Server
-from tests.browser.pages import SHOWN, ask, fill_json, findings, opened, show_json, state, until
+from tests.browser.pages import (
+    SHOWN,
+    ask,
+    fill_json,
+    findings,
+    opened,
+    search_places,
+    show_json,
+    state,
+    until,
+)
 from tests.browsers import BROWSER, MISSING
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
@@ -105,14 +115,7 @@ def found(browser: Browser, service: Server) -> Iterator[Page]:
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         ask(page, ROUND)
-        open_panel(page)
-        region = page.locator("#region")
-        for name in ("x", "y"):
-            region.get_by_label(f"{name} from in mm").fill("-100")
-            region.get_by_label(f"{name} to in mm").fill("100")
-        region.get_by_label("Distance of places").fill("100")
-        region.get_by_label("Time to search").fill("30")
-        page.locator("#search-places").click()
+        search_places(page, 100, 30)
         expect(page.locator("#progress-text")).to_contain_text("s left")
         until(page, "() => studio.state.mapShown")
         until(page, LOOKED)

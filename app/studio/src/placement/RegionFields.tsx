@@ -18,9 +18,10 @@ export function RegionFields() {
       ? "A path is placed as a stop of a round: choose Round."
       : (lackOf(request.value)?.text ?? ("why" in checked ? checked.why : null));
   const running = run.value?.endpoint === "placement";
-  const set = (next: Partial<typeof given>) => (regionTyped.value = { ...given, ...next });
-  const mount = (name: Mount, on: boolean) =>
-    set({ mounts: MOUNTS.filter((each) => (each === name ? on : given.mounts.includes(each))) });
+  const mount = (name: Mount, on: boolean) => {
+    const mounts = MOUNTS.filter((each) => (each === name ? on : given.mounts.includes(each)));
+    regionTyped.value = { ...given, mounts };
+  };
   return (
     <Section title="Where it may stand" note="moved from where it stands now" id="region">
       {COORDINATES.map((name) => (
@@ -39,29 +40,8 @@ export function RegionFields() {
           </label>
         ))}
       </fieldset>
-      <label class="field">
-        <span>Distance of places</span>
-        <input
-          type="text"
-          inputMode="decimal"
-          class="short"
-          placeholder="auto"
-          value={given.step}
-          onInput={(event) => set({ step: event.currentTarget.value })}
-        />{" "}
-        mm
-      </label>
-      <label class="field">
-        <span>Time to search</span>
-        <input
-          type="text"
-          inputMode="decimal"
-          class="short"
-          value={given.deadline}
-          onInput={(event) => set({ deadline: event.currentTarget.value })}
-        />{" "}
-        s
-      </label>
+      <Amount text="Distance of places" field="step" sign="mm" empty="auto" />
+      <Amount text="Time to search" field="deadline" sign="s" />
       {refused.value && <Note kind="error">{refused.value}</Note>}
       {running ? (
         <Progress />
@@ -120,5 +100,34 @@ function Range({ name }: { name: Coordinate }) {
       </label>
       {end(low, "from", (text) => [text, high])} to {end(high, "to", (text) => [low, text])} {sign}
     </div>
+  );
+}
+
+/** A number of the search with its unit. */
+function Amount({
+  text,
+  field,
+  sign,
+  empty,
+}: {
+  text: string;
+  field: "step" | "deadline";
+  sign: string;
+  empty?: string;
+}) {
+  const given = regionTyped.value;
+  return (
+    <label class="field">
+      <span>{text}</span>
+      <input
+        type="text"
+        inputMode="decimal"
+        class="short"
+        placeholder={empty}
+        value={given[field]}
+        onInput={(event) => (regionTyped.value = { ...given, [field]: event.currentTarget.value })}
+      />{" "}
+      {sign}
+    </label>
   );
 }
