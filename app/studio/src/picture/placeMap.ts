@@ -7,7 +7,7 @@ import { inverse } from "../store/chain";
 import { bestPose, layer, look, mapShown, type Mapped } from "../store/placement";
 import { columnsOf, coordinatesOf, energiesOf, pitchOf, placeName } from "../store/places";
 import type { Place, Reason } from "../store/places";
-import { toast } from "../store/state";
+import { placing, toast } from "../store/state";
 import { figure } from "../store/units";
 import { dark } from "../ui/dark";
 import { empty } from "./content";
@@ -80,6 +80,8 @@ export class PlaceMap {
       this.view.eye.hold(this.group);
       this.view.look(OVERVIEW);
     }
+    // the cell is drawn anew first
+    if (this.shown && !placing.value) queueMicrotask(() => this.view.look(1));
     this.shown = map;
     this.view.draw();
   }
