@@ -75,7 +75,7 @@ PAGE = ROOT / "app" / "studio" / "src"
 MOST_PAGE_LINES = 250  # of a file of the studio page
 PAGE_FLOORS = (
     ("app",),
-    ("answer", "export", "jobs", "library", "logs", "task"),
+    ("answer", "export", "jobs", "library", "logs", "placement", "task"),
     ("charts",),
     ("picture",),
     ("ui",),

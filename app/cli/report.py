@@ -86,11 +86,12 @@ def report(
     no_advice: bool,
     **costs: Any,
 ) -> None:
-    """Writes one page on a motion or a cycle: energy, savings, costs, and what they rest on.
+    """Writes one page on a motion, a cycle or a placement: energy, savings, costs, and what they
+    rest on.
 
-    FILE is the JSON of `POST /optimize`, of `POST /cycle`, or of `POST /evaluate` with a `log`; a
-    log as CSV, plain or packed with gzip; `{"job": ID}` with a job of the database; or - for
-    standard input. PDF needs the extra `report` of the package.
+    FILE is the JSON of `POST /optimize`, of `POST /cycle`, of `POST /placement`, or of `POST
+    /evaluate` with a `log`; a log as CSV, plain or packed with gzip; `{"job": ID}` with a job of
+    the database; or - for standard input. PDF needs the extra `report` of the package.
     """
     from joulepath.app.api.report.request import ReportRequest
     from joulepath.app.api.report.task import ReportTask
@@ -138,7 +139,8 @@ def _whole(body: bytes, beside: bytes) -> bytes:
         names = set()
     if names == {"job"}:
         return body[:-1] + b"," + beside
-    kind = "cycle" if "stops" in names else "evaluate" if "log" in names else "optimize"
+    marks = {"stops": "cycle", "log": "evaluate", "region": "placement", "moves": "placement"}
+    kind = next((kind for mark, kind in marks.items() if mark in names), "optimize")
     return b'{"%b":%b,%b' % (kind.encode(), body, beside)
 
 

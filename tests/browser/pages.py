@@ -89,6 +89,18 @@ def optimised(page: Page) -> None:
     until(page, "() => !studio.state.run && studio.state.answered && !studio.state.stale")
 
 
+def search_places(page: Page, half: int, seconds: int) -> None:
+    """Searches for a place of the robot, up to `half` [mm] along x and y, at every 100 mm."""
+    page.locator("#place-robot").click()
+    region = page.locator("#region")
+    for name in ("x", "y"):
+        region.get_by_label(f"{name} from in mm").fill(f"-{half}")
+        region.get_by_label(f"{name} to in mm").fill(f"{half}")
+    region.get_by_label("Distance of places").fill("100")
+    region.get_by_label("Time to search").fill(f"{seconds}")
+    page.locator("#search-places").click()
+
+
 def go(page: Page, name: str) -> None:
     """Opens a page of the studio by its name in the bar."""
     page.locator("nav.pages").get_by_role("button", name=name, exact=True).click()

@@ -15,8 +15,18 @@ from pathlib import Path
 from playwright.sync_api import Browser, Page, expect
 
 from joulepath.models.registry import load_robot
-from tests.app.live import GRACE, ROOT, serving
-from tests.browser.pages import FIRST, MESHES, SHOWN, ask, go, opened, type_into, until
+from tests.app.live import ANSWER, GRACE, ROOT, serving
+from tests.browser.pages import (
+    FIRST,
+    MESHES,
+    SHOWN,
+    ask,
+    go,
+    opened,
+    search_places,
+    type_into,
+    until,
+)
 from tests.browsers import SOFTWARE, chromium
 from tests.identification_logs import csv_of, recorded, truth_of
 
@@ -49,6 +59,7 @@ def main() -> None:
         url = f"{service.url}/studio"
         with opened(browser, url, viewport=SIZE) as page:
             of_cells(page)
+            of_places(page)
             of_a_job(page)
             of_an_identification(page)
         with opened(browser, url, viewport=SIZE, color_scheme="dark") as page:
@@ -92,6 +103,18 @@ def of_cells(page: Page) -> None:
     page.locator("#export").click()
     page.locator("#preview").wait_for()
     picture(page, "studio_export")
+    page.get_by_role("button", name="Close").click()
+
+
+def of_places(page: Page) -> None:
+    """The map of a round between two tables, at its best place."""
+    page.get_by_label("Name of the project").fill("Two tables")
+    ask(page, json.loads((ROOT / "examples/placement/two_tables.json").read_text())["cycle"])
+    search_places(page, 300, 120)
+    until(page, "() => studio.state.looked?.state === 'shown'", 2 * ANSWER)
+    page.locator("#scrub").fill("1.3")
+    page.mouse.move(0, 0)
+    picture(page, "studio_places")
     page.get_by_role("button", name="Close").click()
 
 

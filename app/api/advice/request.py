@@ -30,7 +30,7 @@ class AnsweredRequest(Request):
         default=None,
     )
     answer: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
-        "Id of the kept answer to `optimize` or `cycle`. Null: the request is answered first.",
+        "Id of the kept answer to the request. Null: the request is answered first.",
         None,
         ANSWER_ID,
         default=None,

@@ -32,8 +32,8 @@ class Bundle:
 
     `answer` is the answer to the `request` to the endpoint `kind`; `moves` are the answers of the
     moves of a cycle, in order. Of a job, `answer` has its sums and `moves` its rows, see
-    `job_rows`. `log` is the log of a request to `POST /evaluate`: its settings, and its packed file
-    in Base64.
+    `job_rows`; of a placement, `moves` are the rows of `placed`. `log` is the log of a request to
+    `POST /evaluate`: its settings, and its packed file in Base64.
     """
 
     kind: Kind
@@ -64,9 +64,13 @@ class Bundle:
     @property
     def what(self) -> str:
         """The subject of the report in one word."""
-        return {"optimize": "motion", "cycle": "cycle", "job": "round", "evaluate": "log"}[
-            self.kind
-        ]
+        return {
+            "optimize": "motion",
+            "cycle": "cycle",
+            "job": "round",
+            "evaluate": "log",
+            "placement": "cycle",
+        }[self.kind]
 
     def subtitle(self, robot: Robot) -> str:
         """Day and robot."""
@@ -78,6 +82,8 @@ class Bundle:
         again = {
             "job": "certifies every motion again and answers every request anew",
             "evaluate": "reads the log again and computes its motion anew",
+            "placement": "certifies every motion at both places again and computes their cycles "
+            "anew",
         }.get(self.kind, "certifies every motion again and answers the request anew")
         own = f" Answer {id}." if id else ""
         return (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import orjson
@@ -18,6 +18,7 @@ from joulepath.app.api.report.bundle import Bundle, attached_to
 from joulepath.app.api.report.job_rows import answered as answered_rows
 from joulepath.app.api.report.job_rows import summed
 from joulepath.app.api.report.page import page
+from joulepath.app.api.report.placed import of_cycle, rows_at
 from joulepath.app.api.report.programs import program_of, program_of_motion
 from joulepath.app.api.report.request import JOB_DEADLINE
 from joulepath.app.api.report.task import evaluation_of
@@ -98,13 +99,14 @@ def _motions(bundle: Bundle) -> list[Line]:
                 program = program_of_motion(row["request"], row["answer"])
                 certified(program)
                 moves.append((f"no. {row['index'] + 1}", program.moves[0], row["answer"]))
+    elif bundle.kind == "placement":
+        for row in bundle.moves:
+            moves += [
+                (f"{label}, {row['place']} place", move, answer)
+                for label, move, answer in _moves_of(of_cycle(bundle, row))
+            ]
     elif bundle.kind != "evaluate":
-        program = program_of(bundle)
-        certified(program)
-        moves = [
-            (move.label, move, answer)
-            for move, answer in zip(program.moves, bundle.motions, strict=True)
-        ]
+        moves = _moves_of(bundle)
     lines = list[Line]()
     for label, move, answer in moves:
         electrical = answer["energy"]["electrical"]
@@ -114,8 +116,35 @@ def _motions(bundle: Bundle) -> list[Line]:
     return [Line("limits", f"{len(lines)} motions certified again", True), *lines] if lines else []
 
 
+def _moves_of(bundle: Bundle) -> list[tuple[str, Move, Json]]:
+    """The moves of a motion or a cycle, certified again, by their labels."""
+    program = program_of(bundle)
+    certified(program)
+    return [
+        (move.label, move, answer)
+        for move, answer in zip(program.moves, bundle.motions, strict=True)
+    ]
+
+
+def _placed_sums(bundle: Bundle) -> Iterator[Line]:
+    """The cycles of a placement, and the energies of its places as sums of them."""
+    for row in bundle.moves:
+        for line in _sums(of_cycle(bundle, row)):
+            yield replace(line, what=f"{line.what}, {row['place']} place")
+    objective = bundle.answer["objective"]
+    for place in dict.fromkeys(row["place"] for row in bundle.moves):
+        parts = (
+            row["weight"] * row["answer"]["energy"][objective]["total"]
+            for row in rows_at(bundle, place)
+        )
+        yield _sum(f"cycles, {place} place", bundle.answer[place]["energy"], parts, ROUNDING)
+
+
 def _sums(bundle: Bundle) -> Iterator[Line]:
     """Totals agree with their parts, legs, rows or segments."""
+    if bundle.kind == "placement":
+        yield from _placed_sums(bundle)
+        return
     if bundle.kind == "evaluate":
         total, segments = bundle.answer["total"], bundle.answer["segments"]
         if segments:
@@ -142,6 +171,11 @@ def _again(bundle: Bundle, request_id: str) -> Iterator[Line]:
         for row in answered_rows(bundle.moves):
             what = f"no. {row['index'] + 1} answered anew"
             yield _anew(row["kind"], row["request"], row["answer"], request_id, what)
+    elif bundle.kind == "placement":
+        for row in bundle.moves:
+            if row["request"] is not None:
+                what = f"cycle answered anew, {row['place']} place"
+                yield _anew("cycle", row["request"], row["answer"], request_id, what)
     elif bundle.kind != "evaluate":
         what = "request answered anew"
         yield _anew(bundle.kind, bundle.request, bundle.answer, request_id, what)

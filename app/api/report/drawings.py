@@ -147,8 +147,8 @@ def drawn_bars(bars: Sequence[Bar]) -> str:
                 f'fill="{DRAWING.ink}" stroke="#fff"/>'
             )
         if k % every == 0:
-            parts.append(_text(middle, low + 17, bar.name, DRAWING.grey, "middle"))
-    return _document(low + DRAWING.foot, parts)
+            parts.append(words_at(middle, low + 17, bar.name, DRAWING.grey, "middle"))
+    return document(low + DRAWING.foot, parts)
 
 
 def drawn(course: Course) -> str:
@@ -156,12 +156,13 @@ def drawn(course: Course) -> str:
     top = DRAWING.legs if len(course.legs) > 1 else 8.0
     height = top + DRAWING.power + DRAWING.foot
     parts = [*(_legs(course) if len(course.legs) > 1 else ()), *_power(course, top)]
-    return _document(height, parts)
+    return document(height, parts)
 
 
-def _document(height: float, parts: Sequence[str]) -> str:
+def document(height: float, parts: Sequence[str], width: float = DRAWING.width) -> str:
+    """A drawing of this size [px]."""
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {DRAWING.width:g} {height:g}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
         f'font-family="Inter, DejaVu Sans, sans-serif" font-size="12.5">{"".join(parts)}</svg>'
     )
 
@@ -189,7 +190,7 @@ def _legs(course: Course) -> Iterator[str]:
         if not leg.rests and right - left > 9 * len(text) + 8:
             ink = "#ffffff" if leg.loaded else DRAWING.ink
             y = low - tall / 2 + 4.5
-            yield _text((left + right) / 2, y, text, ink, "middle", 600)
+            yield words_at((left + right) / 2, y, text, ink, "middle", 600)
     for stop in course.stops:
         x = _x(course, stop.t)
         fill, ink, edge = (
@@ -199,7 +200,7 @@ def _legs(course: Course) -> Iterator[str]:
         )
         yield f'<path d="M{x:.1f} 24V{low:.1f}" stroke="{DRAWING.rest}"/>'
         yield f'<circle cx="{x:.1f}" cy="14" r="11" fill="{fill}" stroke="{edge}"/>'
-        yield _text(x, 18.4, str(stop.number), ink, "middle", 600)
+        yield words_at(x, 18.4, str(stop.number), ink, "middle", 600)
 
 
 def _power(course: Course, top: float) -> Iterator[str]:
@@ -227,7 +228,7 @@ def _power(course: Course, top: float) -> Iterator[str]:
         text = f"{k * step:g}" + (" s" if last else "")
         x = _x(course, k * step)
         anchor = "end" if x > DRAWING.width - 3 * DRAWING.right else "middle"
-        yield _text(x, low + 17, text, DRAWING.grey, anchor)
+        yield words_at(x, low + 17, text, DRAWING.grey, anchor)
 
 
 def _grid(levels: Sequence[tuple[float, float]], name: str = "W") -> Iterator[str]:
@@ -236,7 +237,7 @@ def _grid(levels: Sequence[tuple[float, float]], name: str = "W") -> Iterator[st
     for level, y in levels:
         yield f'<path d="M{DRAWING.left} {y:.1f}H{end}" stroke="{DRAWING.line}"/>'
         unit = f" {name}" if level and level == levels[-1][0] else ""
-        yield _text(DRAWING.left - 7, y + 4.3, f"{level:,g}{unit}", DRAWING.grey, "end")
+        yield words_at(DRAWING.left - 7, y + 4.3, f"{level:,g}{unit}", DRAWING.grey, "end")
 
 
 def _tick(least: float) -> float:
@@ -253,8 +254,9 @@ def _of(value: float) -> float:
     return _round_below(value) / value
 
 
-def _text(x: float, y: float, text: str, ink: str, anchor: str, weight: int = 400) -> str:
+def words_at(x: float, y: float, words: str, ink: str, anchor: str, weight: int = 400) -> str:
+    """Words at a point [px]."""
     return (
         f'<text x="{x:.1f}" y="{y:.1f}" fill="{ink}" text-anchor="{anchor}" '
-        f'font-weight="{weight}">{escape(text)}</text>'
+        f'font-weight="{weight}">{escape(words)}</text>'
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from joulepath.app.api.report.rivals import nearest_rival
@@ -31,29 +31,39 @@ def answered(rows: Sequence[Json]) -> list[Json]:
 
 
 def summed(rows: Sequence[Json]) -> Json:
-    """Energy and duration of all answered rows together.
+    """Energy and duration of all answered rows together, each times its `weight` if it has one.
 
     The ends of the interval are the sums of the ends. They are exact if all energies are too large
     or too small together, and otherwise too wide.
     """
-    energies = [row["answer"]["energy"] for row in answered(rows)]
-    electrical = [energy["electrical"] for energy in energies]
+    given = answered(rows)
+    weights = [row.get("weight", 1.0) for row in given]
+    electrical = [row["answer"]["energy"]["electrical"] for row in given]
     names = {name for each in electrical for name, value in each.items() if _is_number(value)}
-    total = {name: sum(each.get(name) or 0.0 for each in electrical) for name in sorted(names)}
+
+    def total(values: Iterable[float]) -> float:
+        pairs = zip(weights, values, strict=True)
+        return float(sum(weight * value for weight, value in pairs))
+
+    parts = {name: total(each.get(name) or 0.0 for each in electrical) for name in sorted(names)}
+    known = [each["interval"] for each in electrical]
     return {
-        "duration": sum(row["answer"]["duration"] for row in answered(rows)),
+        "duration": total(row["answer"]["duration"] for row in given),
         "energy": {
-            "electrical": total
-            | {"interval": _together([each["interval"] for each in electrical])},
-            "lower_bound": sum(energy["lower_bound"] for energy in energies),
+            "electrical": parts | {"interval": _together(known, weights)},
+            "lower_bound": total(row["answer"]["energy"]["lower_bound"] for row in given),
         },
     }
 
 
-def _together(known: Sequence[Mapping[str, Any] | None]) -> Json | None:
-    intervals = [each for each in known if each is not None]
-    if not intervals or len(intervals) < len(known):
+def _together(known: Sequence[Json | None], weights: Sequence[float]) -> Json | None:
+    if not known or None in known:
         return None
+    intervals = [
+        each | {end: weight * each[end] for end in ("p5", "p95")}
+        for each, weight in zip(known, weights, strict=True)
+        if each is not None
+    ]
     widths = [each["p95"] - each["p5"] for each in intervals]
     shares = dict[str, float]()
     for each, width in zip(intervals, widths, strict=True):

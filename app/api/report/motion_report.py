@@ -36,7 +36,7 @@ def motion_report(bundle: Bundle, program: Program) -> Report:
     """The report of documents with the motions of `program`."""
     answer, money = bundle.answer, Money.of(bundle)
     masses = [move.arm.payload.mass for move in program.moves]
-    course = _course(bundle, program)
+    course = course_of(bundle, program)
     several = len(course.legs) > 1
     return Report(
         title=bundle.title or ("A cycle of stops" if bundle.kind == "cycle" else "A motion"),
@@ -59,7 +59,7 @@ def motion_report(bundle: Bundle, program: Program) -> Report:
         currency=money.currency,
         costs_note=costs_note(money),
         proven_title="Proven",
-        proven=unbroken(_proven(answer)),
+        proven=unbroken(proven(answer)),
         check=bundle.how_to_check(answer.get("id")),
         assumptions=assumptions(
             bundle.request,
@@ -206,7 +206,8 @@ def _rivals_note(bundle: Bundle) -> str:
     return f"Against “{name}” the saving is likely {low} to {high}. {rule}"
 
 
-def _course(bundle: Bundle, program: Program) -> Course:
+def course_of(bundle: Bundle, program: Program) -> Course:
+    """The power over time of a motion or a cycle, with its legs."""
     answer = bundle.answer
     if bundle.kind == "optimize":
         trajectory, wait = answer["trajectory"], float(answer["energy"]["electrical"]["dwell"])
@@ -234,7 +235,8 @@ def _course(bundle: Bundle, program: Program) -> Course:
     return Course(answer["duration"], t, power, legs, stops)
 
 
-def _proven(answer: dict[str, Any]) -> str:
+def proven(answer: dict[str, Any]) -> str:
+    """What the certificate of an answer proves, in sentences."""
     used = limits_used(answer["certificate"]["worst_ratio"])
     sentences = [f"Every limit is kept: {used}."]
     clearance = answer["certificate"].get("clearance")

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from joulepath.app.api.advice.request import AdviceName, AnsweredRequest
+from joulepath.app.api.placement.request import CYCLE, PlacementRequest
 from joulepath.app.schemas.common import NO_CONTROLS, Request, described
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import JOB_ID, LOG_ID
@@ -20,7 +21,7 @@ JOB_DEADLINE = 60.0
 
 Text = Annotated[str, Field(min_length=1, max_length=120, pattern=NO_CONTROLS)]
 Format = Literal["html", "pdf"]
-Kind = Literal["optimize", "cycle", "job", "evaluate"]
+Kind = Literal["optimize", "cycle", "job", "evaluate", "placement"]
 
 
 class Sourced(Request):
@@ -79,7 +80,7 @@ class Costs(Request):
 
 class ReportRequest(AnsweredRequest):
     """A motion or a cycle, as exactly one of `optimize` and `cycle`; or a `job`; or a log, as
-    `evaluate`. With the numbers for costs."""
+    `evaluate`; or a `placement`. With the numbers for costs."""
 
     job: Annotated[str, Field(max_length=LENGTHS.id)] | None = described(
         f"Id of a job with motions or cycles of one robot, of at most {MOST_ROWS:,} requests, and "
@@ -92,6 +93,12 @@ class ReportRequest(AnsweredRequest):
         "A body of `POST /evaluate` with a `log`: its moves are measured against predicted.",
         None,
         {"log": LOG_ID},
+        default=None,
+    )
+    placement: PlacementRequest | None = described(
+        "A body of `POST /placement`: its map, and its best place against the nominal one.",
+        None,
+        {"cycle": CYCLE, "region": {"x": [-0.3, 0.3], "y": [-0.2, 0.2]}},
         default=None,
     )
     names: Annotated[list[Text], Field(max_length=MOST_ROWS)] = described(
@@ -131,14 +138,20 @@ class ReportRequest(AnsweredRequest):
         return next(kind for kind in get_args(Kind) if getattr(self, kind) is not None)
 
     @property
+    def robot(self) -> str | None:
+        """Name of the robot."""
+        return self.placement.robot if self.placement is not None else super().robot
+
+    @property
     def figures(self) -> str | None:
         """Id of identified figures."""
-        return self.evaluate.figures if self.evaluate is not None else super().figures
+        body = self.evaluate or self.placement
+        return body.figures if body is not None else super().figures
 
     @property
     def deadline(self) -> float:
         """Wall time of the request [s]."""
-        body = self.task or self.evaluate
+        body = self.task or self.evaluate or self.placement
         given = None if body is None else body.deadline
         return JOB_DEADLINE if given is None else given
 
@@ -152,7 +165,7 @@ class ReportRequest(AnsweredRequest):
     def _one_of_all(self) -> Self:
         if sum(getattr(self, kind) is not None for kind in get_args(Kind)) != 1:
             raise PydanticCustomError(
-                "exactly_one", "Give exactly one of `optimize`, `cycle`, `job` and `evaluate`"
+                "exactly_one", "Give exactly one of {kinds}", {"kinds": ", ".join(get_args(Kind))}
             )
         if self.evaluate is not None and self.evaluate.log is None:
             raise PydanticCustomError("log", "A report of `evaluate` needs a `log`")

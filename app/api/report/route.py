@@ -16,6 +16,7 @@ from joulepath.app.exceptions.stored import UnknownAnswer
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.optimizer.evaluate.errors import NotCertified
+from joulepath.optimizer.placement.errors import NoPlacement
 
 router = APIRouter(tags=["results"], route_class=LargeBodyRoute)
 
@@ -45,6 +46,7 @@ _FILE: dict[int | str, dict[str, Any]] = {
         **problem_responses(
             *dict.fromkeys((*MOTION_PROBLEMS, *CYCLE_PROBLEMS)),
             UnknownAnswer,
+            NoPlacement,
             NotCertified,
             NoTypst,
         ),
@@ -53,9 +55,9 @@ _FILE: dict[int | str, dict[str, Any]] = {
 async def report(
     request: Request, body: ReportRequest, settings: ServiceSettings, engine: ServiceArmEngine
 ) -> Response:
-    """Writes a page about a motion or a cycle: energy and its parts, savings against ways within
-    all limits, costs per shift and year. Request and answer are attached, so that `joulepath check`
-    can compute both again."""
+    """Writes a page about a motion, a cycle or a placement: energy and its parts, savings against
+    ways within all limits or other places, costs per shift and year. Request and answer are
+    attached, so that `joulepath check` can compute both again."""
     task = ReportTask(body, request.state.id)
     result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
     name = f"joulepath-report.{body.format}"

@@ -17,6 +17,7 @@ from joulepath.app.api.report import page, pdf
 from joulepath.app.api.report.build import report_of
 from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.job_rows import row_of, summed
+from joulepath.app.api.report.placed import placed
 from joulepath.app.api.report.request import ReportRequest
 from joulepath.app.convert.fields import inside
 from joulepath.app.convert.recorded import stored_log
@@ -80,6 +81,9 @@ class ReportTask:
                 "moves": [],
                 "log": content if len(log.body) <= _MOST_ATTACHED else None,
             }
+        if asked.placement is not None:
+            answer, moves = placed(asked.placement, asked.answer, self.request_id, limit)
+            return {"request": as_asked(asked.placement), "answer": answer, "moves": moves}
         assert asked.task is not None
         answer, moves = answered(asked, self.request_id, limit)
         advice = advised(asked.task, answer, moves, asked.period, end, ALL if asked.advice else ())

@@ -2,7 +2,7 @@ import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { followReach, reached } from "../src/store/reach";
 import { deadlineOf } from "../src/store/request";
 import { edit } from "../src/store/state";
-import { leftOf } from "../src/task/RunBar";
+import { leftOf } from "../src/ui/Progress";
 import { MOVE } from "./cells";
 
 const answers: [number, unknown][] = [];

@@ -85,5 +85,7 @@ it("differences are named as the page names them", () => {
   expect(
     names(put(MOVE, "/goal/pose", { position: [-0.35, -0.52, 0.45], rotvec: [1.57, 0, 0] })),
   ).toEqual(["Goal orientation"]);
+  const turned = put(MOVE, "/goal/pose", { position: [-0.35, -0.52, 0.45], rotvec: [0, 0, 1] });
+  expect(diff(MOVE, turned)[0]?.before).toBe("1.571, 0.000, 0.000");
   expect(names({ ...MOVE })).toEqual([]);
 });

@@ -6,10 +6,11 @@ import { LibraryPage } from "../library/LibraryPage";
 import { LogsPage } from "../logs/LogsPage";
 import { Picture } from "../picture/Picture";
 import { Player } from "../picture/Player";
+import { PlacementPanel } from "../placement/PlacementPanel";
 import { TaskPanel } from "../task/TaskPanel";
 import { Tabs } from "../ui/Tabs";
 import { alone } from "../store/alone";
-import { answered, page, stale, tab } from "../store/state";
+import { answered, page, placing, stale, tab } from "../store/state";
 import { figure } from "../store/units";
 import { Dialogs } from "./Dialogs";
 import { onKey } from "./keys";
@@ -21,6 +22,7 @@ const TABS = [
   { value: "picture", text: "Picture" },
   { value: "answer", text: "Answer" },
 ] as const;
+const WITH_PLACES = [...TABS.slice(0, 2), { value: "answer", text: "Places" }] as const;
 
 /** The whole page. */
 export function App() {
@@ -47,9 +49,9 @@ export function App() {
         <section class="stage" aria-label="Motion">
           <Picture />
           <Player />
-          <Dock />
+          {!placing.value && <Dock />}
         </section>
-        <AnswerPanel />
+        {placing.value ? <PlacementPanel /> : <AnswerPanel />}
       </main>
       {page.value === "jobs" && <JobsPage />}
       {page.value === "logs" && <LogsPage />}
@@ -58,7 +60,7 @@ export function App() {
         <nav class="bottom" aria-label="Parts of the cell">
           <Tabs
             label="Parts of the cell"
-            options={alone ? TABS.slice(1) : TABS}
+            options={alone ? TABS.slice(1) : placing.value ? WITH_PLACES : TABS}
             value={tab.value}
             onChange={(next) => (tab.value = next)}
           />

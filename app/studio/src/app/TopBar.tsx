@@ -8,6 +8,7 @@ import {
   canRedo,
   canUndo,
   page,
+  placing,
   redo,
   saved,
   stale,
@@ -117,7 +118,7 @@ export function TopBar() {
           )}
           {!alone && ready && <ReportMenu write={reportAnswer} />}
           <Button
-            kind={ready ? "primary" : undefined}
+            kind={ready && !placing.value ? "primary" : undefined}
             icon="download"
             id="export"
             disabled={!ready}

@@ -11,6 +11,7 @@ import "../styles/picture.css";
 import "../styles/charts.css";
 import "../styles/answer.css";
 import "../styles/figures.css";
+import "../styles/placement.css";
 import "../styles/pages.css";
 import "../styles/narrow.css";
 import { render } from "preact";
@@ -19,7 +20,9 @@ import {
   answered,
   changes,
   economics,
+  looked,
   page,
+  placing,
   playing,
   project,
   racers,
@@ -35,6 +38,7 @@ import {
   duration,
   trouble,
 } from "../store/state";
+import { mapShown } from "../store/placement";
 import { postures } from "../answer/postures";
 import { picture } from "../picture/instance";
 import { reachedGhost } from "../picture/reachedGhost";
@@ -53,7 +57,10 @@ const signals = {
   changes,
   duration,
   economics,
+  looked,
+  mapShown,
   page,
+  placing,
   playing,
   postures,
   project,

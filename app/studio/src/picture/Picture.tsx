@@ -2,13 +2,15 @@ import { effect } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { dark } from "../ui/dark";
 import { alone } from "../store/alone";
-import { answered, ghosts, playing, run, show, stale, time } from "../store/state";
+import { answered, ghosts, looked, playing, run, show, stale, time } from "../store/state";
 import { figure } from "../store/units";
 import { Drag, dragNote } from "./drag";
 import { picture } from "./instance";
 import { followMeshes } from "./meshes";
+import { PlaceLegend } from "./PlaceLegend";
+import { PlaceMap } from "./placeMap";
 import { rampStops } from "./path";
-import { pictured } from "./pictured";
+import { pictured, standing } from "./pictured";
 import { reachedGhost } from "./reachedGhost";
 import { Tools } from "./Tools";
 import { View } from "./view";
@@ -19,11 +21,15 @@ const hasWebGl = Boolean(document.createElement("canvas").getContext("webgl2"));
 function start(box: HTMLElement, layer: HTMLElement): () => void {
   const own = new View(box, layer);
   picture.value = own;
-  if (!alone) Object.assign(own, { drag: new Drag(own) });
+  if (!alone) Object.assign(own, { drag: new Drag(own), places: new PlaceMap(own) });
   const stops = [
     effect(() => {
       void pictured.value;
       own.build();
+    }),
+    effect(() => {
+      own.content.stand(standing.value);
+      own.draw();
     }),
     effect(() => {
       void dark.value;
@@ -71,20 +77,37 @@ export function Picture() {
       {hasWebGl && (
         <>
           <Tools />
-          <Legend />
+          <div class="legends">
+            {!alone && <PlaceLegend />}
+            <Legend />
+          </div>
           <p class="frame-note">{frameNote()}</p>
           {dragNote.value && (
             <p class="drag-note" id="drag-note" role="status">
               {dragNote.value}
             </p>
           )}
-          {stale.value && !dragNote.value && (
+          {placeNote() && (
+            <p class="drag-note" id="place-note">
+              {placeNote()}
+            </p>
+          )}
+          {stale.value && !looked.value && !dragNote.value && (
             <p class="drag-note">The old motion is hidden: it is not one of this cell.</p>
           )}
         </>
       )}
     </div>
   );
+}
+
+/** What a place that is looked at needs; the panel says it with more. */
+function placeNote(): string {
+  const now = looked.value;
+  if (!now || now.state === "moving") return "";
+  if (now.state === "failed") return now.why;
+  const known = now.energy === null ? "" : `${figure(now.energy)} J`;
+  return now.state === "computing" ? `${known} Computing …` : `${known} at this place`;
 }
 
 function describe(): string {

@@ -1,5 +1,5 @@
 import { Icon } from "../ui/icons";
-import { answered, duration, playing, stale, time } from "../store/state";
+import { duration, played, playing, time } from "../store/state";
 import { figure } from "../store/units";
 import { goTo, loop, speed, toggle } from "./clock";
 
@@ -7,7 +7,7 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 
 /** Plays the motion. */
 export function Player() {
-  const off = !answered.value || stale.value;
+  const off = !played.value;
   return (
     <div class="player" id="player">
       <button

@@ -1,8 +1,9 @@
 import { Button } from "../ui/Button";
 import { Menu } from "../ui/Menu";
 import { alone } from "../store/alone";
+import { BASE } from "../store/placement";
 import { obstaclesListed, rowsOf } from "../store/request";
-import { request, selected, show } from "../store/state";
+import { placing, request, selected, show } from "../store/state";
 import { tool, type Tool } from "./drag";
 import { picture } from "./instance";
 
@@ -57,6 +58,7 @@ function DragTools() {
     tool.value = tool.value === next ? "look" : next;
   };
   const names = [
+    ...(placing.value ? [[BASE, "robot base"] as const] : []),
     ...rows.map(({ pointer, name }) => [pointer, name] as const),
     ...obstaclesListed(request.value).map(
       ({ name }, k) => [`/scene/obstacles/${k}`, String(name)] as const,

@@ -1,6 +1,6 @@
 // The clock of the page: play, scrub, speed, loop.
 import { signal } from "@preact/signals";
-import { answered, duration, playing, stale, time } from "../store/state";
+import { duration, played, playing, time } from "../store/state";
 
 const REST = 0.7; // at the end of the motion, before it begins again [s]
 
@@ -19,7 +19,7 @@ export const toggle = () => (playing.value ? (playing.value = false) : play());
 
 /** Plays from where the clock is; from the start, if it is at the end. */
 export function play(): void {
-  if (playing.value || !answered.value || stale.value) return;
+  if (playing.value || !played.value) return;
   [before, resting] = [null, 0];
   playing.value = true;
   if (time.value >= duration.value) time.value = 0;
@@ -28,7 +28,7 @@ export function play(): void {
 
 function tick(now: number): void {
   if (!playing.value) return;
-  if (stale.value) {
+  if (!played.value) {
     playing.value = false;
     return;
   }
@@ -49,7 +49,7 @@ function tick(now: number): void {
 
 /** Time of the sample `steps` away from the present one. */
 export function neighbour(steps: number): number {
-  const times = answered.value?.solution.trajectory.t ?? [0];
+  const times = played.value?.solution.trajectory.t ?? [0];
   let nearest = times.findLastIndex((t) => t <= time.value + 1e-9);
   if (steps < 0 && time.value > times[nearest]! + 1e-9) nearest += 1;
   return times[Math.max(0, Math.min(times.length - 1, nearest + steps))]!;

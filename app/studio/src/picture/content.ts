@@ -1,7 +1,7 @@
 // What the picture holds: arms, ghosts, obstacles, the path of the TCP, the nearest pair, the names
 // of stops.
 import * as THREE from "three";
-import { Chain, positionOf, sampleAt, type Matrix } from "../store/chain";
+import { Chain, IDENTITY, multiply, positionOf, sampleAt, type Matrix } from "../store/chain";
 import { legAt, stopsOf } from "../store/cycle";
 import { ghosts, run, show, time } from "../store/state";
 import type { Obstacle, Pose } from "../store/types";
@@ -10,10 +10,11 @@ import { Arm } from "./arm";
 import type { Labels } from "./labels";
 import { drawnObstacle } from "./obstacles";
 import { nearestPair, type NearestPair } from "./nearest";
-import type { Parts } from "./parts";
+import { ON_BASE, type Parts } from "./parts";
 import { pathOfPower } from "./path";
 import { pictured, type Pictured } from "./pictured";
 import { reachedGhost } from "./reachedGhost";
+import { place } from "./shapes";
 import { colour } from "./theme";
 
 const NEAR = 0.5; // of a round, for which the nearest pair is shown before and after its instant [s]
@@ -25,6 +26,8 @@ interface Built {
   tcp: Partial<Pose> | undefined;
   samples: number[][];
   moves: boolean;
+  /** Whether it is of a place that is looked at, so that the view stays. */
+  looks: boolean;
 }
 
 export class Content {
@@ -34,6 +37,7 @@ export class Content {
   ignored: string[] = [];
   private drawn: Pictured | null = null;
   private scene = "";
+  private base = IDENTITY;
   private nearest: NearestPair | null = null;
 
   constructor(
@@ -61,6 +65,7 @@ export class Content {
       tcp: now.cell.tcp,
       samples: samplesOf(now),
       moves: Boolean(now.motion),
+      looks: now.elsewhere,
     };
   }
 
@@ -89,7 +94,20 @@ export class Content {
     }
   }
 
-  /** The pose of the TCP at joint positions. */
+  /** Frames of the first arm as it stands now. */
+  get frames(): Matrix[] {
+    const frames = this.arms[0]?.frames ?? [];
+    return this.base === IDENTITY ? frames : frames.map((T) => multiply(this.base, T));
+  }
+
+  /** Puts the base of the arm somewhere. */
+  stand(base: Matrix): void {
+    this.base = base;
+    for (const name of ON_BASE) place(this.parts[name], base);
+    this.labels.base.fromArray(base).transpose();
+  }
+
+  /** The pose of the TCP at joint positions, in the frame of the base. */
   tcpAt(q: number[]): Matrix {
     return this.chain!.tcp(q, this.drawn?.cell.tcp);
   }
@@ -223,7 +241,8 @@ function samplesOf(now: Pictured): number[][] {
   return Array.from({ length: SAMPLES }, (_, k) => sampleAt(t, q, (t.at(-1)! * k) / (SAMPLES - 1)));
 }
 
-function empty(group: THREE.Group): void {
+/** Takes everything out of a group. */
+export function empty(group: THREE.Group): void {
   // what other arms share is sent to the graphics card again when it is next drawn
   group.traverse((each) => (each as Partial<THREE.Mesh>).geometry?.dispose());
   group.clear();

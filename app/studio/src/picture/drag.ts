@@ -12,13 +12,14 @@ import {
   poseOfMatrix,
   type Matrix,
 } from "../store/chain";
+import { BASE, look, moveBase } from "../store/placement";
 import { at, put } from "../store/pointer";
 import { solutionsOf } from "../store/reach";
 import { freshName, isObject, listOf, poseAt, rowsOf, targetAt, targetOf } from "../store/request";
-import { edit, request, selected, typed } from "../store/state";
+import { edit, placing, request, selected, typed } from "../store/state";
 import { dressed, toolNow } from "../store/tools";
 import type { ApiRequest, Obstacle, Pose } from "../store/types";
-import { configurationOf, pictured, robotNow } from "./pictured";
+import { configurationOf, pictured, robotNow, standing } from "./pictured";
 import { reachedGhost } from "./reachedGhost";
 import type { View } from "./view";
 
@@ -43,10 +44,10 @@ export class Drag {
     this.gizmo.size = 0.75;
     view.scene.add(this.handle, this.gizmo.getHelper());
     this.gizmo.addEventListener("change", () => view.draw());
-    this.gizmo.addEventListener(
-      "objectChange",
-      () => this.rowNow() && void this.reach(this.poseOfHandle()),
-    );
+    this.gizmo.addEventListener("objectChange", () => {
+      if (selected.value === BASE) void moveBase(this.matrixOfHandle());
+      else if (this.rowNow()) void this.reach(this.poseOfHandle());
+    });
     this.gizmo.addEventListener("dragging-changed", ({ value }) => {
       view.controls.enabled = !value;
       this.dragging = Boolean(value);
@@ -74,6 +75,7 @@ export class Drag {
       return;
     }
     this.gizmo.setMode(mode === "turn" ? "rotate" : "translate");
+    this.gizmo.showX = this.gizmo.showY = mode !== "turn" || chosen !== BASE;
     new THREE.Matrix4()
       .fromArray(pose)
       .transpose()
@@ -84,6 +86,7 @@ export class Drag {
 
   /** The pose of what is selected, in the base frame. */
   private poseOf(chosen: string): Matrix | null {
+    if (chosen === BASE) return placing.value ? standing.value : null;
     const robot = robotNow.value!;
     const row = this.rowNow();
     try {
@@ -105,10 +108,14 @@ export class Drag {
     }
   }
 
+  private matrixOfHandle(): Matrix {
+    this.handle.updateMatrix();
+    return this.handle.matrix.clone().transpose().toArray();
+  }
+
   private poseOfHandle(): Pose {
     const rounded = (value: number) => Math.round(value * ROUND) / ROUND;
-    this.handle.updateMatrix();
-    const pose = poseOfMatrix(this.handle.matrix.clone().transpose().toArray());
+    const pose = poseOfMatrix(this.matrixOfHandle());
     return { position: pose.position.map(rounded), rotvec: pose.rotvec };
   }
 
@@ -152,6 +159,7 @@ export class Drag {
     const chosen = selected.value;
     const robot = robotNow.value;
     if (!chosen || !robot) return;
+    if (chosen === BASE) return void look(ofPose(this.poseOfHandle()));
     const row = this.rowNow();
     const given = row ? at(request.value, poseAt(row)) : at(request.value, `${chosen}/pose`);
     const before = isObject(given) ? (given as unknown as Pose) : null;

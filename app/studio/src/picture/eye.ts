@@ -6,6 +6,7 @@ import type { Pose } from "../store/types";
 
 // from where the views look: the first one is chosen so that as little as possible hides the arm
 const VIEWS: Record<number, [number, number, number]> = {
+  0: [0.3, -0.75, 0.95], // of a map on the floor
   2: [0, -1, 0.12],
   3: [1, 0, 0.12],
   4: [-1, 0, 0.12],
@@ -102,7 +103,14 @@ export class Eye {
     sun.shadow.camera.updateProjectionMatrix();
   }
 
-  /** One of the six views, by its number. */
+  /** Widens what all views hold by an object. */
+  hold(object: THREE.Object3D): void {
+    object.updateWorldMatrix(true, true);
+    this.bounds.union(new THREE.Box3().setFromObject(object));
+    this.middle = this.bounds.getCenter(new THREE.Vector3());
+  }
+
+  /** One of the views, by its number. */
   look(number: number): void {
     if (!this.middle) return;
     const view = VIEWS[number];

@@ -6,11 +6,15 @@ interface Label {
   at: THREE.Vector3;
   /** How far below its point it stands [px]. */
   below: number;
+  still: boolean;
 }
 
-const BELOW: Record<string, number> = { near: -22, stop: 20, end: -38, hover: -20 };
+const BELOW: Record<string, number> = { near: -22, stop: 20, end: -38, hover: -20, place: -16 };
+const STILL = ["hover", "place"]; // kinds whose points do not move with the base
 
 export class Labels {
+  /** Pose of the base, in whose frame the points of the arm are. */
+  readonly base = new THREE.Matrix4();
   private readonly all = new Map<string, Label>();
 
   constructor(
@@ -25,7 +29,9 @@ export class Labels {
       const node = document.createElement("span");
       node.className = `label ${kind}`;
       this.layer.append(node);
-      label = { node, at: new THREE.Vector3(), below: BELOW[kind.split(" ")[0]!] ?? 0 };
+      const first = kind.split(" ")[0]!;
+      const below = BELOW[first] ?? 0;
+      label = { node, at: new THREE.Vector3(), below, still: STILL.includes(first) };
       this.all.set(name, label);
     }
     label.at.fromArray(at);
@@ -50,8 +56,10 @@ export class Labels {
    */
   place({ width, height }: { width: number; height: number }): void {
     const taken: { left: number; right: number; top: number; bottom: number }[] = [];
-    for (const { node, at, below } of this.all.values()) {
-      const point = at.clone().project(this.camera);
+    for (const { node, at, below, still } of this.all.values()) {
+      const point = at.clone();
+      if (!still) point.applyMatrix4(this.base);
+      point.project(this.camera);
       node.hidden = Math.max(Math.abs(point.x), Math.abs(point.y), point.z) > 1;
       if (node.hidden) continue;
       // the words stay inside, where their point is

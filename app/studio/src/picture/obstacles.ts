@@ -21,7 +21,8 @@ export function drawnObstacle(
   const solid = obstacle.shape !== "half_space";
   const material = new THREE.MeshLambertMaterial({
     color: colour(solid ? "--obstacle" : "--floor"),
-    side: THREE.DoubleSide,
+    // from within, a half space hides nothing: below a floor, or where the base hangs
+    side: solid ? THREE.DoubleSide : THREE.FrontSide,
   });
   const object = placedShape(obstacle, material);
   const margin = typeof obstacle.margin === "number" ? obstacle.margin : DEFAULT_MARGIN;

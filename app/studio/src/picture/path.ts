@@ -11,6 +11,13 @@ const MOST = 300;
 
 export const rampStops = RAMP.map((colour) => `#${colour.getHexString()}`);
 
+/** The colour at a share of the scale, from 0 to 1. */
+export function rampAt(share: number): THREE.Color {
+  const place = (RAMP.length - 1) * share;
+  const index = Math.min(Math.floor(place), RAMP.length - 2);
+  return RAMP[index]!.clone().lerp(RAMP[index + 1]!, place - index);
+}
+
 /** A tube of `radius` [m] along the TCP of a trajectory; `tcp` maps joint positions to its pose. */
 export function pathOfPower(
   { q, power }: Trajectory,
@@ -29,11 +36,7 @@ export function pathOfPower(
   const geometry = new THREE.TubeGeometry(curve, segments, radius, 8);
   const around = geometry.attributes.position!.count / (segments + 1);
   const colours = kept.flatMap((k) => {
-    const place = ((RAMP.length - 1) * (power[k]! - least)) / (most - least || 1);
-    const index = Math.min(Math.floor(place), RAMP.length - 2);
-    const colour = RAMP[index]!.clone()
-      .lerp(RAMP[index + 1]!, place - index)
-      .toArray();
+    const colour = rampAt((power[k]! - least) / (most - least || 1)).toArray();
     return Array.from({ length: around }, () => colour).flat();
   });
   geometry.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));

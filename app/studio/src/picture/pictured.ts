@@ -1,10 +1,10 @@
 // What is drawn: the motion of the answer while it belongs to the request, else the cell at rest.
 import { computed, effect, signal } from "@preact/signals";
-import { obstaclesOf } from "../store/chain";
+import { IDENTITY, obstaclesOf, type Matrix } from "../store/chain";
 import { reached } from "../store/reach";
 import { robotName, rowsOf, targetAt, type Row } from "../store/request";
 import { robotOf } from "../store/service";
-import { answered, racers, request, stale, type Answered } from "../store/state";
+import { answered, looked, racers, request, stale, type Answered } from "../store/state";
 import { dressed, toolNow } from "../store/tools";
 import type { ApiRequest, Robot, Solution } from "../store/types";
 
@@ -18,6 +18,8 @@ export interface Pictured {
   /** The motion with its round; null: the arm stands. */
   motion: Answered | null;
   arms: { name: string; solution: Solution; colour: number }[];
+  /** Whether it is of a place of the base that is looked at. */
+  elsewhere: boolean;
   /** Where the arm stands, and where it is to go. */
   start: number[];
   goal: number[] | null;
@@ -42,17 +44,44 @@ export function configurationOf(row: Row | undefined, near: number[] | null): nu
   return [...all].sort((a, b) => far(a) - far(b))[0] ?? null;
 }
 
+/** Where the base of the arm stands in the picture. */
+export const standing = computed<Matrix>(() => looked.value?.pose ?? IDENTITY);
+// so that a base that is dragged moves what is drawn, and draws nothing anew
+const isElsewhere = computed(() => looked.value !== null);
+const motionThere = computed(() => looked.value?.motion ?? null);
+
 export const pictured = computed<Pictured | null>(() => {
-  const shown = answered.value;
-  if (shown && !stale.value) {
-    const { solution, robot, cell } = shown;
-    const arms = [{ name: "this motion", solution, colour: 0xffffff }, ...racers.value];
-    const { q } = solution.trajectory;
-    const goal = shown.cycle ? null : q.at(-1)!;
-    return { robot, cell, motion: shown, arms, start: q[0]!, goal, goalName: "Goal" };
-  }
   const robot = robotNow.value;
-  if (!robot) return null;
+  if (robot && isElsewhere.value) return elsewhere(still(robot), motionThere.value);
+  const shown = stale.value ? null : answered.value;
+  if (!shown) return robot && still(robot);
+  const { solution, robot: own, cell } = shown;
+  const arms = [{ name: "this motion", solution, colour: 0xffffff }, ...racers.value];
+  const { q } = solution.trajectory;
+  const goal = shown.cycle ? null : q.at(-1)!;
+  const start = q[0]!;
+  return { robot: own, cell, motion: shown, arms, elsewhere: false, start, goal, goalName: "Goal" };
+});
+
+/** The arm at a place that is looked at, with its motion there once it is known. */
+function elsewhere(now: Pictured, motion: Answered | null): Pictured {
+  if (!motion) return { ...now, elsewhere: true, goal: null };
+  const { solution, cell } = motion;
+  return {
+    ...now,
+    // what stands around the arm stays where it is
+    cell: { ...cell, scene: now.cell.scene },
+    motion,
+    arms: [{ name: "this place", solution, colour: 0xffffff }],
+    elsewhere: true,
+    start: solution.trajectory.q[0]!,
+    goal: null,
+  };
+}
+
+/** The cell at rest. */
+function still(robot: Robot): Pictured {
+  const shown = answered.value;
   const rows = rowsOf(request.value);
   const fits = (q: number[] | null | undefined) => (q?.length === robot.joints.length ? q : null);
   const old = shown?.robot.name === robot.name ? shown.solution.branch : null;
@@ -66,11 +95,12 @@ export const pictured = computed<Pictured | null>(() => {
     cell: stillCell(dressed(request.value, toolNow.value), robot),
     motion: null,
     arms: [],
+    elsewhere: false,
     start,
     goal: rows.length > 1 ? goal : null,
     goalName: rows.at(-1)?.name ?? "Goal",
   };
-});
+}
 
 /** The cell of a request that is being edited; what is wrong with it, the service says. */
 function stillCell(asked: ApiRequest, robot: Robot): ApiRequest {

@@ -111,8 +111,8 @@ export class View {
   build(): void {
     const built = this.content.build();
     if (!built) return;
-    this.eye.fit(built.samples, built.chain, built.tcp, this.sun);
-    if (this.shown !== built.robot || (!this.turned && built.moves)) this.look(1);
+    if (!built.looks) this.eye.fit(built.samples, built.chain, built.tcp, this.sun);
+    if (this.shown !== built.robot || (!this.turned && built.moves && !built.looks)) this.look(1);
     this.shown = built.robot;
     this.pose();
   }
@@ -156,8 +156,8 @@ export class View {
     if (fine) this.setFineness(STILL);
     else this.adapt(now);
     this.controls.update();
-    const [arm] = this.content.arms;
-    if (arm) this.eye.fade(arm.frames, this.content.ignored, show.value.fade, playing.value);
+    const { frames, ignored } = this.content;
+    if (frames.length) this.eye.fade(frames, ignored, show.value.fade, playing.value);
     this.renderer.render(this.scene, this.camera);
     this.labels.place(this.size);
     this.frames += 1;

@@ -1,7 +1,8 @@
 // What was changed since an answer was computed, in words.
+import { rotvecOf, turnOf } from "./chain";
 import { at, keysOf, type Pointer } from "./pointer";
 import { isObject, stopName } from "./request";
-import type { ApiRequest } from "./types";
+import type { ApiRequest, Pose } from "./types";
 import { fixed, shown, UNITS, words, type UnitName } from "./units";
 
 export interface Change {
@@ -18,9 +19,19 @@ export function diff(before: ApiRequest, after: ApiRequest): Change[] {
   return leaves(before, after, "").map((pointer) => ({
     pointer,
     name: nameOf(pointer, after, before),
-    before: textOf(pointer, at(before, pointer)),
-    after: textOf(pointer, at(after, pointer)),
+    before: textOf(pointer, valueAt(before, pointer)),
+    after: textOf(pointer, valueAt(after, pointer)),
   }));
+}
+
+/** What stands at a pointer; of an orientation in another form, its rotation vector. */
+function valueAt(request: ApiRequest, pointer: Pointer): unknown {
+  const found = at(request, pointer);
+  const pose = at(request, pointer.replace(/\/rotvec$/, ""));
+  const turned = isObject(pose) && turnForm(pose) !== undefined;
+  return found === undefined && turned && pointer.endsWith("/rotvec")
+    ? rotvecOf(turnOf(pose as Partial<Pose>))
+    : found;
 }
 
 function leaves(a: unknown, b: unknown, pointer: Pointer): Pointer[] {

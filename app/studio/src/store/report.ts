@@ -1,6 +1,7 @@
 // Reports: pages for those who decide.
 import { send } from "./client";
 import { costsOf, DEFAULT_ECONOMICS, type Economics } from "./economics";
+import { mapShown } from "./placement";
 import { endpointOf } from "./request";
 import { save } from "./share";
 import { answered, economics, project, toast } from "./state";
@@ -37,6 +38,15 @@ export async function reportAnswer(format: ReportFormat): Promise<void> {
     costs: costsFor(given, costsOf([], shown.solution.duration, given).cyclesPerShift),
   };
   await report(body, name, format);
+}
+
+/** A report of the map that is shown, as a file. Throws Problem. */
+export async function reportPlaces(format: ReportFormat): Promise<void> {
+  const map = mapShown.value;
+  if (!map) return;
+  const costs = costsFor(economics.value, null);
+  const { body, answer } = map;
+  await report({ placement: body, answer: answer.id, costs }, project.value.name, format);
 }
 
 /** A report as a file. Throws Problem. */

@@ -53,17 +53,23 @@ export async function showAnswer(
   asked: ApiRequest | null,
   took: number | null = null,
 ): Promise<void> {
-  const given = answer as Solution | Cycle;
-  const next =
-    "legs" in given
-      ? await cycleAnswered(given, asked, took)
-      : await moveAnswered(given, asked, took);
+  const next = await answeredBy(answer, asked, took);
   batch(() => {
     answered.value = next;
     racers.value = [];
     ghosts.value = [];
     time.value = 0;
   });
+}
+
+/** An answer of `POST /optimize` or `POST /cycle` as something to show. Throws Problem. */
+export function answeredBy(
+  answer: unknown,
+  asked: ApiRequest | null,
+  took: number | null,
+): Promise<Answered> {
+  const given = answer as Solution | Cycle;
+  return "legs" in given ? cycleAnswered(given, asked, took) : moveAnswered(given, asked, took);
 }
 
 /** Without its request, the cell is what the answer says of its arm. */

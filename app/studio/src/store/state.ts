@@ -1,5 +1,6 @@
 // What the page shows. The request in SI is the one truth; what was typed stands beside it.
 import { batch, computed, signal } from "@preact/signals";
+import type { Matrix } from "./chain";
 import { diff, type Change } from "./diff";
 import { DEFAULT_ECONOMICS, type Economics } from "./economics";
 import { put, type Pointer } from "./pointer";
@@ -51,6 +52,18 @@ export interface Run {
     duration: number;
     q_goal?: number[];
   }[];
+}
+
+/** A place of the base that is looked at. */
+export interface Looked {
+  asked: ApiRequest;
+  robot: Robot;
+  /** Pose of the base there, in the frame of the present one. */
+  pose: Matrix;
+  state: "moving" | "computing" | "shown" | "failed";
+  energy: number | null;
+  why: string;
+  motion: Answered | null;
 }
 
 /** What went wrong, and the field that caused it. */
@@ -111,11 +124,25 @@ export const changes = computed<Change[]>(() => {
   return asked ? diff(asked, request.value) : [];
 });
 export const stale = computed(() => changes.value.length > 0);
-export const duration = computed(() =>
-  Math.max(
-    answered.value?.solution.duration ?? 1,
-    ...racers.value.map(({ solution }) => solution.duration),
-  ),
+
+/** Whether one looks for a place of the robot. */
+export const placing = signal(false);
+export const looking = signal<Looked | null>(null);
+/** An edit of the task ends the look. */
+export const looked = computed(() =>
+  placing.value && looking.value?.asked === request.value ? looking.value : null,
+);
+/** The motion that is played: of the place that is looked at, else of an answer that is not stale. */
+export const played = computed(() =>
+  looked.value ? looked.value.motion : stale.value ? null : answered.value,
+);
+export const duration = computed(
+  () =>
+    looked.value?.motion?.solution.duration ??
+    Math.max(
+      answered.value?.solution.duration ?? 1,
+      ...racers.value.map(({ solution }) => solution.duration),
+    ),
 );
 
 interface Snapshot {

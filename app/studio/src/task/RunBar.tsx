@@ -1,11 +1,11 @@
-import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Note } from "../ui/Note";
-import { cancel, optimise } from "../store/run";
+import { Progress } from "../ui/Progress";
+import { optimise } from "../store/run";
 import { lackOf } from "../store/request";
 import { answered, changes, jsonBroken, page, request, run, trouble, unread } from "../store/state";
 import { tell } from "../store/trouble";
-import { atMost, figure } from "../store/units";
+import { figure } from "../store/units";
 
 /** Why the request cannot be sent, or null. */
 function obstacle(): string | null {
@@ -29,7 +29,7 @@ export function RunBar() {
   return (
     <div class="run-bar">
       <Wrong />
-      {run.value ? (
+      {run.value && run.value.endpoint !== "placement" ? (
         <Progress />
       ) : (
         <>
@@ -37,7 +37,7 @@ export function RunBar() {
             type="button"
             id="optimise"
             class={`button big${fresh ? "" : " primary"}`}
-            disabled={why !== null}
+            disabled={why !== null || Boolean(run.value)}
             onClick={send}
           >
             {changes.value.length ? "Optimise again" : "Optimise"} <kbd>Ctrl ↵</kbd>
@@ -95,45 +95,6 @@ function Wrong() {
           </>
         )}
       </Note>
-    </div>
-  );
-}
-
-const EARLY = 0.05; // share of the search before which its speed tells nothing
-
-/** How long it still takes, in words: from the share that is done, at most until the deadline. */
-export function leftOf(passed: number, share: number, deadline: number | null): string {
-  const most = deadline === null ? Infinity : Math.max(0, deadline - passed);
-  const left = share > EARLY && share < 1 ? (passed * (1 - share)) / share : Infinity;
-  if (left < most) return `, about ${figure(left, 1)} s left`;
-  return most < Infinity ? `, at most ${Math.ceil(most)} s left` : "";
-}
-
-function Progress() {
-  const [, again] = useState(0);
-  useEffect(() => {
-    const timer = setInterval(() => again((count) => count + 1), 250);
-    return () => clearInterval(timer);
-  }, []);
-  const now = run.value;
-  if (!now) return null;
-  const passed = (performance.now() - now.began) / 1000;
-  const best = now.incumbents.at(-1);
-  const share = now.total ? Math.min(1, now.done / now.total) : null;
-  const left = leftOf(passed, share ?? 0, now.deadline);
-  return (
-    <div class="progress" id="progress">
-      <progress max={1} value={share ?? undefined} aria-label="Progress" />
-      <p class="hint" role="status" id="progress-text">
-        {best
-          ? `Best so far ${figure(best.energy)} J, ${best.bound > 0 ? `at least ${figure(best.bound)} J: at most ${atMost(best.energy / best.bound - 1)} above the least possible` : "no bound yet"}`
-          : "Searching for a first motion"}
-        {` · ${passed.toFixed(1)} s`}
-        {left}
-      </p>
-      <Button id="cancel" onClick={cancel}>
-        Cancel
-      </Button>
     </div>
   );
 }

@@ -6,6 +6,7 @@ import { asJson, edit, kind, request } from "../store/state";
 import { JsonEditor } from "./JsonEditor";
 import { MoreFields } from "./MoreFields";
 import { PathFields } from "./PathFields";
+import { PlaceField } from "./PlaceField";
 import { RobotCard } from "./RobotCard";
 import { RunBar } from "./RunBar";
 import { SceneList } from "./SceneList";
@@ -51,6 +52,7 @@ export function TaskPanel() {
           {kind.value === "path" && <PathFields />}
           <SceneList />
           <TimeField />
+          {kind.value !== "path" && <PlaceField />}
           <MoreFields />
           <Errors under="/logs" />
         </div>

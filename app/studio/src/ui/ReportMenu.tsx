@@ -4,9 +4,15 @@ import type { ReportFormat } from "../store/report";
 import { trying } from "../store/trouble";
 
 /** Writes a report, as a page or to print. */
-export function ReportMenu({ write }: { write: (format: ReportFormat) => Promise<void> }) {
+export function ReportMenu({
+  write,
+  id = "report",
+}: {
+  write: (format: ReportFormat) => Promise<void>;
+  id?: string;
+}) {
   return (
-    <Menu label="Report" icon="file" id="report">
+    <Menu label="Report" icon="file" id={id}>
       <Button kind="quiet" onClick={trying(() => write("pdf"))}>
         PDF, to print and send
       </Button>

@@ -1,0 +1,248 @@
+// Where to put the robot: the region, the map of the service, and the place that is looked at.
+import { batch, computed, signal } from "@preact/signals";
+import { inverse, multiply, ofPose, poseOfMatrix, type Matrix } from "./chain";
+import { get, Problem } from "./client";
+import { diff } from "./diff";
+import { asKind } from "./edits";
+import { capital, energyOf } from "./facts";
+import { placesOf, REASONS, worldOf, yawOf } from "./places";
+import type { Layer, Mount, Place, PlacementAnswer } from "./places";
+import { deadlineOf, endpointOf, isObject, robotName } from "./request";
+import { answeredBy, compute, named } from "./run";
+import { seenFrom } from "./seenFrom";
+import { robotOf } from "./service";
+import {
+  edit,
+  looked,
+  looking,
+  placing,
+  project,
+  request,
+  run,
+  selected,
+  toast,
+  typed,
+  type Looked,
+} from "./state";
+import type { ApiRequest } from "./types";
+import { asShown, typedValue, type UnitName } from "./units";
+
+/** The base of the robot among what can be dragged. */
+export const BASE = "/base";
+
+/** The region as it is typed: from where to where the base may be moved. */
+export interface RegionTyped {
+  x: [string, string];
+  y: [string, string];
+  z: [string, string];
+  yaw: [string, string];
+  /** Which coordinates are free. */
+  free: Record<Coordinate, boolean>;
+  mounts: Mount[];
+  /** Distance of the places of the map; empty: at most 100 places. */
+  step: string;
+  deadline: string;
+}
+
+export const COORDINATES = ["x", "y", "z", "yaw"] as const;
+export type Coordinate = (typeof COORDINATES)[number];
+export const UNIT: Record<Coordinate, UnitName> = { x: "mm", y: "mm", z: "mm", yaw: "deg" };
+
+/** A map with the task that it belongs to. */
+export interface Mapped {
+  project: string;
+  asked: ApiRequest;
+  /** What was sent, with all poses in the world. */
+  body: Record<string, unknown>;
+  world: Matrix;
+  answer: PlacementAnswer;
+  places: Place[];
+}
+
+export const regionTyped = signal<RegionTyped>({
+  x: ["-200", "200"],
+  y: ["-200", "200"],
+  z: ["-100", "200"],
+  yaw: ["-90", "90"],
+  free: { x: true, y: true, z: false, yaw: false },
+  mounts: [],
+  step: "",
+  deadline: "60",
+});
+export const layer = signal<Layer>({ height: null, mount: null });
+/** Why the last search has no answer. */
+export const refused = signal("");
+
+const last = signal<Mapped | null>(null);
+/** The map of this cell, whether or not the task has been changed since. */
+export const mapped = computed(() =>
+  last.value?.project === project.value.id ? last.value : null,
+);
+export const mapChanges = computed(() =>
+  mapped.value ? diff(mapped.value.asked, request.value) : [],
+);
+/** The map, as long as it belongs to the task; only with the panel open. */
+export const mapShown = computed(() =>
+  placing.value && !mapChanges.value.length ? mapped.value : null,
+);
+
+export interface Asked {
+  region: Record<string, unknown>;
+  resolution?: number;
+  deadline: number;
+}
+
+/**
+ * The region as `POST /placement` takes it, or what is wrong with it; `yaw`: of the present base
+ * [rad].
+ */
+export function regionOf(given: RegionTyped, yaw: number): Asked | { why: string } {
+  const region: Record<string, unknown> = {};
+  for (const name of COORDINATES.filter((each) => given.free[each])) {
+    const ends = given[name].map((text) => typedValue(text, UNIT[name]));
+    if (ends.includes(null)) return { why: `Enter two numbers: ${name} of the region.` };
+    const [low, high] = ends as [number, number];
+    if (!(low <= 0 && 0 <= high && low < high))
+      return { why: `${name}: 0, where the robot stands now, lies between both numbers.` };
+    region[name] = name === "yaw" ? [yaw + low, yaw + high] : [low, high];
+  }
+  if (given.mounts.length > 1) region.mounts = given.mounts;
+  if (!Object.keys(region).length) return { why: "Tick what may change: x, y, z, yaw or mounts." };
+  const deadline = typedValue(given.deadline, "s");
+  if (deadline === null || deadline <= 0) return { why: "Enter the seconds of the search." };
+  if (!given.step.trim()) return { region, deadline };
+  const resolution = typedValue(given.step, "mm");
+  if (resolution === null || resolution <= 0) return { why: "Enter the distance of places." };
+  return { region, resolution, deadline };
+}
+
+/** A move as a round of one stop, from which the arm does not return. */
+export function roundOf(asked: ApiRequest): ApiRequest {
+  if (asked.stops !== undefined) return asked;
+  const { duration, dwell } = asked;
+  const round: ApiRequest = { ...asKind(asked, "round"), closed: false };
+  if (isObject(dwell)) {
+    const { time, ...hold } = dwell;
+    return { ...round, time, wait: "goal", ...(Object.keys(hold).length ? { hold } : {}) };
+  }
+  return duration === undefined ? round : { ...round, time: duration };
+}
+
+/** Asks for the map of the region, and looks at its best place. */
+export async function search(): Promise<void> {
+  const asked = request.value;
+  refused.value = "";
+  try {
+    const robot = await robotOf(robotName(asked));
+    const world = worldOf(asked, robot);
+    const given = regionOf(regionTyped.value, yawOf(world));
+    if ("why" in given) throw new Error(given.why);
+    const cycle = seenFrom(roundOf(asked), inverse(world), robot);
+    const body = { cycle, base: poseOfMatrix(world), ...given };
+    const answer = (await compute("placement", body, given.deadline)) as PlacementAnswer | null;
+    if (!answer) return;
+    const places = placesOf(answer, world);
+    batch(() => {
+      layer.value = { height: null, mount: null };
+      last.value = { project: project.value.id, asked, body, world, answer, places };
+    });
+    void named(answer.id, "places");
+    if (request.value === asked) await look(bestPose(last.value!));
+  } catch (error) {
+    refused.value = said(error);
+  }
+}
+
+export const bestPose = ({ answer, world }: Mapped) =>
+  multiply(inverse(world), ofPose(answer.best.base));
+
+function said(error: unknown): string {
+  const fields = error instanceof Problem ? (error.details.errors ?? []) : [];
+  const text = error instanceof Error ? error.message : String(error);
+  return fields.length
+    ? fields.map(({ loc, msg }) => `${loc.slice(1).join(".")}: ${msg}.`).join(" ")
+    : asShown(text);
+}
+
+/** Moves the base in the picture, without computing. Throws Problem. */
+export async function moveBase(pose: Matrix): Promise<Looked> {
+  const asked = request.value;
+  const robot = await robotOf(robotName(asked));
+  const next: Looked = {
+    asked,
+    robot,
+    pose,
+    state: "moving",
+    energy: null,
+    why: "",
+    motion: null,
+  };
+  return (looking.value = next);
+}
+
+export const stopLooking = () => (looking.value = null);
+
+const SAME = 1e-9; // distance of two poses that are one
+let computing = 0; // looks whose joules are awaited; a new one ends those before
+
+/** Puts the base somewhere, and shows what the task needs there. */
+export async function look(pose: Matrix): Promise<void> {
+  const now = await moveBase(pose);
+  const map = mapShown.value;
+  const known = map?.places.find((each) => isAt(each.pose, pose));
+  const next = (more: Partial<Looked>) => {
+    if (looking.value?.pose === pose) looking.value = { ...looking.value, ...more };
+  };
+  if (known?.reason) return next({ state: "failed", why: `${capital(REASONS[known.reason])}.` });
+  if (run.value && !computing)
+    return next({ state: "failed", why: "Something else is being computed: wait, or cancel it." });
+  next({ state: "computing", energy: known?.energy ?? null });
+  computing += 1;
+  try {
+    const found = await motionAt(now, map);
+    next(
+      found
+        ? { state: "shown", energy: energyOf(found), motion: found }
+        : { state: "failed", why: "Cancelled." },
+    );
+  } catch (error) {
+    next({ state: "failed", energy: null, why: said(error) });
+  } finally {
+    computing -= 1;
+  }
+}
+
+const isAt = (one: Matrix, other: Matrix) =>
+  one.every((value, k) => Math.abs(value - other[k]!) < SAME);
+
+/** What the task needs at a place: a kept answer of the map, or a new one. Throws Problem. */
+async function motionAt({ asked, robot, pose }: Looked, map: Mapped | null) {
+  const there = seenFrom(asked, pose, robot);
+  const kept = map && isAt(bestPose(map), pose) ? map.answer.best.cycles[0]!.answer : null;
+  if (kept) {
+    const { answer } = await get<{ answer: unknown }>(kept.replace(/^\//, ""));
+    return answeredBy(answer, there, null);
+  }
+  const answer = await compute(endpointOf(asked), there, deadlineOf(asked));
+  if (!answer) return null;
+  void named((answer as { id: string | null }).id, "another place");
+  return answeredBy(answer, there, null);
+}
+
+/** Closes the panel; the base can no longer be dragged. */
+export function close(): void {
+  placing.value = false;
+  looking.value = null;
+  if (selected.value === BASE) selected.value = null;
+}
+
+/** Writes the place that is looked at into the task, as one step of undo. */
+export function accept(): void {
+  const now = looked.value;
+  if (!now) return;
+  batch(() => {
+    edit(seenFrom(now.asked, now.pose, now.robot), typed.value);
+    close();
+    toast.value = "All poses are seen from the new place of the base now.";
+  });
+}
