@@ -22,6 +22,7 @@ from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.candidates import STANDSTILL
 from joulepath.optimizer.search.waypoint_baselines import WAYPOINTS, along_waypoints
 
 WAYS: tuple[Literal["waypoints", "blended"], ...] = ("waypoints", "blended")
@@ -151,9 +152,10 @@ def _along_waypoints(cycle: Cycle, found: CycleSolution, end: Deadline) -> list[
 
 def _ways_of(cycle: Cycle, move: CycleMove, end: Deadline) -> dict[str, Baseline] | None:
     """Baselines of a move along a planned path, by name; None for a move that keeps its motion."""
-    if move.planned.tool_path is not None or move.passes:
-        return None
     q_start, q_goal = move.solution.start.q, move.solution.goal.q
+    stands = np.abs(q_goal - q_start).max() <= STANDSTILL
+    if stands or move.planned.tool_path is not None or move.passes:
+        return None
     problem = problem_of(cycle, move.planned, q_start, q_goal, end.left)
     least, ours = move.solution.duration, move.solution.energy.electrical.total
     found = along_waypoints(PreparedProblem.of(problem), q_start, q_goal, least, ours, end)

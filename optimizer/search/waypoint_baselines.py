@@ -34,7 +34,7 @@ from joulepath.optimizer.motion.time_scalings import SampledMotion
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.result.baseline import Baseline, BaselineName
 from joulepath.optimizer.search.baselines import compared, standing
-from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.candidates import STANDSTILL, Candidate
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.planned_paths import smooth_path
 
@@ -105,7 +105,9 @@ def along_waypoints(
     ours: float,
     deadline: Deadline,
 ) -> list[Baseline]:
-    """The baselines along a planned path between two configurations; none without a path.
+    """The baselines along a planned path between two configurations.
+
+    There are none without a path, and none of an arm that stands still.
 
     Args:
         prepared: the problem.
@@ -118,6 +120,8 @@ def along_waypoints(
     Raises:
         DeadlinePassed: the watched deadline passed.
     """
+    if np.abs(q_goal - q_start).max() <= STANDSTILL:
+        return []
     arm = prepared.problem.arm
     limits = arm.active_limits
     planned = prepared.surroundings.planned_paths(
