@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from playwright.sync_api import Browser, Page, expect
 
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
+from joulepath.app.api.report.bundle import attached_to
+from joulepath.app.api.report.check import checked
 from joulepath.optimizer.placement.mounts import about_z
 from joulepath.optimizer.placement.moved_cycle import cycle_at
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -187,6 +190,16 @@ def test_an_accepted_place_is_one_step_of_undo(found: Page) -> None:
     found.locator("#undo").click()
     assert state(found, "request") == before and state(found, "stale") is False
     expect(found.locator("#place-legend")).to_be_visible()
+
+
+def test_the_map_is_reported_on(found: Page) -> None:
+    found.locator("#report-places > summary").click()
+    menu = found.locator("#report-places")
+    with found.expect_download() as download:
+        menu.get_by_role("button", name="Page (HTML)").click()
+    file = Path(download.value.path()).read_bytes()
+    assert attached_to(file).answer["id"] == state(found, "mapShown.answer.id")
+    assert checked(file, again=False, request_id="test").agrees
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1440), ("dark", 1440), ("light", 390)])

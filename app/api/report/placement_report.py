@@ -166,6 +166,7 @@ def _rivals(answer: Json) -> tuple[Rival, ...]:
                 energy / dearest,
                 saved(1 - best["energy"] / energy),
                 True,
+                saves=best["energy"] < energy,
             )
             for name, energy in others.items()
             if energy is not None

@@ -51,6 +51,7 @@ def test_the_page_says_what_the_answer_says(page: bytes, answer: Json) -> None:
     ):
         assert words in text, words
     assert "was not computed" in text
+    assert text.count('class="claimed saves"') == 2
 
 
 def test_it_agrees_with_itself_and_with_its_cycles_answered_anew(page: bytes) -> None:
