@@ -7,12 +7,13 @@ import json
 import shutil
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import click
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+from joulepath.app.cli.table import table
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ Examples:
   joulepath identify monday.csv --robot ur10e
   joulepath identify cold.csv warm.csv --validate friday.csv --refit --output figures.json
   joulepath identify empty.csv loaded.csv --fit payload
+  joulepath identify monday.csv --validate friday.csv --format moves
   joulepath identify excitation.csv --method periodic --period 10 --validate friday.csv"""
 )
 @click.argument(
@@ -145,6 +147,15 @@ Examples:
     "--current-units", type=click.Choice(["A", "mA"]), default="A", help="Unit of currents."
 )
 @click.option(
+    "--format",
+    "wanted",
+    type=click.Choice(["json", "moves"]),
+    default="json",
+    show_default=True,
+    help="Kind of the answer; `moves`: a table to read, measured against predicted energy of the "
+    "moves that no fit has seen, and of their cycles.",
+)
+@click.option(
     "--torque-side",
     type=click.Choice(["motor", "link"]),
     help="Where torques were measured: at the motor, or behind the gear. Default: as the robot's "
@@ -169,6 +180,7 @@ def identify(
     gravity: tuple[float, float, float] | None,
     current_units: str,
     torque_side: str | None,
+    wanted: Literal["json", "moves"],
 ) -> None:
     """Finds the figures of one arm from its LOGS, with their standard deviations.
 
@@ -203,6 +215,9 @@ def identify(
     asked = validated(IdentifyRequest, _json(body), request_id)
     with terminal.steps(f"Identifying from {len(logs)} log{'s' if len(logs) > 1 else ''}"):
         answer = _answered(asked, read, request_id)
+    if wanted == "moves":
+        write(moves_of(parsed(answer)).encode(), output)
+        return
     write(answer, output)
     terminal.summary(lambda: summary_of(parsed(answer)))
 
@@ -241,6 +256,21 @@ def _packed(file: Path) -> bytes:
     return packed.getvalue()
 
 
+def moves_of(result: dict[str, Any]) -> str:
+    """A line per held-out move, and per cycle of logs that repeat: predicted energy with its
+    interval, measured energy, their difference."""
+    head = ("move", "log", "start [s]", "time [s]", "predicted [J]", "likely [J]", "measured [J]")
+    rows: list[tuple[str, ...]] = [(*head, "difference")]
+    for title, name in (("", "energies"), ("cycle ", "cycles")):
+        for k, each in enumerate(result["validation"][name], 1):
+            row = f"{title}{k}", str(each["log"] + 1), f"{each['start']:.2f}", f"{each['time']:.2f}"
+            likely = f"{each['p5']:.1f} to {each['p95']:.1f}"
+            difference = f"{each['measured'] / each['predicted'] - 1:+.1%}"
+            energies = f"{each['predicted']:.1f}", likely, f"{each['measured']:.1f}"
+            rows.append((*row, *energies, difference))
+    return table(rows)
+
+
 def summary_of(result: dict[str, Any]) -> dict[str, str]:
     """The lines of the summary by their titles."""
     fitted, own = result["validation"]["fitted"], result["validation"]["own"]
@@ -260,6 +290,10 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
             f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own "
             "figures"
         )
+    cycles = result["validation"]["cycles"]
+    if cycles:
+        covered = sum(each["p5"] <= each["measured"] <= each["p95"] for each in cycles)
+        lines["cycles"] = f"{len(cycles)}, {covered} of them with an energy between P5 and P95"
     if fitted["power"] is not None:
         lines["energy of a move"] = (
             f"{fitted['power']['energy_mean']:.2g} % error, {own['power']['energy_mean']:.2g} % "

@@ -45,6 +45,20 @@ def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> Non
     assert b"log1" not in told
 
 
+def test_measured_and_predicted_energies_are_a_table(here: Here, tmp_path: Path) -> None:
+    fitted, cycles = tmp_path / "monday.csv", tmp_path / "cycles.csv"
+    truth = truth_of(ROBOT)
+    fitted.write_bytes(csv_of(recorded(ROBOT, truth, moves=6)))
+    repeated = recorded(ROBOT, truth, moves=4, seed=1, closed=True, cycles=2)
+    cycles.write_bytes(csv_of(repeated))
+    logs = ("identify", str(fitted), "--validate", str(cycles), "--payload", "0")
+    output = tmp_path / "moves.txt"
+    assert here.run(*logs, "--format", "moves", "-o", str(output))[0] == 0
+    head, *rows = output.read_text().splitlines()
+    assert head.split()[:2] == ["move", "log"]
+    assert [row.split()[0] for row in rows] == [*map(str, range(1, 9)), "cycle", "cycle"]
+
+
 def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path) -> None:
     output = tmp_path / "figures.json"
     chosen = (

@@ -38,6 +38,7 @@ export interface Evaluation {
   robot: string;
   total: Evaluated;
   segments: Evaluated[];
+  cycles: Evaluated[];
   warnings: string[];
 }
 
