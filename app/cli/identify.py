@@ -147,6 +147,13 @@ Examples:
     "--current-units", type=click.Choice(["A", "mA"]), default="A", help="Unit of currents."
 )
 @click.option(
+    "--mains",
+    multiple=True,
+    type=click.FloatRange(0, min_open=True),
+    help="Mean power that a wattmeter in the mains cable of the control box showed during a log "
+    "[W]. Once for each log, in their order.",
+)
+@click.option(
     "--format",
     "wanted",
     type=click.Choice(["json", "moves"]),
@@ -180,6 +187,7 @@ def identify(
     gravity: tuple[float, float, float] | None,
     current_units: str,
     torque_side: str | None,
+    mains: tuple[float, ...],
     wanted: Literal["json", "moves"],
 ) -> None:
     """Finds the figures of one arm from its LOGS, with their standard deviations.
@@ -211,6 +219,7 @@ def identify(
     inertials = "automatic" if refit is None else "refit" if refit else "keep"
     body |= {"method": method, "period": period, "inertials": inertials}
     body |= {"friction": {"terms": list(terms)}}
+    body |= {"mains": list(mains)} if mains else {}
     body |= {"validate": [FILE_ID] * len(others)} if others else {}
     asked = validated(IdentifyRequest, _json(body), request_id)
     with terminal.steps(f"Identifying from {len(logs)} log{'s' if len(logs) > 1 else ''}"):
@@ -261,8 +270,9 @@ def moves_of(result: dict[str, Any]) -> str:
     interval, measured energy, their difference."""
     head = ("move", "log", "start [s]", "time [s]", "predicted [J]", "likely [J]", "measured [J]")
     rows: list[tuple[str, ...]] = [(*head, "difference")]
+    validation = result["validation"] or {"energies": [], "cycles": []}
     for title, name in (("", "energies"), ("cycle ", "cycles")):
-        for k, each in enumerate(result["validation"][name], 1):
+        for k, each in enumerate(validation[name], 1):
             row = f"{title}{k}", str(each["log"] + 1), f"{each['start']:.2f}", f"{each['time']:.2f}"
             likely = f"{each['p5']:.1f} to {each['p95']:.1f}"
             difference = f"{each['measured'] / each['predicted'] - 1:+.1%}"
@@ -273,10 +283,10 @@ def moves_of(result: dict[str, Any]) -> str:
 
 def summary_of(result: dict[str, Any]) -> dict[str, str]:
     """The lines of the summary by their titles."""
-    fitted, own = result["validation"]["fitted"], result["validation"]["own"]
     told = [each for each in result["parameters"] if each["identified"]]
     lines = {"identified": f"{len(told)} of {len(result['parameters'])} figures"}
-    lines["validated on"] = f"{result['validation']['moves']} moves that no fit has seen"
+    if result["validation"] is not None:
+        lines |= _errors(result["validation"])
     if result["warnings"]:
         lines["warnings"] = " ".join(result["warnings"])
     if result["payload"] is not None:
@@ -285,21 +295,36 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
             carried["why"]
             or f"{carried['mass']:.3g} kg, standard deviation {carried['mass_sd']:.2g} kg"
         )
+    shares = [f"{_place(each)} ({each['share']:.0%})" for each in result["measure"]]
+    if shares:
+        lines["measure next"] = f"{', '.join(shares)} of the variance. {result['advice']['do']}"
+    return lines
+
+
+def _errors(validation: dict[str, Any]) -> dict[str, str]:
+    """The lines of the errors on moves that no fit has seen."""
+    fitted, own, cycles = validation["fitted"], validation["own"], validation["cycles"]
+    lines = {"validated on": f"{validation['moves']} moves that no fit has seen"}
     if fitted["torque"] is not None:
         lines["torque"] = (
             f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own "
             "figures"
         )
-    cycles = result["validation"]["cycles"]
-    if cycles:
-        covered = sum(each["p5"] <= each["measured"] <= each["p95"] for each in cycles)
-        lines["cycles"] = f"{len(cycles)}, {covered} of them with an energy between P5 and P95"
     if fitted["power"] is not None:
         lines["energy of a move"] = (
             f"{fitted['power']['energy_mean']:.2g} % error, {own['power']['energy_mean']:.2g} % "
             "with the robot's own"
         )
+    if cycles:
+        covered = sum(each["p5"] <= each["measured"] <= each["p95"] for each in cycles)
+        lines["cycles"] = f"{len(cycles)}, {covered} of them with an energy between P5 and P95"
     return lines
+
+
+def _place(advice: dict[str, Any]) -> str:
+    """A figure, with its joint."""
+    name = advice["figure"].replace("_", " ")
+    return name if advice["joint"] is None else f"{name} of joint {advice['joint'] + 1}"
 
 
 def _percent(torque: dict[str, Any]) -> str:
