@@ -14,12 +14,12 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
-from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, ur3e
+from benchmarks.identification_logs import MISSING, folder, ur3e
 from benchmarks.public_logs import panda_by_inria, ur10e_days
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
@@ -32,6 +32,7 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import recorded, truth_of
 
 METHODS: tuple[Method, ...] = get_args(Method)
+REFIT = "automatic, links refitted"
 # K, of a joint over a simulated log, and 1/K, by which its friction falls
 WARMING, RATE = 20.0, 0.012
 # N and N·m, noise of a sensor beneath the base
@@ -54,7 +55,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """Errors of a method [%], or why it does not fit the logs."""
+    """Errors of a method [%], or `why` it does not fit the logs."""
 
     case: str
     method: str
@@ -71,22 +72,14 @@ class Row:
 
 def real_cases(place: Path) -> Iterator[Case]:
     """Logs of real arms."""
-    ur10e, days = ur10e_days(place)
-    yield Case("UR10e, another day", ur10e, [days["20_02_10"][1]], [days["20_02_12"][0]])
-    yield Case("UR3e, each motion from the others", *_one(ur3e(place)), options=_each())
+    ur10e, days = ur10e_days(place, ("20_02_10", "20_02_12"))
+    first, second = days.values()
+    yield Case("UR10e, another day", ur10e, first, second)
+    robot, log = ur3e(place)
+    each = IdentificationOptions(held_out=1.0)
+    yield Case("UR3e, each motion from the others", robot, [log], options=each)
     panda = load_robot("panda")
     yield Case("Panda, other parts of the log", panda, [panda_by_inria(place)])
-    coupled = IdentificationOptions(couplings=(WRIST,), terms=("coulomb", "viscous", "offset"))
-    yield Case("TX40, other parts of the log", *_one(tx40(place)), options=coupled)
-
-
-def _one(logged: tuple[Robot, Log]) -> tuple[Robot, list[Log]]:
-    return logged[0], [logged[1]]
-
-
-def _each() -> IdentificationOptions:
-    """Each motion is held out in its turn."""
-    return IdentificationOptions(held_out=1.0)
 
 
 def simulated_cases() -> Iterator[Case]:
@@ -133,21 +126,22 @@ def _on_sensor(robot: Robot) -> Log:
     return replace(log, wrench=wrench + noise)
 
 
-def row_of(case: Case, method: Method) -> Row:
+def row_of(case: Case, name: str) -> Row:
     """Errors of a method on the logs of a case."""
-    options = replace(case.options, method=method)
+    method: Any = "automatic" if name == REFIT else name
+    options = replace(case.options, method=method, refit=True if name == REFIT else None)
     options = replace(options, held_out=0.0) if case.others else options
     try:
         found = identify(case.robot, case.logs, options, progress=False)
         errors = found.validate(case.others) if case.others else found.validation
     except (InvalidProblem, JoulepathError) as error:
-        return Row(case.title, method, why=str(error))
+        return Row(case.title, name, why=str(error))
     assert errors is not None
     torque, power = errors.fitted.torque, errors.fitted.power
     moving = () if torque is None else torque.relative[np.isfinite(torque.relative)]
     return Row(
         case.title,
-        method,
+        name,
         None if torque is None else float(np.mean(moving)),
         None if torque is None else float(np.max(moving)),
         None if torque is None else torque.shaft_energy,
@@ -166,15 +160,11 @@ def main() -> int:
     print(f"| {' | '.join(names)} |\n|{' --- |' * len(names)}")
     rows = list[Row]()
     for case in cases:
-        for method in METHODS:
-            row = row_of(case, method)
+        for row in (row_of(case, name) for name in (METHODS[0], REFIT, *METHODS[1:])):
             rows.append(row)
             if not row.why:
                 cells = (_cell(each) for each in (row.torque, row.worst, row.shaft, row.move))
-                print(f"| {row.case} | `{row.method}` | {' | '.join(cells)} |", flush=True)
-    for row in rows:
-        if row.why:
-            print(f"{row.case}, {row.method}: {row.why}")
+                print(f"| {row.case} | {row.method} | {' | '.join(cells)} |", flush=True)
     write_json(given.json, {"rows": [vars(row) for row in rows]})
     return 0
 
