@@ -4,8 +4,9 @@
 
 Real logs are those of `benchmarks.identification_logs` and `benchmarks.public_logs`. No public log
 has a repeated motion, a sensor beneath the base or joints that warm up: simulated ones stand in.
-Figures are errors on motions that no fit has seen: of other days, or of the same log where it is
-the only one.
+A cell has errors [%] on motions that no fit has seen, of other days, or of the same log where it is
+the only one: of torques, mean over the joints; of the energy at the shafts; of the energy of a
+move, where power was logged. It is empty if the method refuses the logs.
 """
 
 from __future__ import annotations
@@ -61,8 +62,6 @@ class Row:
     method: str
     torque: float | None = None
     """Mean over the joints of the error over the measured torque."""
-    worst: float | None = None
-    """The largest of them."""
     shaft: float | None = None
     """Error of the energy at the shafts."""
     move: float | None = None
@@ -74,12 +73,12 @@ def real_cases(place: Path) -> Iterator[Case]:
     """Logs of real arms."""
     ur10e, days = ur10e_days(place, ("20_02_10", "20_02_12"))
     first, second = days.values()
-    yield Case("UR10e, another day", ur10e, first, second)
+    yield Case("UR10e", ur10e, first, second)
     robot, log = ur3e(place)
     each = IdentificationOptions(held_out=1.0)
-    yield Case("UR3e, each motion from the others", robot, [log], options=each)
+    yield Case("UR3e", robot, [log], options=each)
     panda = load_robot("panda")
-    yield Case("Panda, other parts of the log", panda, [panda_by_inria(place)])
+    yield Case("Panda", panda, [panda_by_inria(place)])
 
 
 def simulated_cases() -> Iterator[Case]:
@@ -90,11 +89,11 @@ def simulated_cases() -> Iterator[Case]:
     repeated = recorded(robot, truth, moves=8, seed=UNIT, closed=True, cycles=4).log()
     period = float(np.diff(repeated.cycle_rows)[0]) / repeated.rate
     options = IdentificationOptions(period=period)
-    yield Case("simulated UR10e, repeated motion", robot, [repeated], [other], options)
-    yield Case("simulated UR10e, warming up", robot, [_warming(robot)], [other])
+    yield Case("repeated", robot, [repeated], [other], options)
+    yield Case("warming up", robot, [_warming(robot)], [other])
     heavier = _heavier(robot)
     other = recorded(heavier, truth, moves=8, seed=31).log()
-    yield Case("simulated UR10e, sensor beneath the base", robot, [_on_sensor(heavier)], [other])
+    yield Case("on a sensor", robot, [_on_sensor(heavier)], [other])
 
 
 def _warming(robot: Robot) -> Log:
@@ -143,7 +142,6 @@ def row_of(case: Case, name: str) -> Row:
         case.title,
         name,
         None if torque is None else float(np.mean(moving)),
-        None if torque is None else float(np.max(moving)),
         None if torque is None else torque.shaft_energy,
         None if power is None else power.energy_mean,
     )
@@ -156,21 +154,23 @@ def main() -> int:
     if place is None:
         print(f"Real logs are left out. {MISSING}")
     cases = [*(real_cases(place) if place else ()), *simulated_cases()]
-    names = ("logs", "method", "torque [%]", "worst joint [%]", "shafts [%]", "move [%]")
-    print(f"| {' | '.join(names)} |\n|{' --- |' * len(names)}")
-    rows = list[Row]()
-    for case in cases:
-        for row in (row_of(case, name) for name in (METHODS[0], REFIT, *METHODS[1:])):
-            rows.append(row)
-            if not row.why:
-                cells = (_cell(each) for each in (row.torque, row.worst, row.shaft, row.move))
-                print(f"| {row.case} | {row.method} | {' | '.join(cells)} |", flush=True)
-    write_json(given.json, {"rows": [vars(row) for row in rows]})
+    names = (METHODS[0], REFIT, *METHODS[1:])
+    rows = {name: [row_of(case, name) for case in cases] for name in names}
+    print(
+        f"| method | {' | '.join(case.title for case in cases)} |\n|{' --- |' * (len(cases) + 1)}"
+    )
+    for name, found in rows.items():
+        print(f"| {name} | {' | '.join(map(_cell, found))} |")
+    write_json(given.json, {"rows": [vars(row) for found in rows.values() for row in found]})
     return 0
 
 
-def _cell(error: float | None) -> str:
-    return "" if error is None else f"{error:.2g}"
+def _cell(row: Row) -> str:
+    """Errors [%] of torques, of the energy at the shafts, and of the energy of a move."""
+    if row.why:
+        return ""
+    errors = (row.torque, row.shaft, row.move)
+    return " / ".join("–" if each is None else f"{each:.2g}" for each in errors)
 
 
 if __name__ == "__main__":

@@ -55,9 +55,9 @@ class IdentifiedParameter:
 
 @dataclass(frozen=True, eq=False)
 class TorqueErrors:
-    """Errors of predicted torques; null for joints at rest."""
+    """Errors of predicted torques; null for joints at rest or without efforts."""
 
-    rmse: Annotated[PerJoint, Unit("N·m")]
+    rmse: Annotated[PerJoint, Unit("N·m"), NullIfNotFinite]
     """Root mean square of the error of each joint in motion."""
     relative: PercentPerJoint
     """Error over the measured torque of each joint in motion."""

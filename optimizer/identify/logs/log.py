@@ -54,7 +54,8 @@ class Log:
     a: Array
     """Accelerations (n, joints) [rad/s²]."""
     effort: Array | None = None
-    """Efforts (n, joints), in the unit of their meaning."""
+    """Efforts (n, joints), in the unit of their meaning; NaN for a joint whose effort was not
+    logged."""
     effort_meaning: EffortMeaning | None = None
     torque_side: TorqueSide = "motor"
     """Where torques were measured: `motor`, with rotor and friction, or `link`, by sensors behind
@@ -100,6 +101,11 @@ class Log:
             raise InvalidProblem(
                 "torque_side", "Currents are those of the motors: torque_side must be motor."
             )
+
+    @property
+    def has_all_efforts(self) -> bool:
+        """Whether the efforts of all joints were logged."""
+        return self.effort is not None and bool(np.isfinite(self.effort[0]).all())
 
     @property
     def joints(self) -> int:

@@ -85,9 +85,11 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         for arm, rows in folds
     ]
     measured, predicted, v, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
-    use = np.isfinite(measured).all(axis=1)
-    measured, predicted, v, weight = measured[use], predicted[use], v[use], weight[use]
-    moving, error = (np.abs(v) > threshold).astype(float), measured - predicted
+    use, logged = np.isfinite(measured), np.isfinite(measured).any(axis=0)
+    moving = ((np.abs(v) > threshold) & use).astype(float)
+    # joints without efforts are in no sum
+    measured, predicted = np.where(use, measured, 0.0), np.where(use, predicted, 0.0)
+    error = measured - predicted
 
     def relative(chosen: Array) -> Array:
         size = np.sqrt((chosen * measured**2).sum(axis=0))
@@ -105,7 +107,11 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         float(weight @ (copper * each**2).sum(axis=1)) for each in (measured, predicted)
     )
     return TorqueErrors(
-        rmse=np.sqrt((moving * error**2).sum(axis=0) / np.maximum(moving.sum(axis=0), 1)),
+        rmse=np.where(
+            logged,
+            np.sqrt((moving * error**2).sum(axis=0) / np.maximum(moving.sum(axis=0), 1)),
+            np.nan,
+        ),
         relative=relative(moving),
         relative_all=relative(np.ones_like(v)),
         shaft_energy=100 * abs(predicted_work / work - 1) if work else np.nan,
