@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.quality.answered import AnsweredEnergies
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -90,7 +91,7 @@ def fit_mains(
         if reading is None:
             continue
         drawn, sd = _mean_power(energies, rows.take(rows.log == log))
-        if reading < drawn:
+        if reading < drawn - P95 * sd:
             raise InvalidProblem(
                 "mains",
                 f"The wattmeter showed {reading:g} W during log {log + 1}, and the arm alone drew "
