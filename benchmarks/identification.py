@@ -11,6 +11,8 @@
   deviations, and of the energies of unseen moves between P5 and P95; the same with moves that draw
   a power of their own beside the model's. The gates are those of 200 runs, which take some minutes;
   fewer runs have a margin for their sampling error.
+- `cycles`: share of the energies of the cycles of another log of a simulated UR10e between P5 and
+  P95, with moves that draw a power of their own.
 - `standins`: simulated logs in place of real logs that are not public: another motion of the same
   day and other days of a UR10e, a payload from two logs of different days, halves of a log of a
   Panda.
@@ -30,9 +32,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
-from benchmarks.gate import Gate
+from benchmarks.gate import Gate, sampling_margin
 from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_reference, ur3e
-from benchmarks.identification_sessions import sessions, ur10e_sessions
+from benchmarks.identification_sessions import MOVE_EFFECT, cycles, sessions, ur10e_sessions
 from benchmarks.identification_standins import TORQUE_SENSOR, behind_the_gears, day_of, log_of
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
@@ -54,12 +56,6 @@ DRAWS = 100
 MOVES_OF_A_DRAW = 5
 # share of the runs in which a figure is told, for its own share to count
 OFTEN = 0.2
-# runs of the gates of shares; fewer runs get a margin of so many of their further standard errors
-GATED_RUNS = 200
-MARGIN = 2.0
-# W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a
-# move's energy
-MOVE_EFFECT = 0.6
 TX40_OPTIONS = IdentificationOptions(
     terms=("coulomb", "viscous", "offset"),
     couplings=(WRIST,),
@@ -197,16 +193,6 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
     ]
 
 
-def sampling_margin(sd: float, runs: int) -> float:
-    """Margin of a mean over few runs: the standard errors beyond those of `GATED_RUNS` runs.
-
-    Args:
-        sd: standard deviation of one run.
-        runs: number of runs.
-    """
-    return float(MARGIN * sd * max(0.0, runs**-0.5 - GATED_RUNS**-0.5))
-
-
 def _true(truth: Truth, figure: str, joint: int | None) -> float:
     """The true value of a figure of a simulated arm, whose links are as heavy as the robot's."""
     if joint is None:
@@ -304,6 +290,7 @@ PARTS: dict[str, Callable[[Path | None, int], list[Gate]]] = {
     "ur3e": ur3e_power,
     "tx40": tx40_torque,
     "synthetic": synthetic,
+    "cycles": cycles,
     "standins": standins,
     "sessions": sessions,
     "ur10e_sessions": ur10e_sessions,

@@ -6,11 +6,12 @@ No power is logged: the measured energy of a move is that of its currents.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.gate import Gate
+from benchmarks.gate import GATED_RUNS, Gate, sampling_margin
 from benchmarks.identification_standins import day_of, log_of
 from benchmarks.public_logs import ur10e_days
 from joulepath.models.registry import load_robot
@@ -18,7 +19,7 @@ from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
-from tests.identification_logs import truth_of
+from tests.identification_logs import off_the_model, recorded, truth_of
 
 NUMBERS = (1, 2, 6)
 # simulated arms, days of each, those of the fits first, and moves of a day
@@ -27,6 +28,9 @@ UNITS, DAYS, MOVES = 6, 10, 8
 DAY_SD = 0.025
 # draws of the logs of a fit among the real ones
 DRAWS = 12
+# W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a
+# move's energy
+MOVE_EFFECT = 0.6
 WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 # of the 90 % that the interval promises
 LEAST, MOST = 0.87, 0.93
@@ -93,3 +97,19 @@ def _gate(title: str, covered: list[tuple[float, int]]) -> Gate:
     shares, moves = zip(*covered, strict=True)
     share = float(np.average(shares, weights=moves))
     return Gate(f"{title}: moves of other days between P5 and P95", share, LEAST, MOST)
+
+
+def cycles(_: Path | None, runs: int) -> list[Gate]:
+    """Energies of whole cycles of logs that repeat, of the day of the fit."""
+    robot, shares = load_robot("ur10e"), list[float]()
+    for seed in range(runs):
+        truth = truth_of(robot, seed)
+        fitted = off_the_model(recorded(robot, truth, moves=14, seed=seed).log(), MOVE_EFFECT, seed)
+        repeated = recorded(robot, truth, moves=6, seed=GATED_RUNS + seed, closed=True, cycles=5)
+        other = off_the_model(repeated.log(), MOVE_EFFECT, GATED_RUNS + seed)
+        found = identify(robot, [fitted], WITHOUT_SPLIT)
+        same_day = replace(found, spread=replace(found.spread, session_sd=np.zeros(robot.nq)))
+        shares.append(float(np.mean([each.covered for each in same_day.validate([other]).cycles])))
+    margin = sampling_margin(float(np.std(shares)), runs)
+    title = f"cycles, {runs} simulated arms: share between P5 and P95"
+    return [Gate(title, float(np.mean(shares)), 0.85 - margin, 0.95 + margin)]

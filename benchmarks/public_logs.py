@@ -12,6 +12,7 @@ In the folder `logs` that `benchmarks.identification_logs.folder` finds:
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from io import StringIO
 from pathlib import Path
 
@@ -38,13 +39,16 @@ UR10E_DAYS: dict[str, tuple[str, ...]] = {
 POSSIBLE_Q, POSSIBLE_V = 7.0, 4.0
 
 
-def ur10e_days(place: Path) -> tuple[Robot, dict[str, list[Log]]]:
+def ur10e_days(
+    place: Path, days: Collection[str] = UR10E_DAYS
+) -> tuple[Robot, dict[str, list[Log]]]:
     """Logs of a UR10e without payload, by day."""
     files = place / "dynamic_calibration" / "dataset_ur10e" / "identification_data"
     robot = load_robot("ur10e")
     return robot, {
         day: [ur10e_log(robot, next(files.glob(f"ur-{day}*{name}.csv"))) for name in names]
         for day, names in UR10E_DAYS.items()
+        if day in days
     }
 
 

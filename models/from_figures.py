@@ -17,6 +17,7 @@ from joulepath.models.robot import (
     FrictionLaw,
     Limits,
     LinkCapsule,
+    Mains,
     Robot,
     TorqueSide,
     link_names,
@@ -65,6 +66,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         elbow=_elbow(figures, capsules),
         T_base_base_link=_base_link(figures["kinematics"]),
         gravity=_gravity(figures["kinematics"]),
+        mains=_mains(figures.get("mains")),
     )
 
 
@@ -90,6 +92,12 @@ def _gravity(kinematics: dict[str, Any]) -> Array:
     if "gravity" not in kinematics:
         return UPRIGHT
     return read_only(kinematics["gravity"]["value"], (3,), "kinematics.gravity")
+
+
+def _mains(mains: dict[str, Any] | None) -> Mains | None:
+    if mains is None:
+        return None
+    return Mains(**{part: float(mains[part]["value"]) for part in ("factor", "constant")})
 
 
 def _torque_side(limits: dict[str, Any]) -> TorqueSide:

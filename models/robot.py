@@ -138,6 +138,20 @@ class Electronics:
 
 
 @dataclass(frozen=True)
+class Mains:
+    """What the control box draws from the mains: `factor` times the energy of the arm's bus, and a
+    `constant` power [W].
+    """
+
+    factor: float
+    constant: float
+
+    def energy(self, drawn: float, duration: float) -> float:
+        """Energy from the mains [J] for an energy drawn from the bus [J] in a duration [s]."""
+        return self.factor * drawn + self.constant * duration
+
+
+@dataclass(frozen=True)
 class DefaultMotion:
     """The robot controller's default motion: speed [rad/s] and acceleration [rad/s²] of a
     leading-axis trapezoid.
@@ -174,7 +188,7 @@ class Robot:
     speed limit; None for an arm without an elbow. `torque_side` is `motor` if the torque limits
     include rotor and friction, `link` if they exclude them. `T_base_base_link` (4, 4) is the pose
     of ROS's frame `base_link` in `base`. `gravity` (3,) [m/s²] is that in `base` unless an arm has
-    another mounting.
+    another mounting. `mains` is None where nobody measured what the control box draws.
     """
 
     name: str
@@ -193,6 +207,7 @@ class Robot:
     elbow: LinkCapsule | None = None
     T_base_base_link: Array = field(default_factory=lambda: np.eye(4), repr=False)
     gravity: Array = field(default_factory=lambda: UPRIGHT, repr=False)
+    mains: Mains | None = None
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.nq} joints, payload up to {self.rated_payload:g} kg)"

@@ -17,7 +17,7 @@ from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.close_pass import close_pass
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.deadline import checkpoint
-from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
+from joulepath.optimizer.dynamics.dwell import holding_power, with_dwell
 from joulepath.optimizer.dynamics.losses import breakdown, friction_torque, relative_error
 from joulepath.optimizer.dynamics.torque_bound import TorqueSamples, torque_bounds
 from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle
@@ -81,8 +81,8 @@ def certify(
         checkpoint(len(replay.t) * CERTIFICATE.time_after_torques)
     energy = replay.energy
     if problem.dwell is not None:
-        dwell = dwell_energy(problem.dwell, arm, replay.final_holding_power, spline.duration)
-        energy = energy.with_dwell(dwell)
+        held = replay.final_holding_power
+        energy = with_dwell(energy, problem.dwell, arm, held, spline.duration)
     clearance = proven_clearance(collision_model(arm), spline) if arm.collisions else None
     return Certificate(
         worst_ratio=replay.limit_ratios | replay.path_ratios | replay.tool_path_ratios(problem),

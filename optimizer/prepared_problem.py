@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import ClosestPair
-from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, holding_times
+from joulepath.optimizer.dynamics.dwell import holding_power, holding_times, with_dwell
 from joulepath.optimizer.dynamics.interval import arm_spread
 from joulepath.optimizer.dynamics.kernel import Kernel
 from joulepath.optimizer.dynamics.plant import Plant
@@ -202,7 +202,7 @@ class PreparedProblem(Plant):
         if dwell is None:
             return energy
         hold = float(self.holding_power(spline.control_points[-1]))
-        return energy.with_dwell(dwell_energy(dwell, self.arm, hold, spline.duration))
+        return with_dwell(energy, dwell, self.arm, hold, spline.duration)
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """Sensitivity of the electrical energy of a motion and its dwell to the arm's figures."""

@@ -130,12 +130,13 @@ def recorded(
     seed: int = 0,
     noise: Noise | None = None,
     closed: bool = False,
+    cycles: int = 1,
 ) -> Recording:
     """Random motions from rest to rest, half a second of rest before, between and after them. The
     first two lead from one end to another and back: the same motion twice, in both directions. If
-    `closed`, the last one ends where the first one began."""
+    `closed`, the last one ends where the first one began, and all are repeated in `cycles`."""
     random = np.random.default_rng(seed)
-    q, v, a, ranges = _motions(robot, moves, rate, random, closed)
+    q, v, a, ranges = _motions(robot, moves, rate, random, closed, cycles)
     tau_rigid = rigid_torques(robot, truth, q, v, a)
     sign = v / np.sqrt(v * v + truth.knee**2)
     friction = (
@@ -180,7 +181,12 @@ def rigid_torques(robot: Robot, truth: Truth, q: Array, v: Array, a: Array) -> A
 
 
 def _motions(
-    robot: Robot, count: int, rate: float, random: np.random.Generator, closed: bool
+    robot: Robot,
+    count: int,
+    rate: float,
+    random: np.random.Generator,
+    closed: bool,
+    cycles: int,
 ) -> tuple[Array, Array, Array, tuple[LogMove, ...]]:
     """q, v, a (n, nq) of quintic moves, and the rows of moves and rests."""
     limits, nq = robot.limits, robot.nq
@@ -190,6 +196,7 @@ def _motions(
         ends[2] = ends[0]
     if closed:
         ends[-1] = ends[0]
+        ends += ends[1:] * (cycles - 1)
     rest = round(0.5 * rate)
     parts: list[tuple[Array, Array, Array]] = [_still(ends[0], rest)]
     ranges, row = [LogMove(0, rest, True)], rest

@@ -126,10 +126,12 @@ def settings_in(file: Path) -> dict[str, Any]:
 
 
 def moves_of(answer: dict[str, Any]) -> str:
-    """A line per move: predicted energy with its interval, measured energy, their difference."""
+    """A line per move, and per cycle of a log that repeats: predicted energy with its interval,
+    measured energy, their difference."""
     head = ("move", "start [s]", "time [s]", "predicted [J]", "likely [J]", "measured [J]", "by")
     rows: list[tuple[str, ...]] = [(*head, "difference")]
     parts = [(str(k), part) for k, part in enumerate(answer["segments"], 1)]
+    parts += [(f"cycle {k}", part) for k, part in enumerate(answer["cycles"], 1)]
     rows += [_row(name, part) for name, part in [*parts, ("total", answer["total"])]]
     return table(rows)
 

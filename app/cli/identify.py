@@ -7,12 +7,13 @@ import json
 import shutil
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import click
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+from joulepath.app.cli.table import table
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ Examples:
   joulepath identify monday.csv --robot ur10e
   joulepath identify cold.csv warm.csv --validate friday.csv --refit --output figures.json
   joulepath identify empty.csv loaded.csv --fit payload
+  joulepath identify monday.csv --validate friday.csv --format moves
   joulepath identify excitation.csv --method periodic --period 10 --validate friday.csv"""
 )
 @click.argument(
@@ -145,6 +147,22 @@ Examples:
     "--current-units", type=click.Choice(["A", "mA"]), default="A", help="Unit of currents."
 )
 @click.option(
+    "--mains",
+    multiple=True,
+    type=click.FloatRange(0, min_open=True),
+    help="Mean power that a wattmeter in the mains cable of the control box showed during a log "
+    "[W]. Once for each log, in their order.",
+)
+@click.option(
+    "--format",
+    "wanted",
+    type=click.Choice(["json", "moves"]),
+    default="json",
+    show_default=True,
+    help="Kind of the answer; `moves`: a table to read, measured against predicted energy of the "
+    "moves that no fit has seen, and of their cycles.",
+)
+@click.option(
     "--torque-side",
     type=click.Choice(["motor", "link"]),
     help="Where torques were measured: at the motor, or behind the gear. Default: as the robot's "
@@ -169,6 +187,8 @@ def identify(
     gravity: tuple[float, float, float] | None,
     current_units: str,
     torque_side: str | None,
+    mains: tuple[float, ...],
+    wanted: Literal["json", "moves"],
 ) -> None:
     """Finds the figures of one arm from its LOGS, with their standard deviations.
 
@@ -199,10 +219,14 @@ def identify(
     inertials = "automatic" if refit is None else "refit" if refit else "keep"
     body |= {"method": method, "period": period, "inertials": inertials}
     body |= {"friction": {"terms": list(terms)}}
+    body |= {"mains": list(mains)} if mains else {}
     body |= {"validate": [FILE_ID] * len(others)} if others else {}
     asked = validated(IdentifyRequest, _json(body), request_id)
     with terminal.steps(f"Identifying from {len(logs)} log{'s' if len(logs) > 1 else ''}"):
         answer = _answered(asked, read, request_id)
+    if wanted == "moves":
+        write(moves_of(parsed(answer)).encode(), output)
+        return
     write(answer, output)
     terminal.summary(lambda: summary_of(parsed(answer)))
 
@@ -241,12 +265,28 @@ def _packed(file: Path) -> bytes:
     return packed.getvalue()
 
 
+def moves_of(result: dict[str, Any]) -> str:
+    """A line per held-out move, and per cycle of logs that repeat: predicted energy with its
+    interval, measured energy, their difference."""
+    head = ("move", "log", "start [s]", "time [s]", "predicted [J]", "likely [J]", "measured [J]")
+    rows: list[tuple[str, ...]] = [(*head, "difference")]
+    validation = result["validation"] or {"energies": [], "cycles": []}
+    for title, name in (("", "energies"), ("cycle ", "cycles")):
+        for k, each in enumerate(validation[name], 1):
+            row = f"{title}{k}", str(each["log"] + 1), f"{each['start']:.2f}", f"{each['time']:.2f}"
+            likely = f"{each['p5']:.1f} to {each['p95']:.1f}"
+            difference = f"{each['measured'] / each['predicted'] - 1:+.1%}"
+            energies = f"{each['predicted']:.1f}", likely, f"{each['measured']:.1f}"
+            rows.append((*row, *energies, difference))
+    return table(rows)
+
+
 def summary_of(result: dict[str, Any]) -> dict[str, str]:
     """The lines of the summary by their titles."""
-    fitted, own = result["validation"]["fitted"], result["validation"]["own"]
     told = [each for each in result["parameters"] if each["identified"]]
     lines = {"identified": f"{len(told)} of {len(result['parameters'])} figures"}
-    lines["validated on"] = f"{result['validation']['moves']} moves that no fit has seen"
+    if result["validation"] is not None:
+        lines |= _errors(result["validation"])
     if result["warnings"]:
         lines["warnings"] = " ".join(result["warnings"])
     if result["payload"] is not None:
@@ -255,6 +295,16 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
             carried["why"]
             or f"{carried['mass']:.3g} kg, standard deviation {carried['mass_sd']:.2g} kg"
         )
+    shares = [f"{_place(each)} ({each['share']:.0%})" for each in result["measure"]]
+    if shares:
+        lines["measure next"] = f"{', '.join(shares)} of the variance. {result['advice']['do']}"
+    return lines
+
+
+def _errors(validation: dict[str, Any]) -> dict[str, str]:
+    """The lines of the errors on moves that no fit has seen."""
+    fitted, own, cycles = validation["fitted"], validation["own"], validation["cycles"]
+    lines = {"validated on": f"{validation['moves']} moves that no fit has seen"}
     if fitted["torque"] is not None:
         lines["torque"] = (
             f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own "
@@ -265,7 +315,16 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
             f"{fitted['power']['energy_mean']:.2g} % error, {own['power']['energy_mean']:.2g} % "
             "with the robot's own"
         )
+    if cycles:
+        covered = sum(each["p5"] <= each["measured"] <= each["p95"] for each in cycles)
+        lines["cycles"] = f"{len(cycles)}, {covered} of them with an energy between P5 and P95"
     return lines
+
+
+def _place(advice: dict[str, Any]) -> str:
+    """A figure, with its joint."""
+    name = advice["figure"].replace("_", " ")
+    return name if advice["joint"] is None else f"{name} of joint {advice['joint'] + 1}"
 
 
 def _percent(torque: dict[str, Any]) -> str:

@@ -15,11 +15,12 @@ _Column = (
     | Annotated[int, Field(ge=1, le=1000)]
 )
 _Columns = Annotated[list[_Column], Field(min_length=1, max_length=16)]
+_Efforts = Annotated[list[_Column | None], Field(min_length=1, max_length=16)]
 
 
 class LogColumns(Request):
     """Names of the columns of a log, as in its header, or their numbers from 1; of joints one each,
-    from base to flange. Null: none.
+    from base to flange. Null: none. Efforts may be null for joints whose effort was not logged.
     """
 
     time: _Column = described("Times [s].", None, "time_s")
@@ -29,13 +30,13 @@ class LogColumns(Request):
     q: _Columns = described("Joint positions.", None, ["axis_1", "axis_2"])
     v: _Columns | None = described("Joint velocities.", None, ["speed_1", "speed_2"], default=None)
     a: _Columns | None = described("Joint accelerations.", None, ["acc_1", "acc_2"], default=None)
-    current: _Columns | None = described(
+    current: _Efforts | None = described(
         "Motor currents.", None, ["amps_1", "amps_2"], default=None
     )
-    torque: _Columns | None = described(
+    torque: _Efforts | None = described(
         "Torques at the joints.", None, ["nm_1", "nm_2"], default=None
     )
-    effort: _Columns | None = described(
+    effort: _Efforts | None = described(
         "Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None
     )
     temperature: _Columns | None = described(

@@ -44,6 +44,7 @@ REPLACEABLE: dict[str, dict[str, tuple[float, float]]] = {
         "controller_power": (0.0, 1e5),
         "regeneration": (0.0, 1.0),
     },
+    "mains": {"factor": (1.0, 10.0), "constant": (0.0, 1e5)},
     "inertials": {
         "mass": (1e-6, 1e5),
         "center_of_mass": (-1e3, 1e3),
@@ -147,7 +148,7 @@ def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str,
         if section == "friction_laws":
             replaced[section] = _laws(figures[section], content, nq)
         elif section in REPLACEABLE:
-            changed = _section(section, figures[section], content, nq)
+            changed = _section(section, figures.get(section, {}), content, nq)
             if changed:
                 replaced[section] = changed
         else:
@@ -157,6 +158,8 @@ def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str,
                 f"{', '.join(REPLACEABLE)}.",
             )
     whole = merged(figures, replaced)
+    if set(whole.get("mains", {})) not in (set(), set(REPLACEABLE["mains"])):
+        raise InvalidFigures("mains", "must have both figures, factor and constant.")
     if "inertials" in replaced:
         _check_bodies(whole["inertials"])
     return replaced | _uncertainty(document, whole, nq)
@@ -179,7 +182,7 @@ def merged(figures: dict[str, Any], replaced: dict[str, Any]) -> dict[str, Any]:
                 n: law for n, law in figures[section].items() if n not in content
             }
         else:
-            result[section] = figures[section] | content
+            result[section] = figures.get(section, {}) | content
     return result
 
 
@@ -222,7 +225,11 @@ def _section(section: str, own: dict[str, Any], content: Any, nq: int) -> dict[s
         if name not in REPLACEABLE[section]:
             raise InvalidFigures(where, "differs from the robot's own and cannot be identified.")
         shape = (
-            () if section == "electronics" else (nq, _WIDTHS[name]) if name in _WIDTHS else (nq,)
+            ()
+            if section in ("electronics", "mains")
+            else (nq, _WIDTHS[name])
+            if name in _WIDTHS
+            else (nq,)
         )
         changed[name] = _figure(where, figure, REPLACEABLE[section][name], shape)
     return changed

@@ -170,13 +170,17 @@ class CycleSolution(Result):
     def energy(self) -> Energy:
         """Energy of the cycle [J], with dwells and waits."""
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
-        energy = summed([move.solution for move in self.moves], resting)
         known = self.energies.electrical
+        arm = self.moves[0].planned.arm
+        mains = None
+        if arm.robot.mains is not None:
+            mains = arm.robot.mains.energy(resting, self.duration - known.duration)
+        energy = summed([move.solution for move in self.moves], resting, mains)
         return with_interval(
             replace(energy, storage=self.storage),
             known.sensitivity,
             known.duration,
-            self.moves[0].planned.arm,
+            arm,
         )
 
     @property
@@ -317,9 +321,9 @@ def energies_of(moves: Sequence[CycleMove]) -> CycleEnergies:
     return CycleEnergies(known, sum(move.solution.energy.mechanical.total for move in moves))
 
 
-def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
-    """Energy of several motions and of the dwells between them [J]; the mean power is over the
-    motions.
+def summed(solutions: Sequence[Solution], dwell: float, mains: float | None) -> Energy:
+    """Energy of several motions and of the dwells between them [J], and that of the dwells from the
+    mains [J] if it is known; the mean power is over the motions.
     """
     energies = [each.energy for each in solutions]
     parts = [part.name for part in fields(ElectricalEnergy) if part.name != "interval"]
@@ -339,6 +343,7 @@ def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
                 for part in fields(JointEnergy)
             }
         ),
+        mains=None if mains is None else sum(each.mains or 0.0 for each in energies),
         peak_power=max(each.peak_power for each in energies),
         mean_power=sum(each.energy.mean_power * each.duration for each in solutions) / moving,
-    ).with_dwell(dwell)
+    ).with_dwell(dwell, mains or 0.0)

@@ -20,6 +20,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.losses import power_flow
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
+from joulepath.optimizer.result.energy import Energy
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,14 @@ def dwell_energy(dwell: Dwell, arm: Arm, hold: float, duration: float) -> float:
     """
     by_motors, by_brakes = holding_times(dwell, duration)
     return hold * by_motors + brake_power(dwell, arm) * by_brakes
+
+
+def with_dwell(energy: Energy, dwell: Dwell, arm: Arm, hold: float, duration: float) -> Energy:
+    """The energy of a motion of `duration` [s] with that of the dwell after it, at a goal with
+    holding power `hold` [W]."""
+    drawn, mains = dwell_energy(dwell, arm, hold, duration), arm.robot.mains
+    wait = sum(holding_times(dwell, duration))
+    return energy.with_dwell(drawn, 0.0 if mains is None else mains.energy(drawn, wait))
 
 
 def holding_times(dwell: Dwell, duration: float) -> tuple[float, float]:

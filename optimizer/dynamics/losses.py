@@ -152,10 +152,12 @@ def breakdown(
     )
     mechanical = weights @ np.abs(tau * v)
     power = np.divide(flows.drawn, weights, out=np.zeros_like(weights), where=weights > 0)
+    mains = arm.robot.mains
     return Energy(
         electrical=_electrical_energy(flows, per_joint, duration, potential, kinetic, arm),
         mechanical=MechanicalEnergy(total=float(mechanical.sum()), per_joint=mechanical),
         per_joint=per_joint,
+        mains=None if mains is None else mains.energy(drawn, duration),
         peak_power=float(power.max()),
         mean_power=drawn / duration if duration > 0 else 0.0,
         storage=_storage_use(flows) if arm.bus.mode == "storage" else None,

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import pairwise
+from operator import add
 
 import numpy as np
 import pinocchio as pin
@@ -32,7 +34,7 @@ from joulepath.optimizer.evaluate.piecewise_motion import (
     PiecewiseMotion,
     piecewise_motion,
 )
-from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, Waypoints
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, Recording, Waypoints
 from joulepath.optimizer.evaluate.sampler import Sampler
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.linear_algebra import one_thread
@@ -162,6 +164,7 @@ class _Evaluator:
         self._clearance = ClearanceMonitor(arm) if arm.collisions else None
         self._sampler = None if period is None else Sampler(self._plant, period)
         self._segment_count = 1 if isinstance(motion, Spline) else motion.segments
+        self._cycles = motion.cycles if isinstance(motion, Recording) else ()
         self._intervals: dict[int, IntervalEnergy] = {}
         self._speed_jumps = 0
         self._spread = arm_spread(arm)
@@ -190,15 +193,12 @@ class _Evaluator:
     def finish(self) -> Evaluation:
         """The evaluation of all blocks."""
         assert self._last is not None  # motions without a block are refused
-        segments = [self._intervals[k] for k in sorted(self._intervals)]
-        total = self._with_interval(join_intervals(segments), self._sensitivity)
-        segments = [
-            self._with_interval(segment, self._sensitivities[k]) if self._sensitivities else segment
-            for k, segment in zip(sorted(self._intervals), segments, strict=True)
-        ]
+        whole = self._with_interval(join_intervals([*self._intervals.values()]), self._sensitivity)
+        listed = self._segment_count <= MOTION_LIMITS.max_segments
         return Evaluation(
-            total=total,
-            segments=segments if self._segment_count <= MOTION_LIMITS.max_segments else [],
+            total=whole,
+            segments=[self._part(k, k + 1) for k in self._intervals] if listed else [],
+            cycles=[self._part(*ends) for ends in pairwise(self._cycles)] if listed else [],
             segment_count=self._segment_count,
             speed_jumps=self._speed_jumps,
             limits=self._limits.report(),
@@ -209,6 +209,15 @@ class _Evaluator:
             close_pass=None if self._clearance is None else self._clearance.close_pass,
             unmodelled=[] if self._clearance is None else self._clearance.unmodelled,
         )
+
+    def _part(self, first: int, end: int) -> IntervalEnergy:
+        """Consecutive segments, with the interval of their energy if segments have intervals."""
+        parts = [self._intervals[k] for k in range(first, end)]
+        part = parts[0] if len(parts) == 1 else join_intervals(parts)
+        if not self._sensitivities:
+            return part
+        known = reduce(add, [self._sensitivities[k] for k in range(first, end)])
+        return self._with_interval(part, known)
 
     def _with_interval(self, part: IntervalEnergy, sensitivity: Sensitivity) -> IntervalEnergy:
         """A part of the motion with the interval of its energy."""

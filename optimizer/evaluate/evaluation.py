@@ -29,6 +29,9 @@ class EvaluatedMotion:
     """Segments between configurations. A trajectory is one segment, and a log has one per move and
     rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
     electrical energies."""
+    cycles: Sequence[IntervalEnergy]
+    """Cycles of a log that repeats, from the first on, each of whole segments. Empty for other
+    motions, and for a log that does not repeat."""
     segment_count: Count
     """Number of segments."""
     speed_jumps: Count
@@ -52,6 +55,7 @@ class Evaluation(Result):
 
     Attributes:
         segments: energy of each segment; empty if there are more than are listed.
+        cycles: energy of each cycle of a recording that repeats; empty for other motions.
         speed_jumps: number of velocity steps inside the motion.
         nearest: least clearance with margins subtracted; None if collisions are not checked.
         close_pass: least distance without margins; None unless it is below 2 mm.
@@ -60,6 +64,7 @@ class Evaluation(Result):
 
     total: IntervalEnergy
     segments: list[IntervalEnergy]
+    cycles: list[IntervalEnergy]
     segment_count: int
     speed_jumps: int
     limits: list[LimitReport]
@@ -74,6 +79,7 @@ class Evaluation(Result):
             duration=self.total.duration,
             total=self.total,
             segments=self.segments,
+            cycles=self.cycles,
             segment_count=self.segment_count,
             speed_jumps=self.speed_jumps,
             within_limits=all(report.held for report in self.limits),

@@ -130,12 +130,14 @@ class Recording:
 
     `Recording.of(t, q)` creates a recording from arrays. All blocks have the same channels.
     `first_row` is the number of the first row in error messages. `edges` are the increasing times
-    [s], after the first row, at which a new segment begins.
+    [s], after the first row, at which a new segment begins. `cycles` are the numbers of the
+    segments with which the cycles of a repeated motion begin, and the number behind the last one.
     """
 
     blocks: Iterable[RecordedRows]
     first_row: int = 0
     edges: Sequence[float] = ()
+    cycles: Sequence[int] = ()
 
     @classmethod
     def of(
@@ -145,6 +147,7 @@ class Recording:
         v: Array | None = None,
         a: Array | None = None,
         edges: Sequence[float] = (),
+        cycles: Sequence[int] = (),
     ) -> Recording:
         """A recording in memory.
 
@@ -154,6 +157,7 @@ class Recording:
             v: joint velocities if they were recorded, shape (n, nq) [rad/s].
             a: joint accelerations if they were recorded, shape (n, nq) [rad/s²].
             edges: times at which a new segment begins, after the first row [s].
+            cycles: numbers of the segments with which a cycle begins, and that behind the last one.
 
         Raises:
             InvalidProblem: the arrays have different numbers of rows.
@@ -171,7 +175,7 @@ class Recording:
             RecordedRows(*(None if each is None else each[part] for each in columns))  # type: ignore[arg-type]
             for part in rows
         ]
-        return cls(blocks, edges=edges)
+        return cls(blocks, edges=edges, cycles=cycles)
 
     @property
     def segments(self) -> int:

@@ -25,9 +25,11 @@ from joulepath.optimizer.identify.fits.temperature import temperatures_of
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.advice import advice_of
+from joulepath.optimizer.identify.quality.answered import AnsweredEnergies
 from joulepath.optimizer.identify.quality.curves import curves_of
 from joulepath.optimizer.identify.quality.figures import figures_of
 from joulepath.optimizer.identify.quality.interval import Spread, spread_of
+from joulepath.optimizer.identify.quality.mains import IdentifiedMains, fit_mains
 from joulepath.optimizer.identify.quality.parameters import parameters_of
 from joulepath.optimizer.identify.quality.residuals import residuals_of
 from joulepath.optimizer.identify.quality.structure import physical_of, structure_of
@@ -67,7 +69,6 @@ class Identification(Result):
     physical: Physical | None
     residuals: Residuals
     temperatures: Temperatures
-    advice: Advice | None
     validation: Validation | None
     """Errors of a fit without the held-out moves; None if no moves are held out."""
     payload: IdentifiedPayload | None
@@ -75,6 +76,15 @@ class Identification(Result):
     curves: Curves
     """Moves that are not held out, as the figures predict them."""
     logs: tuple[str, ...]
+    mains: IdentifiedMains | None = None
+    """What the control box draws; None without readings of a wattmeter."""
+    measure: tuple[Advice, ...] = ()
+    """What to measure next, in the order of its share in the interval of an energy."""
+
+    @property
+    def advice(self) -> Advice | None:
+        """The most useful further measurement; None if none is known."""
+        return next(iter(self.measure), None)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -123,7 +133,12 @@ class Identification(Result):
             Value, unit, source, trust letter and standard deviation of each figure, and their
             covariance; see docs/reference/identification.md.
         """
-        return document_of(self.robot.figures, self.robot.friction.name, self.figures(), date)
+        document = document_of(self.robot.figures, self.robot.friction.name, self.figures(), date)
+        if self.mains is None:
+            return document
+        logs = ", ".join(self.logs)
+        source = f"identified from readings of a wattmeter during logs {logs}, {date}"
+        return document | {"mains": self.mains.figures(source)}
 
     def _headline(self) -> str:
         told = sum(each.identified for each in self.parameters)
@@ -145,7 +160,7 @@ class Identification(Result):
     def _shown(self) -> Any:
         names = (
             *("parameters", "structure", "physical", "validation", "residuals", "temperatures"),
-            *("noise", "thresholds", "advice"),
+            *("noise", "thresholds", "measure"),
         )
         return {"robot": self.robot.name} | {name: getattr(self, name) for name in names}
 
@@ -206,9 +221,12 @@ def _identified(
 ) -> Identification:
     """The identification from prepared logs."""
     last = len(logs) - 1
+    if len(options.mains) not in (0, len(logs)):
+        raise InvalidProblem("mains", f"mains must have {len(logs)} readings, one for each log.")
     rows = _rows(robot, logs, options)
     check_logs(robot, rows, logs, options)
-    masks = held_out_masks(rows, options.held_out) if options.held_out else []
+    split = options.held_out and not rows.rest.all()
+    masks = held_out_masks(rows, options.held_out) if split else []
     steps = Steps("fits", len(masks) + 1, tell)
     validation, held_out = _validation(robot, rows, options, masks, last, steps)
     payload = _payload(robot, rows, options, last)
@@ -220,7 +238,7 @@ def _identified(
         parameters += payload.parameters(logs[-1].payload)
     check_identified(parameters, logs, options)
     threshold = options.velocity_threshold
-    return Identification(
+    found = Identification(
         robot=robot,
         options=options,
         fitted=fitted,
@@ -232,12 +250,14 @@ def _identified(
         temperatures=temperatures_of(
             rows, motor_torque(fitted.arm, rows), fitted.arm, fitted.clusters, threshold
         ),
-        advice=advice_of(robot, fitted, rows),
         validation=validation,
         payload=payload,
         curves=curves_of([(fitted.arm, rows, ~held_out)], threshold),
         logs=tuple(log.name or "" for log in logs),
     )
+    energies = AnsweredEnergies.of(robot, found.document(""), fitted.arm)
+    mains = fit_mains(energies, rows, options.mains)
+    return replace(found, mains=mains, measure=advice_of(energies, rows))
 
 
 def _validation(

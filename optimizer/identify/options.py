@@ -69,6 +69,9 @@ class IdentificationOptions:
     prior_weight: float = 1.0
     """Weight of the robot's own inertials in a refit [1]."""
     couplings: Sequence[Coupling] = field(default_factory=tuple)
+    mains: Sequence[float | None] = ()
+    """Mean power [W] that a wattmeter in the mains cable of the control box showed during each log;
+    None for a log without a reading. Empty: no readings."""
 
     def __post_init__(self) -> None:
         for name, allowed in (("fit", get_args(Target)), ("terms", get_args(Term))):
@@ -101,6 +104,9 @@ class IdentificationOptions:
         if self.knee is not None and not 1e-6 <= self.knee <= 1.0:
             raise InvalidProblem("knee", "knee must be from 1e-6 to 1 rad/s.")
         object.__setattr__(self, "couplings", tuple(self.couplings))
+        object.__setattr__(self, "mains", tuple(self.mains))
+        if not all(each is None or 0 < each <= 1e6 for each in self.mains):
+            raise InvalidProblem("mains", "A reading of mains must be above 0 and at most 1e6 W.")
 
     @property
     def reduced(self) -> bool:

@@ -9,9 +9,11 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.declared import (
     Count,
     Internal,
+    Joules,
     NullIfNotFinite,
     PerJoint,
     Ratio,
+    Seconds,
     Unit,
     Watts,
 )
@@ -53,9 +55,9 @@ class IdentifiedParameter:
 
 @dataclass(frozen=True, eq=False)
 class TorqueErrors:
-    """Errors of predicted torques; null for joints at rest."""
+    """Errors of predicted torques; null for joints at rest or without efforts."""
 
-    rmse: Annotated[PerJoint, Unit("N·m")]
+    rmse: Annotated[PerJoint, Unit("N·m"), NullIfNotFinite]
     """Root mean square of the error of each joint in motion."""
     relative: PercentPerJoint
     """Error over the measured torque of each joint in motion."""
@@ -112,6 +114,34 @@ class Curves:
     """Modelled power on the bus (n,) [W]."""
 
 
+@dataclass(frozen=True)
+class ComparedEnergy:
+    """Measured and predicted energy of a held-out move, or of the held-out moves of a cycle."""
+
+    log: Count
+    """Number of the log, from 0: among the logs of the fit, or among those that validate it."""
+    start: Seconds
+    """Start of the first of these moves, from the start of the log."""
+    end: Seconds
+    """End of the last of these moves."""
+    time: Seconds
+    """Time in motion that is compared."""
+    measured: Joules
+    """Energy by the logged power of the arm's bus; without it, by the currents or torques of the
+    motors, with idle power and losses of the figures."""
+    predicted: Joules
+    """Energy by a fit that has not seen the moves."""
+    p5: Joules
+    """The measured energy is above this with 95 % probability."""
+    p95: Joules
+    """The measured energy is below this with 95 % probability."""
+
+    @property
+    def covered(self) -> bool:
+        """Whether the measured energy lies between P5 and P95."""
+        return self.p5 <= self.measured <= self.p95
+
+
 @dataclass(frozen=True, eq=False)
 class Validation:
     """Errors on moves that were not part of the fit."""
@@ -131,6 +161,11 @@ class Validation:
     """Mean of half the interval from P5 to P95; null where `coverage` is."""
     curves: Annotated[Curves, Internal]
     """The moves, as predicted by the fit without them."""
+    energies: tuple[ComparedEnergy, ...] = ()
+    """Measured against predicted energy of each of these moves. Empty without a measurement, and in
+    answers stored by an earlier version."""
+    cycles: tuple[ComparedEnergy, ...] = ()
+    """The same for these moves of each cycle together. Empty also for logs that do not repeat."""
 
 
 @dataclass(frozen=True, eq=False)

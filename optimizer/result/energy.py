@@ -169,6 +169,9 @@ class Energy:
     """Losses and shaft work per joint."""
     storage: StorageUse | None = None
     """The energy storage on the bus; null without one."""
+    mains: Joules | None = None
+    """Energy that the control box draws from the mains, by the figures `mains` of the arm, with the
+    wait until the end of the dwell. Null without these figures."""
     peak_power: Watts
     """Largest power drawn from the supply during the motion."""
     mean_power: Watts
@@ -178,11 +181,13 @@ class Energy:
         """The energy that an objective minimises [J]."""
         return self.electrical.total if objective == "electrical" else self.mechanical.total
 
-    def with_dwell(self, dwell: float) -> Energy:
-        """The same with the energy [J] of a dwell afterwards."""
+    def with_dwell(self, dwell: float, mains: float = 0.0) -> Energy:
+        """The same with the energy [J] of a dwell afterwards, and that from the mains [J]."""
         electrical = self.electrical
         return replace(
-            self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell)
+            self,
+            electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell),
+            mains=None if self.mains is None else self.mains + mains,
         )
 
 
@@ -223,6 +228,7 @@ def energy_rows(energy: Energy) -> list[tuple[str, str, str]]:
         ("part", "energy [J]", "share"),
         *((name, f"{part:.4g}", _share(part, total)) for name, part in parts.items()),
         ("electrical", f"{total:.4g}", _share(total, total)),
+        *([] if energy.mains is None else [("mains", f"{energy.mains:.4g}", "")]),
         ("mechanical work", f"{energy.mechanical.total:.4g}", ""),
     ]
 

@@ -25,7 +25,7 @@ from dataclasses import replace
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, holding_times
+from joulepath.optimizer.dynamics.dwell import holding_power, holding_times, with_dwell
 from joulepath.optimizer.dynamics.interval import (
     MotionEnergy,
     arm_spread,
@@ -125,7 +125,7 @@ def compared(
         motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, tau_friction
     )
     if problem.dwell is not None:
-        energy = energy.with_dwell(dwell_energy(problem.dwell, arm, held.power, motion.duration))
+        energy = with_dwell(energy, problem.dwell, arm, held.power, motion.duration)
         times = holding_times(problem.dwell, motion.duration)
         sensitivity += waiting_sensitivity(arm, held.q, held.tau, *times, problem.dwell, spread)
     return Baseline(

@@ -176,8 +176,9 @@ def test_measured_joules_stand_beside_those_that_are_predicted(
     expect(rows.first).to_contain_text("whole log")
     log = service.get("/logs").json()["logs"][0]["id"]
     found = service.post("/evaluate", {"log": log}).json()
-    assert rows.count() == len(found["segments"]) + 1
-    for part, row in zip([found["total"], *found["segments"]], rows.all(), strict=True):
+    parts = [found["total"], *found["cycles"], *found["segments"]]
+    assert rows.count() == len(parts)
+    for part, row in zip(parts, rows.all(), strict=True):
         cells = [cell.replace(",", "") for cell in row.locator("td").all_inner_texts()]
         measured, predicted = part["measured"]["electrical"], part["energy"]["electrical"]["total"]
         assert float(cells[2]) == pytest.approx(measured, rel=DIGITS)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import reduce
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -74,27 +75,41 @@ class EvaluatedInterval(IntervalEnergy):
 class Evaluated:
     """The evaluation of a motion of the requested arm.
 
-    A log has `measured` energies of its segments, and remarks.
+    A log has `measured` energies of its segments, the segments that bound its `cycles`, and
+    remarks.
     """
 
     asked: EvaluateSettings
     result: Evaluation
     measured: Sequence[MeasuredEnergy] = ()
+    cycle_bounds: Sequence[int] = ()
     remarks: Sequence[str] = ()
 
     @property
     def total(self) -> EvaluatedInterval:
         """The whole motion."""
-        known = reduce(MeasuredEnergy.joined, self.measured) if self.measured else None
-        return EvaluatedInterval.of(self.result.total, known)
+        return EvaluatedInterval.of(self.result.total, self._known(None, None))
 
     @property
     def segments(self) -> list[EvaluatedInterval]:
         """The listed segments."""
         return [
-            EvaluatedInterval.of(each, self.measured[k] if self.measured else None)
+            EvaluatedInterval.of(each, self._known(k, k + 1))
             for k, each in enumerate(self.result.segments)
         ]
+
+    @property
+    def cycles(self) -> list[EvaluatedInterval]:
+        """The cycles of a log that repeats."""
+        return [
+            EvaluatedInterval.of(each, self._known(*ends))
+            for each, ends in zip(self.result.cycles, pairwise(self.cycle_bounds), strict=False)
+        ]
+
+    def _known(self, first: int | None, end: int | None) -> MeasuredEnergy | None:
+        """Measured energies of consecutive segments; None without any."""
+        parts = self.measured[first:end]
+        return reduce(MeasuredEnergy.joined, parts) if parts else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +122,9 @@ class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
     """Segments between configurations. A trajectory is one segment, and a log has one per move and
     rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
     electrical energies."""
+    cycles: list[EvaluatedInterval]
+    """Cycles of a log that repeats, from the first on, each of whole segments. Empty for other
+    motions, and for a log that does not repeat."""
     warnings: list[str]
     """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
     mm, one names them, their distance without margins, and the time. Others report possibly missed
@@ -120,6 +138,7 @@ class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
         motion = vars(result.evaluated_motion()) | {
             "total": found.total,
             "segments": found.segments,
+            "cycles": found.cycles,
         }
         return cls(
             request=request_id,
@@ -216,8 +235,9 @@ def _evaluated_log(asked: EvaluateSettings, reading: LogReading, end: Deadline) 
     """The evaluation of the motion of a log until about `end`, with measured energies."""
     with until(end):
         arm = to_arm(asked)
-    result = _evaluation(arm, reading.log.recording(), asked, end)
-    return Evaluated(asked, result, measured(reading.log, arm), reading.report.warnings)
+    motion, remarks = reading.log.recording(), reading.report.warnings
+    result = _evaluation(arm, motion, asked, end)
+    return Evaluated(asked, result, measured(reading.log, arm), motion.cycles, remarks)
 
 
 def _evaluation(arm: Arm, motion: Motion, asked: EvaluateSettings, end: Deadline) -> Evaluation:

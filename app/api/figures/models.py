@@ -6,7 +6,7 @@ from datetime import datetime
 
 from joulepath.app.api.figures.request import Covariance, Section
 from joulepath.app.schemas.common import Response, described, part
-from joulepath.app.schemas.examples.figures import DRIVES, FIGURES_ID, FRICTION
+from joulepath.app.schemas.examples.figures import DRIVES, FIGURES_ID, FRICTION, MAINS
 from joulepath.app.schemas.examples.values import CREATED
 
 
@@ -45,6 +45,9 @@ class FiguresDetail(FiguresSummary):
     )
     drives: Section = described("Motors, gears and inverters.", None, DRIVES)
     electronics: Section = described("Electronics.", None, {})
+    mains: Section | None = described(
+        "What the control box draws from the mains; null if unknown.", None, MAINS
+    )
     friction_table: Section = described("Measured friction torques of the robot.", None, {})
     friction_laws: Section = described(
         "Friction laws by name; the first one is the default.", None, FRICTION

@@ -7,7 +7,13 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from joulepath.app.schemas.common import Request, RobotName, described
-from joulepath.app.schemas.examples.figures import COVARIANCE, DRIVES, FIGURES_ID, FRICTION
+from joulepath.app.schemas.examples.figures import (
+    COVARIANCE,
+    DRIVES,
+    FIGURES_ID,
+    FRICTION,
+    MAINS,
+)
 from joulepath.app.schemas.examples.values import CREATED
 
 Section = dict[str, Any]
@@ -38,7 +44,7 @@ def _section(what: str, example: Section) -> Any:
 class FiguresDocument(Request):
     """Figures of a robot, some of them identified on one arm, in the form of its `figures.yaml`.
     A figure has `value`, `unit`, `source`, `trust`, and `sd` if it was identified. Only friction
-    laws, drives, electronics and inertials may differ from the robot's own."""
+    laws, drives, electronics, mains and inertials may differ from the robot's own."""
 
     robot: RobotName = described("Name of the robot.", None, "ur5e")
     friction_laws: Section | None = _section(
@@ -46,6 +52,13 @@ class FiguresDocument(Request):
     )
     drives: Section | None = _section("Motors, gears and inverters", DRIVES)
     electronics: Section | None = _section("Electronics", {})
+    mains: Section | None = described(
+        "What the control box draws from the mains: `factor` [1] times the energy of the arm's "
+        "bus, and a `constant` power [W]. Null: not known.",
+        None,
+        MAINS,
+        default=None,
+    )
     inertials: Section | None = _section("Masses, centres of mass and inertias of the links", {})
     covariance: Covariance | None = described(
         "Covariance of the identified parameters. Null: none was identified.",

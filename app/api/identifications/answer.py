@@ -71,8 +71,8 @@ class IdentificationResult:
     """Base parameters of the links and rotors."""
     physical: Physical | None
     """Whether refitted links are real bodies; null without a refit."""
-    validation: Validation
-    """Errors on moves outside the fit."""
+    validation: Validation | None
+    """Errors on moves outside the fit; null for logs at rest, which identify the idle power."""
     residuals: Residuals
     """Residuals of the fit."""
     temperatures: Temperatures
@@ -86,10 +86,14 @@ class IdentificationResult:
     """The most useful further measurement; null if none is known."""
     payload: FoundPayload | None
     """Payload of the last log; null if it was not requested."""
+    measure: tuple[Advice, ...] = ()
+    """What to measure next, in the order of its share in the interval of an energy: `advice` is the
+    first. Each share is that beside the figures before it. Empty in answers stored by an earlier
+    version."""
 
     @classmethod
-    def of(cls, found: Identification, validation: Validation) -> IdentificationResult:
-        """The result of an identification, with its errors on other moves."""
+    def of(cls, found: Identification, validation: Validation | None) -> IdentificationResult:
+        """The result of an identification, with its errors on other moves, if any move."""
         return cls(
             found.robot.name,
             found.document(datetime.now(UTC).date().isoformat()),
@@ -104,4 +108,5 @@ class IdentificationResult:
             found.thresholds,
             found.advice,
             None if found.payload is None else FoundPayload.of(found.payload),
+            found.measure,
         )

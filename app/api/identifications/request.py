@@ -12,6 +12,7 @@ from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Metho
 
 MOST_LOGS = 32
 LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
+Reading = Annotated[float, Field(gt=0, le=1e6)]
 DEADLINE = 60.0
 
 
@@ -118,6 +119,16 @@ class IdentifyRequest(Request):
         default=1.0,
         ge=1e-6,
         le=1e6,
+    )
+    mains: Annotated[list[Reading | None], Field(min_length=1, max_length=MOST_LOGS)] | None = (
+        described(
+            "Mean power that a wattmeter in the mains cable of the control box showed during each "
+            "of `logs`; null for a log without a reading. Factor and constant of the control box "
+            "are found from readings at rest and in motion. Null: no readings.",
+            "W",
+            [182.0],
+            default=None,
+        )
     )
     deadline: float = described(
         "Longest time of the fit.", "s", DEADLINE, default=DEADLINE, gt=0, le=3600

@@ -170,8 +170,16 @@ async def _shown(store: ServiceStore, job_id: str) -> IdentificationSummary:
 def _content(session: Session, job_id: str) -> dict[str, Any]:
     """The fields of an identification. Raises UnknownIdentification."""
     job, request, body = _found(session, job_id)
-    result = None if body is None else orjson.Fragment(unpacked(body))
+    result = None if body is None else completed(orjson.loads(unpacked(body)))
     return _summary(session, job, request) | {"problem": request.problem, "result": result}
+
+
+def completed(result: dict[str, Any]) -> dict[str, Any]:
+    """The result with empty lists for what an earlier version did not store."""
+    validation = result["validation"]
+    if validation is not None:
+        validation = {"energies": [], "cycles": []} | validation
+    return {"measure": []} | result | {"validation": validation}
 
 
 def _curves(session: Session, job_id: str) -> bytes | None:

@@ -56,7 +56,6 @@ class IdentifyTask:
             others = found.validate(logs[count:]) if logs[count:] else found.validation
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None
-        assert others is not None
         moves = _residual_fields(found, others, self.request.all_logs)
         curves = StoredAnswer(
             str(uuid.uuid4()), json_document({"moves": moves}), AnswerFigures(robot.name)
@@ -79,16 +78,18 @@ def _to_options(request: IdentifyRequest) -> IdentificationOptions:
         estimator=request.estimator,
         velocity_threshold=request.velocity_threshold,
         prior_weight=request.prior_weight,
+        mains=request.mains or (),
     )
 
 
 def _residual_fields(
-    found: Identification, validation: Validation, logs: Sequence[str]
+    found: Identification, validation: Validation | None, logs: Sequence[str]
 ) -> list[dict[str, Any]]:
     """The moves of the logs with these ids: of the fit, then of the validation alone."""
     own = len(found.logs)
     others = own if len(logs) > own else 0
-    return [*_moves(found.curves, logs, False), *_moves(validation.curves, logs[others:], True)]
+    held_out = () if validation is None else _moves(validation.curves, logs[others:], True)
+    return [*_moves(found.curves, logs, False), *held_out]
 
 
 def _moves(curves: Curves, logs: Sequence[str], held_out: bool) -> Iterator[dict[str, Any]]:

@@ -35,6 +35,10 @@ FRICTION: dict[str, Any] = {
     }
 }
 DRIVES: dict[str, Any] = {"rotor_inertia": _identified([1.9, 1.95, 1.9, 0.21, 0.2, 0.2], "kg·m²")}
+MAINS: dict[str, Any] = {
+    "factor": {"value": 1.12, "unit": "1", "source": "wattmeter, 2025-03-14", "trust": "B"},
+    "constant": {"value": 74.0, "unit": "W", "source": "wattmeter, 2025-03-14", "trust": "B"},
+}
 COVARIANCE: dict[str, Any] = {
     "names": ["friction_laws.identified.coulomb.1", "friction_laws.identified.load.1"],
     "matrix": [[0.09, -0.001], [-0.001, 0.000064]],

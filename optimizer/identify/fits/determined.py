@@ -34,7 +34,7 @@ DETERMINED = DeterminedSettings()
 NOT_MOVING = "The joint hardly moves in these logs."
 UNCERTAIN = "Its standard deviation is {:.0%} of its value."
 LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
-AT_BOUND = "The fit puts it at its bound, 0."
+AT_BOUND = "The fit puts it at its bound, {:g}."
 REJECTED = (
     "{} The robot's own value, {:.3g}, is {:.0f} standard deviations away, so that it is not kept: "
     "check the links, the torque constants and the payload."
@@ -43,8 +43,8 @@ REJECTED = (
 
 def reason_of(value: float, sd: float) -> str:
     """Reason for not counting a figure as identified; empty if it is."""
-    if value == 0:
-        return AT_BOUND
+    if value == 0 or sd == 0:
+        return AT_BOUND.format(value)
     relative = sd / abs(value)
     return "" if relative <= DETERMINED.max_relative_sd else UNCERTAIN.format(relative)
 

@@ -104,7 +104,7 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitRes
         prior_error_arms=(),
         prior_covariance=np.zeros((size, size)),
         covariance_increase=np.zeros((clusters.count, size, size)),
-        mean_power=float(np.mean(moving_power)) if with_power else np.nan,
+        mean_power=float(np.mean(moving_power)) if moving_power.size else np.nan,
     )
     if options.method == "base_wrench":
         return _with_wrench(robot, rows, fitted, options)

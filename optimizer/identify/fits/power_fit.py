@@ -51,6 +51,9 @@ class PowerFitSettings:
     """Prior standard deviation of a joint's offset over its Coulomb friction [1]."""
     known_sd: float = 1e-6
     """Prior standard deviation of a figure that counts as known [SI unit]."""
+    least_link_scale: float = 0.5
+    """Smallest factor on the masses of the links [1], five standard deviations below the robot's
+    own: links without a mass are no bodies, and no document of figures may have them."""
     max_iterations: int = 30
     """Largest number of Gauss-Newton steps."""
     step_tolerance: float = 1e-9
@@ -197,6 +200,7 @@ def fit_power(
     noise = float(np.var(measured)) + settings.variance_floor
     least = np.zeros_like(prior.mean)
     least[-1 - parts.v.shape[1] : -1] = -np.inf  # offsets may be negative
+    least[-1] = settings.least_link_scale
     for iteration in range(settings.max_iterations):
         figures = PowerParameters.unpacked(value)
         predicted, slope = bus_power(figures, parts, torque_constant, regeneration)

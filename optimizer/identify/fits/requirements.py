@@ -63,7 +63,7 @@ def check_logs(
         )
     if "power" in options.fit and not power:
         raise NoPowerChannel
-    if options.held_out and rows.rest.all():
+    if options.held_out and rows.rest.all() and not power:
         terms = terms_of(replace(options, constants=False))
         names = ["torque_constant" if term == SCALE else term for term in terms]
         raise not_excited(names, logs, options)

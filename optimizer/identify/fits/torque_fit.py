@@ -272,7 +272,7 @@ def doubts_of(block: JointBlock, value: Array, sd: Array) -> list[Doubt]:
         elif term == "offset" or size <= 1:
             found.append(Doubt("", 0.0))
         else:
-            reason = UNCERTAIN.format(relative) if np.isfinite(relative) else AT_BOUND
+            reason = UNCERTAIN.format(relative) if np.isfinite(relative) else AT_BOUND.format(0.0)
             found.append(Doubt(reason, size))
     return found
 

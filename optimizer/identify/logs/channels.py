@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.identify.logs.columns import Columns
+from joulepath.optimizer.identify.logs.columns import NOT_LOGGED, Columns
 from joulepath.optimizer.identify.logs.filters import noise
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_formats import ChannelName
@@ -41,6 +41,8 @@ def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterato
             continue
         indices = columns.groups.get(group) if group is not None else None
         for j, size in enumerate(noise(values, log.rate)):
+            if indices is not None and indices[j] == NOT_LOGGED:
+                continue
             column = None if indices is None else columns.names[indices[j]]
             yield Channel(f"{name}{j + 1}", column, units[name], *_range(values[:, j]), float(size))
     if log.wrench is not None:

@@ -11,8 +11,13 @@ from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.head import NUMBERED
 from joulepath.optimizer.identify.logs.log_formats import FORMATS, ChannelName, LogFormat
 
-ColumnMap = Mapping[str, str | int | Sequence[str | int]]
-"""Names of columns, or their numbers from 1, by the name of the channel."""
+ColumnMap = Mapping[str, str | int | Sequence[str | int | None]]
+"""Names of columns, or their numbers from 1, by the name of the channel; None for a joint whose
+effort was not logged."""
+NOT_LOGGED = -1
+"""In place of the column of a joint whose effort was not logged."""
+EFFORTS: tuple[ChannelName, ...] = ("current", "torque", "effort")
+"""Channels that may lack joints."""
 WRENCH_COLUMNS = 6
 """Columns of a wrench: three of the force, then three of the torque."""
 
@@ -40,7 +45,7 @@ class Columns:
     time: tuple[int, ...]
     """Column of the time, or columns of its seconds and nanoseconds."""
     groups: Mapping[ChannelName, tuple[int, ...]]
-    """Columns of each channel; one per joint for channels of joints."""
+    """Columns of each channel; one per joint for channels of joints, or `NOT_LOGGED`."""
 
     MAPPED: ClassVar[tuple[str, ...]] = (
         "time",
@@ -69,15 +74,26 @@ class Columns:
         removed: list[ChannelName] = [
             group
             for group, indices in self.groups.items()
-            if group != "q" and all(_is_empty(first[k]) for k in indices)
+            if group != "q" and all(_is_empty(first[k]) for k in _logged(indices))
         ]
-        groups = {group: indices for group, indices in self.groups.items() if group not in removed}
+        groups = {
+            group: tuple(NOT_LOGGED if _is_empty(first[k]) else k for k in indices)
+            if group in EFFORTS
+            else indices
+            for group, indices in self.groups.items()
+            if group not in removed
+        }
         return replace(self, groups=groups), removed
 
     @property
     def used(self) -> list[int]:
         """Sorted indices of all columns."""
-        return sorted({*self.time, *(k for group in self.groups.values() for k in group)})
+        return sorted({*self.time, *(k for group in self.groups.values() for k in _logged(group))})
+
+
+def _logged(indices: Sequence[int]) -> list[int]:
+    """The columns of the joints that were logged."""
+    return [k for k in indices if k != NOT_LOGGED]
 
 
 def _is_empty(cell: str) -> bool:
@@ -95,13 +111,19 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
         InvalidTable: the header is in none of the formats, or lacks columns.
     """
     for log_format in FORMATS:
+        positions = _numbered(names, log_format.joints["q"])
+        if not positions:
+            continue
+        numbers = _by_number(names, log_format.joints["q"])
         found = {
             group: indices
             for group, pattern in log_format.joints.items()
-            if (indices := _numbered(names, pattern))
+            if (
+                indices := _of_joints(names, pattern, numbers)
+                if group in EFFORTS
+                else _numbered(names, pattern)
+            )
         }
-        if "q" not in found:
-            continue
         time = time_of(names, log_format.time)
         if not time:
             raise InvalidTable(
@@ -164,11 +186,24 @@ def _stamp(names: Sequence[str]) -> tuple[int, ...]:
     return ()
 
 
-def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
-    """Columns with names that match a pattern, in the order of their numbers.
+def _of_joints(names: Sequence[str], pattern: str, numbers: Mapping[int, int]) -> tuple[int, ...]:
+    """Columns with names that match a pattern, of the joints with these numbers; `NOT_LOGGED` for
+    joints without one, and empty if no joint has one.
 
     Raises:
-        InvalidTable: the numbers are not consecutive from 0 or 1.
+        InvalidTable: the numbers are others, and not consecutive from 0 or 1.
+    """
+    found = _by_number(names, pattern)
+    if not found.keys() < numbers.keys():
+        return _numbered(names, pattern)
+    return tuple(found.get(number, NOT_LOGGED) for number in sorted(numbers)) if found else ()
+
+
+def _by_number(names: Sequence[str], pattern: str) -> dict[int, int]:
+    """Columns with names that match a pattern, by their numbers.
+
+    Raises:
+        InvalidTable: a number occurs twice.
     """
     found: dict[int, int] = {}
     for k, name in enumerate(names):
@@ -181,6 +216,16 @@ def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
                 f"The header has the column {name} twice: delete one of them.", 1, name
             )
         found[number] = k
+    return found
+
+
+def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
+    """Columns with names that match a pattern, in the order of their numbers.
+
+    Raises:
+        InvalidTable: the numbers are not consecutive from 0 or 1.
+    """
+    found = _by_number(names, pattern)
     if found and sorted(found) not in ([*range(len(found))], [*range(1, len(found) + 1)]):
         name = names[found[min(found)]]
         raise InvalidTable(
@@ -212,7 +257,8 @@ def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
     Args:
         names: names of the columns.
         columns: names or numbers of the columns of each channel: one for `time`, `nanoseconds` and
-            `power`, six for `wrench`, and one per joint for all others.
+            `power`, six for `wrench`, and one per joint for all others, or None for an effort that
+            was not logged.
         nq: number of joints.
 
     Raises:
@@ -238,7 +284,13 @@ def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
                 "columns.wrench",
                 "columns.wrench must name six columns: of the force, then the torque.",
             )
-        found[group] = tuple(_index(names, each) for each in wanted)
+        if None in wanted and (group not in EFFORTS or not any(wanted)):
+            raise InvalidProblem(
+                f"columns.{group}",
+                f"columns.{group} must name a column for each joint; only efforts may be null, and "
+                "not those of all joints.",
+            )
+        found[group] = tuple(NOT_LOGGED if each is None else _index(names, each) for each in wanted)
     time = (*found.pop("time"), *found.pop("nanoseconds", ()))
     groups: dict[ChannelName, tuple[int, ...]] = found  # type: ignore[assignment]
     _check_counts(

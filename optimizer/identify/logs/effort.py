@@ -45,13 +45,16 @@ class EffortReport:
 
 
 def effort_report(motion: LoggedMotion, effort: Array) -> EffortReport:
-    """Meaning of efforts (n, joints) of a motion."""
+    """Meaning of efforts (n, joints) of a motion; efforts that are 0 throughout count as not
+    logged."""
     rows = thinned(len(effort), EFFORT.max_rows)
     part, effort, robot = motion.at(rows), effort[rows].astype(float), motion.robot
     rigid, zero = part.rigid_torques(), np.zeros_like(part.q)
     gravity = replace(part, v=zero, a=zero).rigid_torques()
     # only joints next to the base: at a wrist, cables and friction exceed the weight
-    heaviest = np.sort(np.argsort(-gravity[:, : (robot.nq + 1) // 2].std(axis=0))[:2])
+    carried = gravity.std(axis=0) * effort.any(axis=0)
+    heaviest = np.sort(np.argsort(-carried[: (robot.nq + 1) // 2])[:2])
+    heaviest = heaviest[carried[heaviest] > 0]
     slopes = {
         int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], robot.limits.tau_max[j])
         for j in heaviest

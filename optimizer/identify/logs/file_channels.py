@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.logs.columns import Columns
+from joulepath.optimizer.identify.logs.columns import NOT_LOGGED, Columns
 from joulepath.optimizer.identify.logs.file_rows import FileRows, LogSource
 from joulepath.optimizer.identify.logs.filters import noise
 from joulepath.optimizer.identify.logs.grid import Grid, grid_of
@@ -109,7 +109,11 @@ def _read_rows(
 ) -> tuple[Array, Array, dict[ChannelName, Array]]:
     """Times (n,), numbers of the lines (n,), and values (n, k) of each channel in SI units."""
     names, used = columns.names, columns.used
-    where = {group: [used.index(k) for k in indices] for group, indices in columns.groups.items()}
+    # of an effort that was not logged, any column: its numbers are not read
+    where = {
+        group: [-1 if k == NOT_LOGGED else used.index(k) for k in indices]
+        for group, indices in columns.groups.items()
+    }
     # arrays that grow in place, because a log can fill half of the memory
     parts = {group: array("d" if group in _DOUBLE_PRECISION else "f") for group in where}
     times, numbers = array("d"), array("i")
@@ -120,6 +124,9 @@ def _read_rows(
         check_sizes(block, lines, names, used, where, scales)
         for group, part in parts.items():
             values = _reduced(group, block[:, where[group]] * scales.get(group, 1.0), part)
+            missing = [k for k, at in enumerate(columns.groups[group]) if at == NOT_LOGGED]
+            if missing:
+                values[:, missing] = 0.0
             part.frombytes(values.astype(part.typecode).tobytes())
         check_radians(block[:, where["q"]] * scales["q"], lines, robot, positions)
     channels = {

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.columns import Columns, time_of
+from joulepath.optimizer.identify.logs.columns import EFFORTS, NOT_LOGGED, Columns, time_of
 from joulepath.optimizer.identify.logs.log_formats import JOINT_NUMBER, ChannelName
 
 _WORDS: Mapping[ChannelName, str] = {
@@ -41,7 +41,10 @@ def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None
     found = {
         group: columns
         for group, word in _WORDS.items()
-        if (columns := _of_word(names, word, joints) or _numbered(names, word, len(joints)))
+        if (
+            columns := _of_word(names, word, joints, group in EFFORTS)
+            or _numbered(names, word, len(joints))
+        )
     }
     time = time_of(names)
     if "q" not in found or not time:
@@ -49,12 +52,19 @@ def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None
     return Columns(NAMED, names, time, found)
 
 
-def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[int, ...]:
+def _of_word(
+    names: Sequence[str], word: str, joints: Sequence[str], partial: bool
+) -> tuple[int, ...]:
+    """Columns of the joints for a word; if it may be `partial`, `NOT_LOGGED` for joints without.
+
+    Raises:
+        InvalidTable: a joint is missing or occurs twice.
+    """
     every = [[*_matching(names, word, joint.lower())] for joint in joints]
     if not any(every):
         return ()
     for joint, columns in zip(joints, every, strict=True):
-        if len(columns) != 1:
+        if len(columns) != 1 and not (partial and not columns):
             has = "no column" if not columns else "more than one column"
             raise InvalidTable(
                 f"The header has {has} `{word.partition('|')[0]}` of {joint}: a log has every "
@@ -62,7 +72,7 @@ def _of_word(names: Sequence[str], word: str, joints: Sequence[str]) -> tuple[in
                 1,
                 None if not columns else names[columns[1]],
             )
-    return tuple(columns[0] for columns in every)
+    return tuple(columns[0] if columns else NOT_LOGGED for columns in every)
 
 
 def _numbered(names: Sequence[str], word: str, count: int) -> tuple[int, ...]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
-from joulepath.models.robot import UPRIGHT, Array, TorqueSide
+from joulepath.models.robot import UPRIGHT, Array, Mask, TorqueSide
+from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.evaluate.recording import Recording
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identify.logs.cycles import cycle_edges
 from joulepath.optimizer.problem.arm import Payload
 
 EffortMeaning = Literal["current", "torque", "external"]
@@ -51,7 +54,8 @@ class Log:
     a: Array
     """Accelerations (n, joints) [rad/s²]."""
     effort: Array | None = None
-    """Efforts (n, joints), in the unit of their meaning."""
+    """Efforts (n, joints), in the unit of their meaning; NaN for a joint whose effort was not
+    logged."""
     effort_meaning: EffortMeaning | None = None
     torque_side: TorqueSide = "motor"
     """Where torques were measured: `motor`, with rotor and friction, or `link`, by sensors behind
@@ -99,26 +103,52 @@ class Log:
             )
 
     @property
+    def has_all_efforts(self) -> bool:
+        """Whether the efforts of all joints were logged."""
+        return self.effort is not None and bool(np.isfinite(self.effort[0]).all())
+
+    @property
     def joints(self) -> int:
         """Number of joints."""
         return int(self.q.shape[1])
 
+    @cached_property
+    def cycle_rows(self) -> Indices:
+        """Rows at which the cycles of a log that repeats begin, and the row at which the last one
+        ends; empty if it does not repeat."""
+        return cycle_edges(self.q, self.v, self._rest, self.rate, self._moves_and_rests)
+
     @property
     def segment_rows(self) -> list[int]:
         """Rows that bound the segments: the first and last row, and each row at which motion or
-        rest begins."""
+        rest begins, or a cycle."""
+        return sorted({*self._moves_and_rests, *self.cycle_rows.tolist()})
+
+    @property
+    def _moves_and_rests(self) -> list[int]:
+        """The first and last row, and each row at which motion or rest begins."""
         begins = [
             move.start for before, move in pairwise(self.moves) if move.at_rest != before.at_rest
         ]
         last = len(self.time) - 1
         return [0, *(row for row in begins if 0 < row < last), last]
 
+    @property
+    def _rest(self) -> Mask:
+        """Whether the arm rests (n,)."""
+        rest = np.zeros(len(self.time), dtype=bool)
+        for move in self.moves:
+            rest[move.start : move.end] = move.at_rest
+        return rest
+
     def recording(self) -> Recording:
         """The logged motion in the form of `evaluate`, with a segment for each move and each
-        rest."""
-        edges = (self.time[self.segment_rows[1:-1]] - self.time[0]).tolist()
+        rest, and its cycles."""
+        rows = self.segment_rows
+        edges = (self.time[rows[1:-1]] - self.time[0]).tolist()
         q, v, a = (channel.astype(float) for channel in (self.q, self.v, self.a))
-        return Recording.of(self.time, q, v, a, edges)
+        cycles = tuple(np.searchsorted(rows, self.cycle_rows).tolist())
+        return Recording.of(self.time, q, v, a, edges, cycles)
 
     @property
     def duration(self) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.logs.channels import channels_of
+from joulepath.optimizer.identify.logs.columns import EFFORTS, NOT_LOGGED
 from joulepath.optimizer.identify.logs.effort import EffortReport, effort_report
 from joulepath.optimizer.identify.logs.effort_checks import (
     check_signs,
@@ -27,7 +28,11 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.log_report import LogReport
-from joulepath.optimizer.identify.logs.log_warnings import held_warning, log_warnings
+from joulepath.optimizer.identify.logs.log_warnings import (
+    held_warning,
+    log_warnings,
+    numbers_of_joints,
+)
 from joulepath.optimizer.identify.logs.motion import LoggedMotion
 from joulepath.optimizer.identify.logs.moves import (
     cut_into_moves,
@@ -38,8 +43,6 @@ from joulepath.optimizer.identify.logs.speeds import speeds_of
 from joulepath.optimizer.identify.logs.usable_effort import check_measured, choose_meaning
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.arrays import frozen
-
-_EFFORTS: tuple[ChannelName, ...] = ("current", "torque", "effort")
 
 
 @dataclass(frozen=True)
@@ -154,7 +157,7 @@ def _efforts(
     """
     if options.effort is None:
         return None
-    group = next((each for each in _EFFORTS if each in channels.values), None)
+    group = next((each for each in EFFORTS if each in channels.values), None)
     if group is None:
         return None
     effort = channels.take(group)
@@ -171,6 +174,14 @@ def _efforts(
     if report.meaning == "torque":
         report = replace(report, torque_side=options.torque_side or motion.robot.torque_side)
     remarks += effort_warnings(motion.robot, regressions, effort, report.meaning)
+    missing = [j for j, k in enumerate(channels.columns.groups[group]) if k == NOT_LOGGED]
+    if missing:
+        effort = effort.copy()
+        effort[:, missing] = np.nan
+        remarks.append(
+            f"The efforts of joints {numbers_of_joints(missing)} are not logged: these joints keep "
+            "their own figures."
+        )
     return _Efforts(group, effort, report)
 
 

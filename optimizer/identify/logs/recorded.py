@@ -46,7 +46,7 @@ def measured(log: Log, arm: Arm) -> list[MeasuredEnergy]:
     """
     drives = arm.drives
     torque = None
-    if log.effort is not None and log.effort_meaning != "external":
+    if log.effort is not None and log.effort_meaning != "external" and log.has_all_efforts:
         torque = log.effort * (drives.torque_constant if log.effort_meaning == "current" else 1.0)
     if torque is None and log.power is None:
         return []

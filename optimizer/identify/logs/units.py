@@ -95,7 +95,7 @@ def check_units(
                 (check.other, check.other_remedy) if is_si else (check.si, check.si_remedy)
             )
             for k in columns.groups.get(group, ()):
-                if k < len(units) and wrong.fullmatch(units[k].strip()):
+                if 0 <= k < len(units) and wrong.fullmatch(units[k].strip()):
                     name = columns.names[k]
                     raise InvalidTable(
                         f"{name} is in another unit by line {row} than it is read in: give "

@@ -52,10 +52,14 @@ class Spread:
 
 
 def energy_sd(fitted: FitResult, spread: Spread, rows: Rows) -> tuple[float, float]:
-    """Predicted energy of rows and its standard deviation [J]."""
+    """Predicted energy of rows and its standard deviation [J].
+
+    Moves along one motion share the error that the figures do not express; it is independent of
+    that of other motions.
+    """
     energy = fitted.arm.energy(rows)
-    time = float(rows.weight.sum())
-    variance = figures_variance(fitted, rows) + (time * spread.move_sd) ** 2
+    time = np.bincount(rows.group, rows.weight)
+    variance = figures_variance(fitted, rows) + float(time @ time) * spread.move_sd**2
     for joint in np.flatnonzero(spread.session_sd).tolist():
         lost = energy - without_friction(fitted.arm, joint).energy(rows)
         variance += (float(spread.session_sd[joint]) * lost) ** 2

@@ -11,10 +11,17 @@ from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm
 from joulepath.optimizer.identify.arm.logged_torque import logged_torque, measured_power
+from joulepath.optimizer.identify.estimates.grouped import IntArray
 from joulepath.optimizer.identify.fits.fitting import FitResult
 from joulepath.optimizer.identify.quality.curves import curves_of
 from joulepath.optimizer.identify.quality.interval import Spread, energy_sd
-from joulepath.optimizer.identify.results import PowerErrors, Prediction, TorqueErrors, Validation
+from joulepath.optimizer.identify.results import (
+    ComparedEnergy,
+    PowerErrors,
+    Prediction,
+    TorqueErrors,
+    Validation,
+)
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
@@ -36,8 +43,8 @@ def validate(robot: Robot, folds: Sequence[Fold], threshold: float) -> Validatio
         threshold: smallest speed of a moving joint [rad/s].
     """
     own, power = own_arm(robot), any(np.isfinite(fold.rows.power).any() for fold in folds)
-    covered = [coverage(fold) for fold in folds]
-    inside, half = (np.concatenate(each) for each in zip(*covered, strict=True))
+    energies = [each for fold in folds for each in compared(fold, fold.rows.move).values()]
+    half = [50 * (each.p95 - each.p5) / each.predicted for each in energies]
     return Validation(
         moves=sum(len(np.unique(fold.rows.move[~fold.rows.rest])) for fold in folds),
         fitted=_prediction([(fold.fitted.arm, fold.rows) for fold in folds], threshold),
@@ -47,8 +54,10 @@ def validate(robot: Robot, folds: Sequence[Fold], threshold: float) -> Validatio
         )
         if power
         else None,
-        coverage=float(inside.mean()) if len(inside) else None,
-        half_width=float(half.mean()) if len(half) else None,
+        coverage=float(np.mean([each.covered for each in energies])) if energies else None,
+        half_width=float(np.mean(half)) if half else None,
+        energies=_in_order(energies),
+        cycles=_in_order(_of_cycles(folds)),
         curves=curves_of(
             [(fold.fitted.arm, fold.rows, ~fold.rows.rest) for fold in folds], threshold
         ),
@@ -76,9 +85,11 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         for arm, rows in folds
     ]
     measured, predicted, v, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
-    use = np.isfinite(measured).all(axis=1)
-    measured, predicted, v, weight = measured[use], predicted[use], v[use], weight[use]
-    moving, error = (np.abs(v) > threshold).astype(float), measured - predicted
+    use, logged = np.isfinite(measured), np.isfinite(measured).any(axis=0)
+    moving = ((np.abs(v) > threshold) & use).astype(float)
+    # joints without efforts are in no sum
+    measured, predicted = np.where(use, measured, 0.0), np.where(use, predicted, 0.0)
+    error = measured - predicted
 
     def relative(chosen: Array) -> Array:
         size = np.sqrt((chosen * measured**2).sum(axis=0))
@@ -96,7 +107,11 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         float(weight @ (copper * each**2).sum(axis=1)) for each in (measured, predicted)
     )
     return TorqueErrors(
-        rmse=np.sqrt((moving * error**2).sum(axis=0) / np.maximum(moving.sum(axis=0), 1)),
+        rmse=np.where(
+            logged,
+            np.sqrt((moving * error**2).sum(axis=0) / np.maximum(moving.sum(axis=0), 1)),
+            np.nan,
+        ),
         relative=relative(moving),
         relative_all=relative(np.ones_like(v)),
         shaft_energy=100 * abs(predicted_work / work - 1) if work else np.nan,
@@ -131,21 +146,54 @@ def power_errors(folds: Sequence[tuple[Rows, Array]]) -> PowerErrors:
     )
 
 
-def coverage(fold: Fold) -> tuple[Array, Array]:
-    """Intervals of the energies of the moves of a fold.
+def compared(fold: Fold, part: IntArray) -> dict[int, ComparedEnergy]:
+    """Measured and predicted energies of the moving rows of a fold, by the number of their part.
 
-    Returns:
-        Whether the measured energy of each move, by the logged power or else by the torques, lies
-        between P5 and P95 (moves,), and half the width of the interval (moves,) [%].
+    Args:
+        fold: the held-out rows with their fit.
+        part: number of the part of each row (n,), which is of one log; below 0 for no part.
     """
-    inside, half_widths = list[bool](), list[float]()
     measured = measured_power(fold.fitted.arm, fold.rows)
-    use = ~fold.rows.rest & np.isfinite(measured)
-    rows, measured = fold.rows.take(use), measured[use]
-    for move in np.unique(rows.move):
-        part = rows.take(rows.move == move)
-        energy, sd = energy_sd(fold.fitted, fold.spread, part)
-        drawn = float(part.weight @ measured[rows.move == move])
-        inside.append(abs(drawn - energy) <= P95 * sd)
-        half_widths.append(100 * P95 * sd / energy)
-    return np.array(inside), np.array(half_widths)
+    use = ~fold.rows.rest & np.isfinite(measured) & (part >= 0)
+    rows, measured, part = fold.rows.take(use), measured[use], part[use]
+    found = dict[int, ComparedEnergy]()
+    for number in np.unique(part).tolist():
+        mask = part == number
+        inside = rows.take(mask)
+        energy, sd = energy_sd(fold.fitted, fold.spread, inside)
+        found[number] = ComparedEnergy(
+            log=int(inside.log[0]),
+            start=float(inside.time[0]),
+            end=float(inside.time[-1]),
+            time=float(inside.weight.sum()),
+            measured=float(inside.weight @ measured[mask]),
+            predicted=energy,
+            p5=energy - P95 * sd,
+            p95=energy + P95 * sd,
+        )
+    return found
+
+
+def _of_cycles(folds: Sequence[Fold]) -> list[ComparedEnergy]:
+    """The energies of the cycles, whose moves may be in several folds.
+
+    The fits of the folds share most of their rows, and so most of their errors: their deviations
+    add up.
+    """
+    found = dict[int, ComparedEnergy]()
+    for fold in folds:
+        for number, each in compared(fold, fold.rows.cycle).items():
+            found[number] = _together(found[number], each) if number in found else each
+    return [*found.values()]
+
+
+def _together(one: ComparedEnergy, other: ComparedEnergy) -> ComparedEnergy:
+    """The energies of two parts of a cycle together."""
+    names = ("time", "measured", "predicted", "p5", "p95")
+    sums = {name: getattr(one, name) + getattr(other, name) for name in names}
+    start, end = min(one.start, other.start), max(one.end, other.end)
+    return ComparedEnergy(one.log, start, end, **sums)
+
+
+def _in_order(energies: Sequence[ComparedEnergy]) -> tuple[ComparedEnergy, ...]:
+    return tuple(sorted(energies, key=lambda each: (each.log, each.start)))

@@ -88,6 +88,8 @@ class Rows:
     move."""
     group: IntArray
     """Number of the motion (n,); moves along the same motion share it."""
+    cycle: IntArray
+    """Number of the cycle (n,), different in every log; -1 outside of the cycles of a log."""
     rest: Mask
     """Whether the arm rests (n,)."""
     weight: Array
@@ -254,9 +256,18 @@ def _rows_of_log(
         "wrench": mean(log.wrench, (6,)),
         "log": np.full(len(starts), number),
         "move": of_move + moves,
+        "cycle": _cycles(log, number, starts),
         "rest": rest,
         "weight": np.full(len(starts), size * stride / log.rate),
     }, moves + int(of_move.max()) + 1
+
+
+def _cycles(log: Log, number: int, starts: IntArray) -> IntArray:
+    """Number of the cycle of each row (n,), by its first sample; -1 outside of the cycles."""
+    edges = log.cycle_rows
+    cycle = np.searchsorted(edges, starts, side="right") - 1
+    outside = (cycle < 0) | (cycle >= len(edges) - 1)
+    return np.where(outside, -1, number * ROWS.max_rows + cycle)
 
 
 def _standing_joints(q: Array, move: IntArray, rest: Mask) -> Mask:

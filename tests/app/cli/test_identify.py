@@ -45,6 +45,38 @@ def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> Non
     assert b"log1" not in told
 
 
+def test_measured_and_predicted_energies_are_a_table(here: Here, tmp_path: Path) -> None:
+    fitted, cycles = tmp_path / "monday.csv", tmp_path / "cycles.csv"
+    truth = truth_of(ROBOT)
+    fitted.write_bytes(csv_of(recorded(ROBOT, truth, moves=6)))
+    repeated = recorded(ROBOT, truth, moves=4, seed=1, closed=True, cycles=2)
+    cycles.write_bytes(csv_of(repeated))
+    logs = ("identify", str(fitted), "--validate", str(cycles), "--payload", "0")
+    output = tmp_path / "moves.txt"
+    assert here.run(*logs, "--format", "moves", "-o", str(output))[0] == 0
+    head, *rows = output.read_text().splitlines()
+    assert head.split()[:2] == ["move", "log"]
+    assert [row.split()[0] for row in rows] == [*map(str, range(1, 9)), "cycle", "cycle"]
+
+
+def test_ten_seconds_at_rest_and_a_wattmeter(here: Here, tmp_path: Path) -> None:
+    log, output = tmp_path / "rest.csv", tmp_path / "figures.json"
+    upright = "0,-1.5708,0,-1.5708,0,0"
+    rows = [f"{k / 100},{upright},{30 + (k % 7) / 10}" for k in range(1000)]
+    log.write_text("\n".join(["t,q1,q2,q3,q4,q5,q6,P", *rows]))
+    command = ("identify", str(log), "--payload", "0", "--mains", "104", "-o", str(output))
+    assert here.run(*command)[0] == 0
+    result = RESULT.model_validate_json(output.read_bytes())
+    assert result.validation is None
+    assert result.document["electronics"]["idle_power"]["value"] == pytest.approx(30.3, abs=0.1)
+    mains = result.document["mains"]
+    assert mains["constant"]["value"] == pytest.approx(104 - 1.1 * 30.3, abs=0.1)
+    assert [mains[each]["trust"] for each in ("factor", "constant")] == ["E", "B"]
+    assert summary_of(json.loads(output.read_bytes()))["measure next"]
+    code, content = here.problem(*command[:-3], "30")
+    assert code == 2 and content["errors"][0]["loc"][-1] == "mains"
+
+
 def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path) -> None:
     output = tmp_path / "figures.json"
     chosen = (

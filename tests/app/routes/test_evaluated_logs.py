@@ -293,3 +293,22 @@ def test_the_command_sets_measured_against_predicted(recording: Recording, tmp_p
     head, *rows = found.stdout.decode().splitlines()
     assert head.split()[0] == "move" and len(rows) == len(recording.moves) + 1
     assert rows[-1].startswith("total") and all("power" in row and "%" in row for row in rows)
+
+
+def test_a_log_that_repeats_has_cycles(client: TestClient, tmp_path: Path) -> None:
+    repeated = recorded(ROBOT, TRUTH, moves=4, seed=2, closed=True, cycles=3)
+    answer = client.post("/evaluate", content=rtde(repeated), headers=CSV)
+    found: Any = model_of(EvaluateAnswer).model_validate_json(answer.content)
+    assert len(found.cycles) == 3 and len(found.segments) == len(repeated.moves)
+    for cycle in found.cycles:
+        inside = [each for each in found.segments if cycle.start <= each.start < cycle.end]
+        for name in ("electrical", "by_efforts"):
+            parts = [getattr(each.measured, name) for each in inside]
+            assert getattr(cycle.measured, name) == pytest.approx(sum(parts))
+        interval = cycle.energy.electrical.interval
+        assert interval.p5 < cycle.energy.electrical.total < interval.p95
+        assert cycle.difference is not None
+    file = tmp_path / "log.csv"
+    file.write_bytes(rtde(repeated))
+    rows = run("evaluate", str(file), "--format", "moves").stdout.decode().splitlines()
+    assert [row[:7] for row in rows[-4:]] == ["cycle 1", "cycle 2", "cycle 3", "total  "]

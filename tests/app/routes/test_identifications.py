@@ -17,6 +17,7 @@ from joulepath.app.api.identifications.models import (
     ResidualCurves,
     ResidualMove,
 )
+from joulepath.app.api.identifications.route import completed
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
 from joulepath.models.registry import load_robot
@@ -120,6 +121,20 @@ def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
     }
     answer = client.post("/evaluate", json=motion)
     assert answer.status_code == 200, answer.text
+
+
+def test_a_result_of_an_earlier_version_is_shown_with_empty_lists(
+    client: TestClient, log: str
+) -> None:
+    now = done(client, logs=[log]).model_dump(mode="json")
+    assert now["measure"] and now["validation"]["energies"]
+    stored = {name: value for name, value in now.items() if name != "measure"}
+    validation = {**now["validation"]}
+    del validation["energies"], validation["cycles"]
+    shown = completed(stored | {"validation": validation})
+    empty = {"energies": [], "cycles": []}
+    assert shown == now | {"measure": [], "validation": now["validation"] | empty}
+    assert completed(now | {"validation": None}) == now | {"validation": None}
 
 
 def residuals(client: TestClient, id: str) -> list[ResidualMove]:

@@ -12,8 +12,6 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.quality.advice import energy_derivative
-from joulepath.optimizer.identify.rows.fit_rows import rows_of
 from tests.identification_logs import recorded, rigid_torques, truth_of
 
 ROBOT = load_robot("ur10e")
@@ -50,33 +48,3 @@ def test_a_smaller_span_tells_no_rate() -> None:
 def test_a_log_without_temperatures_says_so() -> None:
     found = identify(ROBOT, [replace(warming(20.0), temperature=None)], OPTIONS).temperatures
     assert np.isnan(found.reference).all() and np.isnan(found.k).all()
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_known_figure_takes_the_advised_share_of_the_variance_away(seed: int) -> None:
-    """From power alone, where errors of figures make up for each other: their own terms are beyond
-    the whole.
-    """
-    log = recorded(ROBOT, truth_of(ROBOT, seed), moves=8, seed=seed).log()
-    fitted = identify(ROBOT, [replace(log, effort=None, effort_meaning=None)], OPTIONS)
-    advice, estimate = fitted.advice, fitted.fitted.estimate
-    assert advice is not None and 0 < advice.share <= 1.0
-    # the variance of the energy by the arms of the covariance's own errors, before and after the
-    # figure is known
-    rows = rows_of(ROBOT, [replace(log, effort=None, effort_meaning=None)])
-    gradient = np.array(
-        [energy_derivative(fitted.fitted.arm, rows, *name) for name in estimate.names]
-    )
-    at, covariance = estimate.names.index((advice.figure, advice.joint)), estimate.covariance
-    known = covariance - np.outer(covariance[at], covariance[at]) / covariance[at, at]
-    left = gradient @ known @ gradient / (gradient @ covariance @ gradient)
-    assert advice.share == pytest.approx(1 - left, abs=1e-6)
-
-
-def test_advice_names_what_the_log_tells_least() -> None:
-    """Without any rest, idle power and the losses beside it are told least."""
-    log = recorded(ROBOT, TRUTH, moves=10).log()
-    advice = identify(ROBOT, [log], OPTIONS).advice
-    assert advice is not None and 0 < advice.share <= 1.0 and advice.do.startswith("Log ")
-    parameters = {(each.figure, each.joint) for each in identify(ROBOT, [log], OPTIONS).parameters}
-    assert (advice.figure, advice.joint) in parameters

@@ -5,7 +5,7 @@ import { get } from "../store/client";
 import { robotOf } from "../store/service";
 import { edit, page, request, toast } from "../store/state";
 import type { Robot } from "../store/types";
-import { figure, percent } from "../store/units";
+import { figure, jointName, percent, words } from "../store/units";
 import { Curves } from "./Curves";
 import { ErrorTable, FigureTable } from "./FigureTables";
 import { openedIdentification, type Found, type LogDetail } from "./model";
@@ -57,8 +57,8 @@ export function Identification() {
       </header>
       <div class="columns">
         <Curves moves={moves} logs={logs} robot={robot} />
-        <ErrorTable validation={result.validation} robot={robot} />
-        <Advice result={result} logs={logs} figures={found.figures} />
+        {result.validation && <ErrorTable validation={result.validation} robot={robot} />}
+        <Advice result={result} robot={robot} logs={logs} figures={found.figures} />
         <FigureTable result={result} robot={robot} />
       </div>
     </div>
@@ -68,14 +68,16 @@ export function Identification() {
 /** What is odd in the logs or in what was found, and what would help most. */
 function Advice({
   result,
+  robot,
   logs,
   figures,
 }: {
   result: Found;
+  robot: Robot;
   logs: Pick<LogDetail, "id" | "name" | "warnings">[];
   figures: string | null;
 }) {
-  const { residuals, physical, advice, payload } = result;
+  const { residuals, physical, measure, payload } = result;
   const all = [
     !figures && "The figures are not stored: there was no room, or they were deleted.",
     payload &&
@@ -87,8 +89,10 @@ function Advice({
     ...logs.flatMap(({ id, name, warnings }) =>
       warnings.map((text) => `${name ?? id.slice(0, 8)}: ${text}`),
     ),
-    advice &&
-      `Most of the energy's uncertainty (${percent(advice.share)}) is from ${advice.figure.replaceAll("_", " ")}. ${advice.do}`,
+    ...measure.map(({ share, figure: name, joint, do: text }) => {
+      const place = joint === null ? "" : `, ${jointName(robot.joints[joint]!)}`;
+      return `${percent(share)} of the energy's uncertainty is from ${words(name)}${place}. ${text}`;
+    }),
   ].filter((text) => typeof text === "string");
   return (
     <article>

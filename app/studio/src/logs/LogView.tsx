@@ -83,7 +83,7 @@ export function LogView({ log }: { log: LogDetail }) {
 
 const signed = (share: number) => `${share >= 0 ? "+" : "−"}${figure(Math.abs(100 * share), 2)} %`;
 
-function Measured({ found: { segments, total } }: { found: Evaluation }) {
+function Measured({ found: { segments, cycles, total } }: { found: Evaluation }) {
   const electrical = total.measured?.electrical != null;
   const efforts = total.measured?.by_efforts != null;
   const cells = (name: string, part: Evaluated) => {
@@ -112,10 +112,14 @@ function Measured({ found: { segments, total } }: { found: Evaluation }) {
     "likely",
     "difference",
   ];
-  const rows = segments.map((part, k) => ({
-    key: k,
-    cells: cells(`${figure(part.start)} to ${figure(part.end)} s`, part),
-  }));
+  const spanned = (name: string, part: Evaluated, key: string) => ({
+    key,
+    cells: cells(`${name}${figure(part.start)} to ${figure(part.end)} s`, part),
+  });
+  const rows = [
+    ...cycles.map((part, k) => spanned(`cycle ${k + 1}, `, part, `cycle ${k}`)),
+    ...segments.map((part, k) => spanned("", part, `move ${k}`)),
+  ];
   return (
     <>
       {!electrical && !efforts && (

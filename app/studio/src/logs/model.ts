@@ -38,6 +38,7 @@ export interface Evaluation {
   robot: string;
   total: Evaluated;
   segments: Evaluated[];
+  cycles: Evaluated[];
   warnings: string[];
 }
 
@@ -81,10 +82,10 @@ type Figures = Record<string, Parameter>;
 export interface Found {
   robot: string;
   parameters: FigureFound[];
-  validation: Validation;
+  validation: Validation | null;
   residuals: { white: boolean };
   physical: { consistent: boolean } | null;
-  advice: { share: number; figure: string; do: string } | null;
+  measure: { share: number; figure: string; joint: number | null; do: string }[];
   payload: { mass: number; mass_sd: number; why: string | null } | null;
   document: { drives?: Figures; electronics?: Figures; friction_laws?: { identified?: Figures } };
 }
