@@ -29,6 +29,8 @@ from joulepath.optimizer.problem.targets import Single, members
 class NearbySettings:
     """Settings of nearby configurations."""
 
+    reach: float = 0.1
+    """Distance from a place up to which the best cycles mostly have its configurations [m]."""
     farthest: float = 0.8
     """Greatest change of a joint that counts as near [rad]."""
     residual: float = 1e-9
