@@ -22,7 +22,6 @@ import argparse
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -109,23 +108,22 @@ def _box(name: str, centre: Array, size: list[float]) -> Obstacle:
     return Obstacle(name, Box(np.array(size)), _at(centre))
 
 
-def placements(seed: int, count: int, deadline: float) -> Iterator[Placement]:
-    """The placements, each with a generator of its own; cells without a nominal cycle are left
-    out.
+def numbered(seed: int, number: int, deadline: float) -> Placement:
+    """The placement of a number, with a generator of its own; cells without a nominal cycle are
+    drawn anew.
     """
-    for k in range(count):
-        rng, robot = np.random.default_rng([seed, k]), ROBOTS[k % len(ROBOTS)]
-        while True:
-            cycle = cell(robot, rng)
-            try:
-                plan_cycle(replace(cycle, with_baselines=False), progress=False)
-            except JoulepathError:
-                continue
-            break
-        reach = Chain.of(cycle.arm.robot.model).length
-        around, above = AROUND * reach / 2, ABOVE * reach
-        region = Region(x=(-around, around), y=(-around, around), z=(-above, above))
-        yield Placement(cycles=[WeightedCycle(cycle)], moved=[Moved(region)], deadline=deadline)
+    rng, robot = np.random.default_rng([seed, number]), ROBOTS[number % len(ROBOTS)]
+    while True:
+        cycle = cell(robot, rng)
+        try:
+            plan_cycle(replace(cycle, with_baselines=False), progress=False)
+        except JoulepathError:
+            continue
+        break
+    reach = Chain.of(cycle.arm.robot.model).length
+    around, above = AROUND * reach / 2, ABOVE * reach
+    region = Region(x=(-around, around), y=(-around, around), z=(-above, above))
+    return Placement(cycles=[WeightedCycle(cycle)], moved=[Moved(region)], deadline=deadline)
 
 
 def exhaustive(placement: Placement) -> list[float]:
@@ -192,8 +190,8 @@ def main() -> None:
         compile_kernel(load_robot(robot))
     results = list[dict[str, float]]()
     statuses, reasons = Counter[str](), Counter[str]()
-    cells = placements(arguments.seed, arguments.count, arguments.deadline)
-    for number, placement in enumerate(cells):
+    for number in range(arguments.count):
+        placement = numbered(arguments.seed, number, arguments.deadline)
         found, own = measured(placement, arguments.grid)
         statuses[found.status] += 1
         reasons.update(each.reason for each in found.map if each.reason is not None)

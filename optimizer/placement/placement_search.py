@@ -116,7 +116,7 @@ class PlacementSearch:
 
     @property
     def evaluated(self) -> int:
-        """Number of places at which the cycles were computed."""
+        """Number of places at which the cycles were computed or estimated."""
         return self.rounds.evaluated
 
     @property

@@ -120,7 +120,8 @@ class SolvedPlacement:
     map: list[MapPoint]
     """Places all over the region."""
     evaluated: Count
-    """Number of places at which the cycles were computed, those beside the map included."""
+    """Number of places at which the cycles were computed or estimated, those beside the map
+    included."""
     left_out: Count
     """Number of places of the map for which there was no time."""
     wall_time: Seconds
@@ -142,7 +143,7 @@ class PlacementSolution(Result):
             is known.
         status: "complete" if every place of the map was decided and the refinement ended;
             "cut_short" if the deadline came first.
-        evaluated: number of places whose cycles were computed, beyond the map, too.
+        evaluated: number of places whose cycles were computed or estimated, beyond the map, too.
         left_out: number of places of the map for which there was no time.
         wall_time: wall time [s].
         objective: the minimised energy.
