@@ -22,9 +22,8 @@ class NearbyEnergy:
         start: round at the first place.
         end: deadline.
         solve: finds the best cycles at a place. It is asked far from the last place that it was
-            asked for, and where there are no nearby configurations; the energies are then estimates
-            if there are any. With None, all energies are those of certified cycles, and there are
-            none in other configurations.
+            asked for, and where there are no nearby configurations.
+        estimates: whether estimates suffice, if there are any for the cycles.
     """
 
     def __init__(
@@ -32,11 +31,12 @@ class NearbyEnergy:
         rounds: Rounds,
         start: Round,
         end: Deadline,
-        solve: Callable[[Place], Round] | None = None,
+        solve: Callable[[Place], Round],
+        estimates: bool = False,
     ) -> None:
         self.rounds, self.end, self.solve = rounds, end, solve
         self.known, self.least = start, np.inf
-        self._estimates = solve is not None and rounds.can_estimate
+        self._estimates = estimates and rounds.can_estimate
         self._memo: dict[bytes, float] = {}
 
     def __call__(self, x: Array) -> float | None:
@@ -56,15 +56,13 @@ class NearbyEnergy:
         rounds, known = self.rounds, self.known
         cycles = rounds.nearby(place, known.visited) if self._is_near(place) else None
         if cycles is None:
-            if self.solve is None:
-                return None
             known = self.solve(place)
             cycles = rounds.nearby(place, known.visited)
         elif not self._estimates:
             known = rounds.solved(place, self.end, KnownMotions(), cycles=cycles)
         estimates = self._estimates and cycles is not None
         value = rounds.estimated(cycles or [], self.end) if estimates else known.energy
-        if self.solve is not None and value is not None and value < self.least:
+        if value is not None and value < self.least:
             self.known, self.least = known, value
         return value
 
@@ -72,4 +70,4 @@ class NearbyEnergy:
         """Whether the best cycles of a place are likely in the known configurations."""
         scale = [axis.scale for axis in self.rounds.space.axes]
         away = np.abs((place.x - self.known.place.x) / scale).max(initial=0.0)
-        return self.solve is None or bool(away <= NEARBY.reach)
+        return bool(away <= NEARBY.reach)

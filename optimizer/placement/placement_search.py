@@ -12,6 +12,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.known_motions import KnownMotions
 from joulepath.optimizer.deadline import Clock, Deadline, end_if_stopped
 from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.placement.box_bound import box_bound
 from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
 from joulepath.optimizer.placement.nearby_energy import NearbyEnergy
 from joulepath.optimizer.placement.placement import Placement
@@ -35,6 +36,8 @@ class PlacementSearchSettings:
     """Share until which places are computed that may be better than the best one."""
     refined: float = 0.8
     """Share until which the best places are refined."""
+    bounded: float = 0.04
+    """Share for the lower bound over boxes of places, at most."""
     mapped: float = 0.92
     """Share until which the rest of the map is computed."""
     measured: float = 0.97
@@ -106,6 +109,7 @@ class PlacementSearch:
         self._solve_points(self._until(SEARCH.promising), only_better=True)
         if self.best is not None:
             self._refine(self._until(SEARCH.refined))
+        self._raise_bound()
         self._solve_points(self._until(SEARCH.mapped), only_better=False)
         if self.best is None:
             raise self._no_place()
@@ -202,7 +206,9 @@ class PlacementSearch:
         if end.passed:
             return
         for start in self._starts():
-            energy = NearbyEnergy(self.rounds, start, end, lambda place: self._solved(place, end))
+            energy = NearbyEnergy(
+                self.rounds, start, end, lambda place: self._solved(place, end), estimates=True
+            )
             step = PATTERN.first_step * self.spacing
             x, ended = refined(energy, start.place.x, self.box, step)
             self._solved(self.space.place(start.place.choice, x), self.end)
@@ -231,11 +237,23 @@ class PlacementSearch:
         same = a.choice == b.choice
         return same and bool((np.abs(a.x - b.x) <= SEARCH.apart * self.spacing).all())
 
+    def _raise_bound(self) -> None:
+        """Raise the lower bound, where one over boxes of places is known."""
+        bound = box_bound(self.space, self.end.within(SEARCH.bounded * self.deadline))
+        if bound is not None and self.lower_bound is not None:
+            self.lower_bound = max(bound, self.lower_bound)
+
     def _measure(self, end: Deadline) -> None:
         """Find how precisely the best place must be kept."""
         best = self.best
         assert best is not None and best.energy is not None
-        energy, step = NearbyEnergy(self.rounds, best, end), self.spacing / 2
+        energy = NearbyEnergy(
+            self.rounds,
+            best,
+            end,
+            lambda place: self.rounds.solved(place, end, KnownMotions()),
+        )
+        step = self.spacing / 2
         self.tolerance = tolerances(energy, best.place.x, best.energy, self.box, step)
 
     def _compare(self) -> None:

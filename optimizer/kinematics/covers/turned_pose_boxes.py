@@ -130,22 +130,29 @@ class TurnedPose:
         flange = drawing.pose(flange_pose(T, self.arm.T_flange_tcp))
         R, shift = drawing.T_form_base[:3, :3], drawing.T_form_base[:3, 3]
         position, direction = R @ self.pose.position + shift, R @ self.pose.direction
-        turned = _Turned(self.form, flange, position, direction, h + ROUNDING)
-        centre, half, held = turned.boxes(*signs.T)
+        h = h + ROUNDING
+        # The last axis' origin moves on a circle about the tool's axis.
+        beside = flange[:, :3, 3] - self.form.d6 * flange[:, :3, 2] - position
+        radius = np.linalg.norm(np.cross(beside, direction), axis=1)
+        moved = 2 * np.sin(h / 2) * radius + ROUNDING
+        centre, half, held = PoseCells(self.form, flange, h, moved, moved).boxes(*signs.T)
         return drawing.file(centre), half, held
 
 
 @dataclass(frozen=True)
-class _Turned:
-    """Flange poses T (k, 4, 4) of the table at the middles of cells with half widths `h` (k,)
-    [rad], turned about a `direction` (3,) through a `position` (3,) [m].
+class PoseCells:
+    """Cells of flange poses, whose middles are T (k, 4, 4) of the table.
+
+    Within a cell, a direction of the tool is within `h` (k,) [rad] of its direction for the middle,
+    and the last axis' origin within `across` (k,) [m] across the first axis, and `above` (k,) [m]
+    along it.
     """
 
     form: URClosedForm
     T: Array
-    position: Array
-    direction: Array
     h: Array
+    across: Array
+    above: Array
 
     def boxes(self, shoulder: Array, wrist: Array, elbow: Array) -> tuple[Array, Array, Mask]:
         """Boxes (k, 6) of the cells on branches given by their signs (k,), and a mask (k,) of the
@@ -180,13 +187,9 @@ class _Turned:
         return centre, half, held
 
     def _wrist(self, shoulder: Array, wrist: Array) -> _Wrist:
-        form, T, h = self.form, self.T, self.h
+        form, T, h, moved = self.form, self.T, self.h, self.across
         x_axis, y_axis, z_axis = (T[:, :3, k] for k in range(3))
         centre = T[:, :3, 3] - form.d6 * z_axis
-        # The last axis' origin moves on a circle about the tool's axis.
-        beside = centre - self.position
-        radius = np.linalg.norm(np.cross(beside, self.direction), axis=1)
-        moved = 2 * np.sin(h / 2) * radius + ROUNDING
         rho = np.hypot(centre[:, 0], centre[:, 1])
         low, high = np.maximum(rho - moved, abs(form.d4)), rho + moved
         held = high >= abs(form.d4)
@@ -218,7 +221,7 @@ class _Turned:
         level = np.stack([ahead.at - form.a1, centre[:, 2] - form.d1], axis=1)
         place = level - arm * np.stack([np.sin(heading.at), -np.cos(heading.at)], axis=1)
         swung = np.where(anywhere, abs(form.d5), 2 * abs(form.d5) * np.sin(seen / 2))
-        return _Wrist(held, q1, q5, q6, place, np.hypot(ahead.off, moved) + swung, heading)
+        return _Wrist(held, q1, q5, q6, place, np.hypot(ahead.off, self.above) + swung, heading)
 
 
 def _seen_from_pole(off: Array, angle: Array) -> Array:

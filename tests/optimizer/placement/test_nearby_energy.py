@@ -29,11 +29,15 @@ def nominal(rounds: Rounds) -> Round:
     return rounds.solved(rounds.space.nominal, AMPLE, KnownMotions())
 
 
+def not_asked(place: Place) -> Round:
+    pytest.fail("its configurations are near")
+
+
 def test_estimates_rank_places_as_certified_cycles_do() -> None:
     rounds = rounds_of(Region(x=(-0.2, 0.1)))
     start = nominal(rounds)
-    estimated = NearbyEnergy(rounds, start, AMPLE, lambda place: pytest.fail("it is near"))
-    certified = NearbyEnergy(rounds, start, AMPLE)
+    estimated = NearbyEnergy(rounds, start, AMPLE, not_asked, estimates=True)
+    certified = NearbyEnergy(rounds, start, AMPLE, not_asked)
     places = [np.array([x]) for x in (-0.08, 0.0, 0.08)]
     values = np.array([[energy(x) for x in places] for energy in (estimated, certified)])
     assert (values[1] <= values[0]).all() and (values[0] <= values[1] * (1 + LONGEST)).all()
@@ -48,7 +52,7 @@ def test_far_away_the_best_cycles_are_sought() -> None:
         asked.append(float(place.x[0]))
         return rounds.solved(place, AMPLE, KnownMotions())
 
-    energy = NearbyEnergy(rounds, nominal(rounds), AMPLE, solve)
+    energy = NearbyEnergy(rounds, nominal(rounds), AMPLE, solve, estimates=True)
     assert energy(np.array([-3.0])) == np.inf
     far = energy(np.array([-0.15]))
     assert far is not None and np.isfinite(far)
@@ -62,12 +66,12 @@ def test_a_given_time_is_computed_and_not_estimated() -> None:
     rounds = rounds_of(Region(x=(-0.2, 0.1)), duration_max=2.5)
     assert not rounds.can_estimate
     start = nominal(rounds)
-    energy = NearbyEnergy(rounds, start, AMPLE, lambda place: pytest.fail("it is near"))
+    energy = NearbyEnergy(rounds, start, AMPLE, not_asked, estimates=True)
     assert energy(start.place.x) == pytest.approx(start.energy, rel=1e-6)
 
 
 def test_no_time_is_left() -> None:
     rounds = rounds_of(Region(x=(-0.2, 0.1)))
     passed = Deadline.after(-1.0)
-    assert NearbyEnergy(rounds, nominal(rounds), passed)(np.zeros(1)) is None
+    assert NearbyEnergy(rounds, nominal(rounds), passed, not_asked)(np.zeros(1)) is None
     assert rounds.estimated(rounds.space.cycles(rounds.space.nominal), passed) is None
