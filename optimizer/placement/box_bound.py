@@ -1,10 +1,10 @@
 """Lower bound over boxes of places, by all configurations that reach the stops from a box.
 
-It is known for arms of Universal Robots' form, and for cycles with free time whose stops are poses
-or joint positions, reached without lines or paths.
+It is known for six-joint arms of the forms of `pose_cells`, and for cycles whose stops are poses or
+joint positions, reached without lines or paths.
 
-**Configurations.** While the base, or a group, is anywhere in a box of places, the last axis'
-origin at a stop is within a cylinder about its position for the middle of the box, and the
+**Configurations.** While the base, or a group, is anywhere in a box of places, a point of the
+flange at a stop is within a cylinder about its position for the middle of the box, and the
 directions of the tool turn by no more than the yaw does. `PoseCells` has eight boxes of joint
 positions that hold all configurations of such poses.
 
@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -31,8 +30,7 @@ from joulepath.optimizer.bounds.subdivide import Boxes, SearchLimits, Subdivisio
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.deadline import Deadline, end_if_stopped
 from joulepath.optimizer.kinematics.angles import wrapped
-from joulepath.optimizer.kinematics.covers.turned_pose_boxes import BRANCHES, ROUNDING, PoseCells
-from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
+from joulepath.optimizer.kinematics.covers.pose_cells import PoseCells, pose_cells_of
 from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.placement.extents import Extents
@@ -54,7 +52,7 @@ class BoxBoundSettings:
     """Number of boxes of places split in a round."""
     rounds: int = 24
     """Most rounds."""
-    smallest: float = 0.01
+    smallest: float = 0.002
     """Half side below which a box is not split [m]."""
     copper: float = 0.4
     """Share of the greatest η."""
@@ -64,7 +62,6 @@ class BoxBoundSettings:
 
 
 BOX_BOUND = BoxBoundSettings()
-_SIGNS = np.array(list(product((1.0, -1.0), repeat=3)))
 
 
 def box_bound(space: Space, end: Deadline) -> float | None:
@@ -77,10 +74,10 @@ def box_bound(space: Space, end: Deadline) -> float | None:
     Returns:
         The bound [J]; None where none is known.
     """
-    form = URClosedForm.of(space.placement.cycles[0].cycle.arm.robot.model)
-    if form is None or not all(_is_known(each.cycle) for each in space.placement.cycles):
+    cells = pose_cells_of(space.placement.cycles[0].cycle.arm.robot.model)
+    if cells is None or not all(_is_known(each.cycle) for each in space.placement.cycles):
         return None
-    parts = _PlaceBoxBound(space, form).run(SearchLimits(BOX_BOUND.rounds, end))
+    parts = _PlaceBoxBound(space, cells).run(SearchLimits(BOX_BOUND.rounds, end))
     least = float(parts.value.min(initial=np.inf))
     return least if np.isfinite(least) else None
 
@@ -124,11 +121,11 @@ class _Ends:
 class _PlaceBoxBound(Subdivision[_PlaceBoxes]):
     """Boxes of places with the bounds of all cycles."""
 
-    def __init__(self, space: Space, form: URClosedForm) -> None:
+    def __init__(self, space: Space, cells: PoseCells) -> None:
         self.space = space
         self.scale = np.array([axis.scale for axis in space.axes])
         extents, count = Extents(space), len(space.placement.cycles)
-        self.cycles = [_CycleBoxes(space, form, extents, k) for k in range(count)]
+        self.cycles = [_CycleBoxes(space, cells, extents, k) for k in range(count)]
 
     def first(self) -> _PlaceBoxes:
         """The whole region, for every discrete choice."""
@@ -172,13 +169,13 @@ class _CycleBoxes:
 
     Args:
         space: the places.
-        form: closed form of the arm.
+        cells: boxes of configurations of the arm.
         extents: boxes of points in the world.
         number: number of the cycle.
     """
 
-    def __init__(self, space: Space, form: URClosedForm, extents: Extents, number: int) -> None:
-        self.space, self.form, self.number = space, form, number
+    def __init__(self, space: Space, cells: PoseCells, extents: Extents, number: int) -> None:
+        self.space, self.cells, self.number = space, cells, number
         self.cycle = cycle = space.placement.cycles[number].cycle
         self.body_of_stop = extents.body_of_stop
         bound = CycleBound(cycle, extents)
@@ -186,14 +183,10 @@ class _CycleBoxes:
         self.fixed = bound.dwells + (1 + 2 * self.eta) * bound.gain
         self.targets: dict[str, tuple[Single, ...]] = {START: members(cycle.start)}
         self.targets |= {stop.name: members(stop.target) for stop in cycle.stops}
-        shift = form.drawing.T_form_base[:3, 3], form.drawing.T_flange_form[:3, 3]
-        self.tool = abs(form.d6) + sum(
-            float(np.linalg.norm(each)) for each in (shift[1], cycle.arm.T_flange_tcp[:3, 3])
-        )
-        turned = form.drawing.T_form_base[:3, 2]
-        self.is_first_axis_upright = bool(
-            max(np.abs(turned[:2]).max(), np.abs(shift[0][:2]).max()) < BOX_BOUND.first_axis
-        )
+        self.tool = float(np.linalg.norm(cells.point - cycle.arm.T_flange_tcp[:3, 3]))
+        # whether a yaw of an upright base turns the first joint alone
+        aside = np.append(cells.up[:2], cells.origin[:2])
+        self.is_first_axis_upright = bool(np.abs(aside).max() < BOX_BOUND.first_axis)
         self.is_posed = all(isinstance(t, Pose) for each in self.targets.values() for t in each)
 
     def bounds(self, places: Sequence[Place], half: Array) -> Array:
@@ -240,24 +233,12 @@ class _CycleBoxes:
                 cells.append(_Ends(q, np.zeros_like(q), np.ones((b, 1), dtype=bool)))
                 continue
             tcp = T @ target.T
-            flange = self.form.drawing.pose(flange_pose(tcp, self.cycle.arm.T_flange_tcp))
-            spread = np.array(
-                [
-                    self._spread(name, target, *each)
-                    for each in zip(places, half, tcp[:, :3, 3], strict=True)
-                ]
-            )
-            rows = np.repeat(np.arange(b), BRANCHES)
-            of_rows = PoseCells(self.form, flange[rows], *spread[rows].T)
-            centre, off, held = of_rows.boxes(*np.tile(_SIGNS, (b, 1)).T)
-            shape = b, BRANCHES, -1
-            cells.append(
-                _Ends(
-                    self.form.drawing.file(centre).reshape(shape),
-                    off.reshape(shape),
-                    held.reshape(b, BRANCHES),
-                )
-            )
+            spread = [
+                self._spread(name, target, *each)
+                for each in zip(places, half, tcp[:, :3, 3], strict=True)
+            ]
+            flange = flange_pose(tcp, self.cycle.arm.T_flange_tcp)
+            cells.append(_Ends(*self.cells.boxes(flange, *np.array(spread).T)))
         return _Ends(
             np.concatenate([each.centre for each in cells], axis=1),
             np.concatenate([each.half for each in cells], axis=1),
@@ -268,8 +249,6 @@ class _CycleBoxes:
         self, name: str, target: Pose, place: Place, half: Array, position: Array
     ) -> tuple[float, float, float]:
         """How far the pose of a stop changes within a box of places with half sides (n,) [m, rad].
-
-        The last axis' origin is nowhere farther from the TCP than `tool`.
 
         Args:
             name: name of the stop.
@@ -296,10 +275,10 @@ class _CycleBoxes:
             # a yaw of the base turns the first joint, alike at all stops that are poses
             turns[0] *= not self.is_posed
         else:
-            shift = np.abs(self.form.drawing.T_form_base[:3, :3] @ R_world_base.T) @ shift
-            across, above = float(np.hypot(*shift[:2])), float(shift[2])
+            across = float(np.linalg.norm(shift))
+            above = float(np.abs(R_world_base @ self.cells.up) @ shift)
         levers = float(np.linalg.norm(position) + np.linalg.norm(shift)), 0.0
         if body is not None:
             levers = levers[0], float(np.linalg.norm(target.T[:3, 3] - space.bodies[k].pivot))
         swung = sum(turn * (lever + self.tool) for turn, lever in zip(turns, levers, strict=True))
-        return sum(turns) + ROUNDING, across + swung + ROUNDING, above + swung + ROUNDING
+        return sum(turns), across + swung, above + swung

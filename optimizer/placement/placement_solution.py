@@ -110,10 +110,10 @@ class SolvedPlacement:
     """Lower bound of the objective: at no place of the region do the cycles need less, in any
     configurations. Null where no bound is known."""
     optimality_gap: Ratio | None
-    """1 - lower_bound / energy of the best place. For an arm of Universal Robots' form and a cycle
-    in its own time between poses or joint positions, the bound knows the configurations at the
-    stops for every place. In other cases it knows the lengths of the ways, the payloads and the
-    rests alone, and the gap is wide."""
+    """1 - lower_bound / energy of the best place. For a six-joint arm of Universal Robots' form or
+    with a spherical wrist, and a cycle between poses or joint positions, the bound knows the
+    configurations at the stops for every place. In other cases it knows the lengths of the ways,
+    the payloads and the rests alone, and the gap is wide."""
     tolerance: list[Tolerance]
     """How precisely every free coordinate of the best place must be kept. Empty for listed places,
     and if there was no time to find it."""
