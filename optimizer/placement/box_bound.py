@@ -56,6 +56,8 @@ class BoxBoundSettings:
     """Half side below which a box is not split [m]."""
     copper: float = 0.4
     """Share of the greatest η."""
+    most_targets: int = 4
+    """Most targets of a stop; the pairs of boxes grow with their square."""
     first_axis: float = 1e-9
     """Difference of directions, and distance [m], of the first axis from the vertical through the
     base up to which they are the same."""
@@ -84,13 +86,14 @@ def box_bound(space: Space, end: Deadline) -> float | None:
 
 def _is_known(cycle: Cycle) -> bool:
     law = cycle.arm.friction_law
-    targets = [cycle.start, *(stop.target for stop in cycle.stops)]
+    targets = [members(to) for to in (cycle.start, *(stop.target for stop in cycle.stops))]
     return (
         cycle.objective == "electrical"
         and cycle.order is None
         and not cycle.has_passes
         and all(move.tool_path is None for move in cycle.moves)
-        and all(isinstance(each, Pose | np.ndarray) for to in targets for each in members(to))
+        and all(len(to) <= BOX_BOUND.most_targets for to in targets)
+        and all(isinstance(each, Pose | np.ndarray) for to in targets for each in to)
         and min(law.coulomb.min(), law.curved.min(), law.viscous.min()) >= 0
     )
 
@@ -154,14 +157,15 @@ class _PlaceBoxBound(Subdivision[_PlaceBoxes]):
         return _PlaceBoxes(value, halves.centre, halves.half, halves.choice)
 
     def _bounded(self, centre: Array, half: Array, choice: Indices) -> _PlaceBoxes:
-        end_if_stopped()
-        choices = self.space.choices
-        places = [self.space.place(choices[c], x) for c, x in zip(choice, centre, strict=True)]
-        weights = [each.weight for each in self.space.placement.cycles]
-        value = sum(
-            w * each.bounds(places, half) for w, each in zip(weights, self.cycles, strict=True)
-        )
-        return _PlaceBoxes(np.asarray(value), centre, half, choice)
+        value = np.zeros(len(centre))
+        for k in range(0, len(centre), BOX_BOUND.split):
+            end_if_stopped()
+            rows = slice(k, k + BOX_BOUND.split)
+            at = zip(choice[rows], centre[rows], strict=True)
+            places = [self.space.place(self.space.choices[c], x) for c, x in at]
+            for weighted, cycle in zip(self.space.placement.cycles, self.cycles, strict=True):
+                value[rows] += weighted.weight * cycle.bounds(places, half[rows])
+        return _PlaceBoxes(value, centre, half, choice)
 
 
 class _CycleBoxes:
