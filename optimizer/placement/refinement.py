@@ -3,6 +3,12 @@
 The least energy of a cycle is a smooth function of the place only as long as the configurations at
 all stops stay the same and no clearance becomes active, and it has no value where a stop is out of
 reach. A pattern search needs no derivative, and a place without cycles is only a step not taken.
+
+Derivatives were measured against it. The energy of fixed motions whose ends follow the place is no
+guide: all moves run at limits of acceleration or jerk, so that even signs differ. Differences over
+less than some centimetres drown in the scatter of solves of 0.2 %. A quasi-Newton method with
+differences over the steps of the pattern search came to the same energies within 0.1 %, in 48, 61
+and 68 evaluations from three places of two cells of the benchmark, for 41, 26 and 48 here.
 """
 
 from __future__ import annotations
