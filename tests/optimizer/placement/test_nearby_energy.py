@@ -38,7 +38,7 @@ def test_estimates_rank_places_as_certified_cycles_do() -> None:
     start = nominal(rounds)
     estimated = NearbyEnergy(rounds, start, AMPLE, not_asked, estimates=True)
     certified = NearbyEnergy(rounds, start, AMPLE, not_asked)
-    places = [np.array([x]) for x in (-0.08, 0.0, 0.08)]
+    places = [np.array([x]) for x in (-0.04, 0.0, 0.04)]
     values = np.array([[energy(x) for x in places] for energy in (estimated, certified)])
     assert (values[1] <= values[0]).all() and (values[0] <= values[1] * (1 + LONGEST)).all()
     assert (values.argsort(axis=1)[0] == values.argsort(axis=1)[1]).all()
