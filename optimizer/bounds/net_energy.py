@@ -150,7 +150,7 @@ class NetEnergy:
     ) -> NetEnergy:
         """The bound of motions from rest to rest; the arguments are those of `electrical`."""
         cruise = Cruise(np.abs(displacement), arm)
-        return NetEnergy.of(arm, cruise, gain, waiting + np.zeros(len(gain)), _most_copper(arm))
+        return NetEnergy.of(arm, cruise, gain, waiting + np.zeros(len(gain)), most_copper(arm))
 
     def __getitem__(self, k: Indices) -> NetEnergy:
         return replace(self, cruise=self.cruise[k], power=self.power[k], work=self.work[k])
@@ -216,7 +216,31 @@ class NetEnergy:
         return value - missed
 
 
-def _most_copper(arm: Arm) -> float:
+@dataclass(frozen=True)
+class FixedCopperEnergy(NetEnergy):
+    """The bound with the same η for all motions.
+
+    It rises by 1 + 2 η per joule of potential gain, so that the gains of successive motions may be
+    added up before they are bounded.
+    """
+
+    @classmethod
+    def without_gain(cls, arm: Arm, displacement: Array, eta: float) -> FixedCopperEnergy:
+        """The bound of motions from rest to rest without potential gain.
+
+        Args:
+            arm: the arm.
+            displacement: joint displacements, shape (P, nq) [rad].
+            eta: the η, at most `most_copper`.
+        """
+        none = np.zeros(len(displacement))
+        return cls(**vars(NetEnergy.of(arm, Cruise(np.abs(displacement), arm), none, none, eta)))
+
+    def _best(self, work: Array, square: Array) -> Array:
+        return np.full_like(work, self.most)
+
+
+def most_copper(arm: Arm) -> float:
     """Greatest η of `electrical`; 0 for a friction law with a negative coefficient.
 
     The second derivative g'' is least at the greatest speed. Convexity requires (1 + 2 η) g'' - 2

@@ -29,8 +29,15 @@ from joulepath.optimizer.problem.targets import Single, members
 class NearbySettings:
     """Settings of nearby configurations."""
 
+    reach: float = 0.1
+    """Distance from a place up to which the best cycles mostly have its configurations [m]."""
     farthest: float = 0.8
     """Greatest change of a joint that counts as near [rad]."""
+    inset: float = 0.02
+    """Distance from its limit to which a joint beyond it is set back, from where the other joints
+    of a redundant arm reach the pose again [rad]."""
+    set_back: int = 8
+    """Most times that joints are set back."""
     residual: float = 1e-9
     """Greatest pose error of a configuration [m, rad], far below the 1e-6 that the certificate
     allows at an end."""
@@ -86,8 +93,14 @@ def nearby_cycle(cycle: Cycle, visited: Visited, T_base_stop: Mapping[str, Array
         q.append(visited.q[name])
         poses.append(_pose(cycle, members(target), visited.q[name], T))
     at = np.array(q)
-    near, residual = solved(chain, at, np.array(poses))
-    inside = (near >= limits.q_min) & (near <= limits.q_max)
+    near, inside, residual = at, np.ones(at.shape, dtype=bool), np.zeros(len(at))
+    for _ in range(1 + NEARBY.set_back):
+        # a redundant arm may reach a pose within its limits though the nearest way leaves them
+        within = np.clip(near, limits.q_min + NEARBY.inset, limits.q_max - NEARBY.inset)
+        near, residual = solved(chain, np.where(inside, near, within), np.array(poses))
+        inside = (near >= limits.q_min) & (near <= limits.q_max)
+        if inside.all():
+            break
     if not (inside.all() and (residual <= NEARBY.residual).all()):
         return None
     if np.abs(near - at).max() > NEARBY.farthest:

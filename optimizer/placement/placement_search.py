@@ -12,7 +12,9 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.known_motions import KnownMotions
 from joulepath.optimizer.deadline import Clock, Deadline, end_if_stopped
 from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.placement.box_bound import box_bound
 from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
+from joulepath.optimizer.placement.nearby_energy import NearbyEnergy
 from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.refinement import PATTERN, Box, refined
 from joulepath.optimizer.placement.region_bound import region_bound
@@ -34,6 +36,8 @@ class PlacementSearchSettings:
     """Share until which places are computed that may be better than the best one."""
     refined: float = 0.8
     """Share until which the best places are refined."""
+    bounded: float = 0.04
+    """Share for the lower bound over boxes of places, at most."""
     mapped: float = 0.92
     """Share until which the rest of the map is computed."""
     measured: float = 0.97
@@ -50,9 +54,6 @@ class PlacementSearchSettings:
     distance of neighbours on the map."""
     near_best: float = 0.05
     """Share of the least energy above it up to which a place of the map is refined."""
-    nearby: float = 0.04
-    """Distance from a place up to which the best cycles have its configurations [m]: mostly those
-    of neighbours in a map of 15 cm have others."""
     same: float = 1e-6
     """Relative difference of energies below which a bound excludes a better place."""
 
@@ -87,7 +88,7 @@ class PlacementSearch:
             np.array([axis.high for axis in axes]),
             np.array([axis.scale for axis in axes]),
         )
-        self.evaluated, self._times = 0, list[float]()
+        self._times = list[float]()
         self._memo: dict[tuple[tuple[int, ...], bytes], Round] = {}
         self._known = KnownMotions()
         self.best: Round | None = None
@@ -108,6 +109,7 @@ class PlacementSearch:
         self._solve_points(self._until(SEARCH.promising), only_better=True)
         if self.best is not None:
             self._refine(self._until(SEARCH.refined))
+        self._raise_bound()
         self._solve_points(self._until(SEARCH.mapped), only_better=False)
         if self.best is None:
             raise self._no_place()
@@ -115,6 +117,11 @@ class PlacementSearch:
             self._refine(self._until(SEARCH.refined))
         self._measure(self._until(SEARCH.measured))
         self._compare()
+
+    @property
+    def evaluated(self) -> int:
+        """Number of places at which the cycles were computed or estimated."""
+        return self.rounds.evaluated
 
     @property
     def left_out(self) -> int:
@@ -145,7 +152,6 @@ class PlacementSearch:
             end = end.within(max(SEARCH.least_time, usual))
         known, began = KnownMotions(), self.clock()
         found = self.rounds.solved(place, end, known, compared)
-        self.evaluated += 1
         if found.is_decided:
             self._memo[key] = found.summary
         # a place out of reach takes no time, and says nothing of others
@@ -200,10 +206,11 @@ class PlacementSearch:
         if end.passed:
             return
         for start in self._starts():
-            assert start.energy is not None
-            nearby = Nearby(self, start, end)
+            energy = NearbyEnergy(
+                self.rounds, start, end, lambda place: self._solved(place, end), estimates=True
+            )
             step = PATTERN.first_step * self.spacing
-            x, ended = refined(nearby.energy, start.place.x, start.energy, self.box, step)
+            x, ended = refined(energy, start.place.x, self.box, step)
             self._solved(self.space.place(start.place.choice, x), self.end)
             if not ended:
                 return
@@ -230,20 +237,24 @@ class PlacementSearch:
         same = a.choice == b.choice
         return same and bool((np.abs(a.x - b.x) <= SEARCH.apart * self.spacing).all())
 
-    def energy(self, place: Place, end: Deadline) -> float | None:
-        """Energy at a place [J]: inf without cycles; None if the time is up."""
-        found = self._solved(place, end)
-        if not found.is_decided and end.passed:
-            return None
-        return np.inf if found.energy is None else found.energy
+    def _raise_bound(self) -> None:
+        """Raise the lower bound, where one over boxes of places is known."""
+        bound = box_bound(self.space, self.end.within(SEARCH.bounded * self.deadline))
+        if bound is not None and self.lower_bound is not None:
+            self.lower_bound = max(bound, self.lower_bound)
 
     def _measure(self, end: Deadline) -> None:
         """Find how precisely the best place must be kept."""
         best = self.best
         assert best is not None and best.energy is not None
-        nearby = Nearby(self, best, end, follows=False)
+        energy = NearbyEnergy(
+            self.rounds,
+            best,
+            end,
+            lambda place: self.rounds.solved(place, end, KnownMotions()),
+        )
         step = self.spacing / 2
-        self.tolerance = tolerances(nearby.energy, best.place.x, best.energy, self.box, step)
+        self.tolerance = tolerances(energy, best.place.x, best.energy, self.box, step)
 
     def _compare(self) -> None:
         """Compute the best place once more, with baselines."""
@@ -257,61 +268,10 @@ class PlacementSearch:
     def _no_place(self) -> NoPlacement | DeadlineExceeded:
         found = {_key(each.place): each.reason for each in [*self.map, self.nominal]}
         reasons = [reason for reason in found.values() if reason is not None]
-        if not reasons:
+        if len(reasons) < len(found):
             return DeadlineExceeded([])
         counts = ReasonCounts(**{name: reasons.count(name) for name in get_args(Reason)})
         return NoPlacement(counts, str(self.nominal.error))
-
-
-class Nearby:
-    """Energies at places through configurations near those of a place.
-
-    Args:
-        search: the search.
-        start: round at the place.
-        end: deadline.
-        follows: whether the configurations of a better place take the place of those before, and
-            the best cycles of a place are sought where there are none in nearby configurations.
-    """
-
-    def __init__(
-        self, search: PlacementSearch, start: Round, end: Deadline, follows: bool = True
-    ) -> None:
-        self.search, self.end, self.follows = search, end, follows
-        self.near, self.at, self.least = start.visited, start.place.x, start.energy or np.inf
-        self.choice = start.place.choice
-        self._memo: dict[bytes, float] = {}
-
-    def energy(self, x: Array) -> float | None:
-        """Energy [J] at coordinates (n,): inf without cycles, None if the time is up."""
-        end_if_stopped()
-        if self.end.passed:
-            return None
-        key = np.round(x, 9).tobytes()
-        if key not in self._memo:
-            value = self._near_energy(x)
-            if value is None and self.follows:
-                value = self.search.energy(self.search.space.place(self.choice, x), self.end)
-                if value is None:
-                    return None
-            self._memo[key] = np.inf if value is None else value
-        return self._memo[key]
-
-    def _near_energy(self, x: Array) -> float | None:
-        """Energy [J] through nearby configurations; None without such cycles."""
-        search = self.search
-        away = float(np.abs((x - self.at) / search.box.scale).max())
-        if self.follows and away > SEARCH.nearby:
-            return None
-        place = search.space.place(self.choice, x)
-        cycles = search.rounds.nearby(place, self.near)
-        if cycles is None:
-            return None
-        found = search.rounds.solved(place, self.end, KnownMotions(), cycles=cycles)
-        search.evaluated += 1
-        if self.follows and found.energy is not None and found.energy < self.least:
-            self.near, self.at, self.least = found.visited, x, found.energy
-        return found.energy
 
 
 def _key(place: Place) -> tuple[tuple[int, ...], bytes]:

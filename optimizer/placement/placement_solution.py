@@ -110,8 +110,10 @@ class SolvedPlacement:
     """Lower bound of the objective: at no place of the region do the cycles need less, in any
     configurations. Null where no bound is known."""
     optimality_gap: Ratio | None
-    """1 - lower_bound / energy of the best place. The bound knows the lengths of the ways, the
-    payloads and the rests, and not where the base stands, so that the gap is wide."""
+    """1 - lower_bound / energy of the best place. For a six-joint arm of Universal Robots' form or
+    with a spherical wrist, and a cycle between poses or joint positions, the bound knows the
+    configurations at the stops for every place. In other cases it knows the lengths of the ways,
+    the payloads and the rests alone, and the gap is wide."""
     tolerance: list[Tolerance]
     """How precisely every free coordinate of the best place must be kept. Empty for listed places,
     and if there was no time to find it."""
@@ -120,7 +122,8 @@ class SolvedPlacement:
     map: list[MapPoint]
     """Places all over the region."""
     evaluated: Count
-    """Number of places at which the cycles were computed, those beside the map included."""
+    """Number of places at which the cycles were computed or estimated, those beside the map
+    included."""
     left_out: Count
     """Number of places of the map for which there was no time."""
     wall_time: Seconds
@@ -142,7 +145,7 @@ class PlacementSolution(Result):
             is known.
         status: "complete" if every place of the map was decided and the refinement ended;
             "cut_short" if the deadline came first.
-        evaluated: number of places whose cycles were computed, beyond the map, too.
+        evaluated: number of places whose cycles were computed or estimated, beyond the map, too.
         left_out: number of places of the map for which there was no time.
         wall_time: wall time [s].
         objective: the minimised energy.

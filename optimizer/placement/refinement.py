@@ -3,6 +3,12 @@
 The least energy of a cycle is a smooth function of the place only as long as the configurations at
 all stops stay the same and no clearance becomes active, and it has no value where a stop is out of
 reach. A pattern search needs no derivative, and a place without cycles is only a step not taken.
+
+Derivatives were measured against it. The energy of fixed motions whose ends follow the place is no
+guide: all moves run at limits of acceleration or jerk, so that even signs differ. Differences over
+less than some centimetres drown in the scatter of solves of 0.2 %. A quasi-Newton method with
+differences over the steps of the pattern search came to the same energies within 0.1 %, in 48, 61
+and 68 evaluations from three places of two cells of the benchmark, for 41, 26 and 48 here.
 """
 
 from __future__ import annotations
@@ -29,7 +35,7 @@ class PatternSettings:
     finest: float = 0.01
     """Step below which the search ends [m]; the energy is flat at the minimum: it rises by 2 % at
     10 cm, and thus by 0.02 % at 1 cm."""
-    least_gain: float = 1e-5
+    least_gain: float = 2e-4
     """Relative fall of the energy below which a place is not better: the scatter of solves."""
 
 
@@ -45,20 +51,21 @@ class Box:
     scale: Array
 
 
-def refined(energy: Energy, x: Array, value: float, box: Box, step: Array) -> tuple[Array, bool]:
+def refined(energy: Energy, x: Array, box: Box, step: Array) -> tuple[Array, bool]:
     """The coordinates of a local minimum.
 
     Args:
         energy: function to be minimised.
         x: coordinates to begin with, shape (n,) [m, rad].
-        value: energy there [J].
         box: ranges of the coordinates.
         step: first steps, shape (n,) [m, rad].
 
     Returns:
         The best coordinates (n,), and whether the search ended before its time was up.
     """
-    step = step.copy()
+    value, step = energy(x), step.copy()
+    if value is None:
+        return x, False
     while len(x) and (step / box.scale).max() > PATTERN.finest:
         polled = _polled(energy, x, value, box, step)
         if polled is None:

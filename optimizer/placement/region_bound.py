@@ -32,6 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
@@ -82,7 +83,7 @@ def region_bound(space: Space) -> float | None:
     extents = Extents(space)
     total = 0.0
     for each in space.placement.cycles:
-        bound = _CycleBound(each.cycle, extents).least()
+        bound = CycleBound(each.cycle, extents).least()
         if bound is None:
             return None
         total += each.weight * bound
@@ -123,7 +124,7 @@ def _spots(cycle: Cycle) -> dict[str, _Spot]:
     return spots
 
 
-class _CycleBound:
+class CycleBound:
     """The bound of one cycle."""
 
     def __init__(self, cycle: Cycle, extents: Extents) -> None:
@@ -140,7 +141,7 @@ class _CycleBound:
         if cycle.order is not None:
             # what is carried where depends on the order
             return 0.0 if never_negative else None
-        gain = self._gain()
+        gain = self.gain
         if cycle.objective == "mechanical":
             return max(gain, 0.0)
         value = self._electrical(gain)
@@ -153,7 +154,6 @@ class _CycleBound:
         least = min([power, *(hold for _, hold in rests)])
         if cycle.hold == "brakes":
             least = min(least, *(brake_power(cycle.dwell_of(1.0), m.arm_after) for m in moves))
-        dwells = sum(rest_energy(cycle, move, move.dwell, hold) for move, hold in rests)
         travels, best = [self._travel(move) for move in moves], -np.inf
         for share in REGION_BOUND.prices:
             price = share * max(least, 0.0)
@@ -162,7 +162,7 @@ class _CycleBound:
                 continue
             paid = price * ((time or 0.0) - cycle.dwell_time)
             moving = sum(self._moving(each, power - price) for each in travels)
-            best = max(best, gain + dwells + paid + moving)
+            best = max(best, gain + self.dwells + paid + moving)
         return best
 
     def _moving(self, travel: _Travel, power: float) -> float:
@@ -225,7 +225,16 @@ class _CycleBound:
             return self.extents.of_stop(stop, point)
         return self.extents.of_base(point)
 
-    def _gain(self) -> float:
+    @cached_property
+    def dwells(self) -> float:
+        """Least energy of all dwells [J]."""
+        return sum(
+            rest_energy(self.cycle, move, move.dwell, least_holding_power(move))
+            for move in self.cycle.moves
+        )
+
+    @cached_property
+    def gain(self) -> float:
         """Least gain of potential energy over the cycle [J]."""
         cycle, gain = self.cycle, 0.0
         if not cycle.closed:

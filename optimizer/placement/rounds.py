@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from joulepath.optimizer.cycle.chains import LeastChain
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
@@ -107,6 +109,7 @@ class Rounds:
 
     def __init__(self, space: Space, clock: Clock) -> None:
         self.space, self.clock = space, clock
+        self.evaluated = 0
         self.weights = [each.weight for each in space.placement.cycles]
 
     def checked(self, place: Place, end: Deadline) -> Round:
@@ -170,6 +173,7 @@ class Rounds:
         Returns:
             The round; without energy and reason if there was no time for all cycles.
         """
+        self.evaluated += 1
         found, energy = list[CycleSolution](), 0.0
         cycles = self.space.cycles(place) if cycles is None else cycles
         for k, (weight, cycle) in enumerate(zip(self.weights, cycles, strict=True)):
@@ -196,6 +200,50 @@ class Rounds:
         )
         visited = map(Visited.of, found, self.space.stops(place))
         return Round(place, energy, tuple(found), bound=bound, visited=tuple(visited))
+
+    @property
+    def can_estimate(self) -> bool:
+        """Whether `estimated` knows the energy of the cycles: they rest at all stops, and are free
+        in their time.
+        """
+        return all(
+            each.cycle.objective == "electrical"
+            and each.cycle.has_free_duration
+            and not each.cycle.has_passes
+            and each.cycle.arm.bus.mode != "storage"
+            for each in self.space.placement.cycles
+        )
+
+    def estimated(self, cycles: Sequence[Cycle], end: Deadline) -> float | None:
+        """Energy [J] of cycles with the first motion of every move, neither refined nor certified.
+
+        Of cycles through given configurations, it takes about a third of the time of the rounds,
+        and is greater by 0.5 to 1.5 %, nearly the same at neighbouring places.
+
+        Args:
+            cycles: the cycles, for which `can_estimate` holds.
+            end: deadline.
+
+        Returns:
+            The energy times the weights: inf without motions, None if the time is up.
+        """
+        self.evaluated += 1
+        energy = 0.0
+        for weight, cycle in zip(self.weights, cycles, strict=True):
+            asked = replace(cycle, deadline=max(end.left, _LEAST), with_baselines=False)
+            try:
+                search = CycleSearch(asked, self.clock)
+                nodes = search.explore()
+            except DeadlineExceeded:
+                return None
+            except JoulepathError as error:
+                if reason_of(error) is None:
+                    raise
+                return np.inf
+            if search.cut_short:
+                return None
+            energy += weight * search.cost(nodes)
+        return energy
 
     def nearby(self, place: Place, near: Sequence[Visited]) -> list[Cycle] | None:
         """The cycles at a place through configurations near those of another place.

@@ -13,7 +13,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.placement.mounts import TILTS, about_z, mount_of, yaw_of
 from joulepath.optimizer.placement.moved_cycle import Offsets, composed, cycle_at, inverted
-from joulepath.optimizer.placement.placement import Placement
+from joulepath.optimizer.placement.placement import PLACEMENT_RANGES, Placement
 from joulepath.optimizer.placement.region import (
     COORDINATES,
     Coordinate,
@@ -267,7 +267,7 @@ class Space:
         for _ in range(40):
             middle = (low + high) / 2
             low, high = (low, middle) if self._points(middle) <= MAP.points else (middle, high)
-        return high
+        return max(high, PLACEMENT_RANGES.finest)
 
 
 def _body(placement: Placement, k: int) -> Body:

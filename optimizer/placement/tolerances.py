@@ -19,7 +19,7 @@ class ToleranceSettings:
     tries: int = 4
     """Places tried on either side of a coordinate."""
     cautious: float = 0.95
-    """Share of the offset tried that a parabola through the last place gives."""
+    """Share of the offset tried that a curve through the last place gives."""
     enough: float = 0.1
     """Relative distance of an offset that works from one that does not at which the tries end."""
 
@@ -65,13 +65,16 @@ def _offset(
         found = energy(at)
         if found is None:
             return None
-        rise = found - value
+        # the energy rises like a parabola from a minimum, and evenly from the end of a range
+        rise, power = found - value, 0.5 if np.isinf(fails) else 1.0
         if rise <= allowed:
             works = offset
         else:
             fails = offset
-        parabola = TOLERANCE.cautious * np.sqrt(allowed / rise) if 0 < rise < np.inf else np.nan
-        ahead = offset * (parabola if np.isfinite(parabola) else 0.5 if rise > 0 else 3.0)
+        if 0 < rise < np.inf:
+            ahead = offset * TOLERANCE.cautious * (allowed / rise) ** power
+        else:
+            ahead = offset * (0.5 if rise > 0 else 3.0)
         ahead = min(ahead, 3 * offset, abs(most))
         offset = float(ahead if works < ahead < fails else (works + min(fails, abs(most))) / 2)
     return float(side * works) if works else 0.0

@@ -32,6 +32,7 @@ are singular configurations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -55,16 +56,16 @@ BRANCHES = 8
 
 
 @dataclass(frozen=True)
-class _Interval:
+class Interval:
     """Intervals with middles `at` and half widths `off` (k,)."""
 
     at: Array
     off: Array
 
     @staticmethod
-    def between(a: Array, b: Array) -> _Interval:
+    def between(a: Array, b: Array) -> Interval:
         """Intervals between two values (k,), in either order."""
-        return _Interval((a + b) / 2, np.abs(b - a) / 2)
+        return Interval((a + b) / 2, np.abs(b - a) / 2)
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,12 @@ class _Wrist:
     """
 
     held: Mask
-    q1: _Interval
-    q5: _Interval
-    q6: _Interval
+    q1: Interval
+    q5: Interval
+    q6: Interval
     place: Array
     off: Array
-    heading: _Interval
+    heading: Interval
 
 
 @dataclass(frozen=True)
@@ -130,98 +131,134 @@ class TurnedPose:
         flange = drawing.pose(flange_pose(T, self.arm.T_flange_tcp))
         R, shift = drawing.T_form_base[:3, :3], drawing.T_form_base[:3, 3]
         position, direction = R @ self.pose.position + shift, R @ self.pose.direction
-        turned = _Turned(self.form, flange, position, direction, h + ROUNDING)
-        centre, half, held = turned.boxes(*signs.T)
+        h = h + ROUNDING
+        # The last axis' origin moves on a circle about the tool's axis.
+        beside = flange[:, :3, 3] - self.form.d6 * flange[:, :3, 2] - position
+        radius = np.linalg.norm(np.cross(beside, direction), axis=1)
+        moved = 2 * np.sin(h / 2) * radius + ROUNDING
+        centre, half, held = URCells(self.form, flange, h, moved, moved).boxes(*signs.T)
         return drawing.file(centre), half, held
 
 
 @dataclass(frozen=True)
-class _Turned:
-    """Flange poses T (k, 4, 4) of the table at the middles of cells with half widths `h` (k,)
-    [rad], turned about a `direction` (3,) through a `position` (3,) [m].
+class URCells:
+    """Cells of flange poses, whose middles are T (k, 4, 4) of the table.
+
+    Within a cell, a direction of the tool is within `h` (k,) [rad] of its direction for the middle,
+    and the last axis' origin within `across` (k,) [m] across the first axis, and `above` (k,) [m]
+    along it.
     """
 
     form: URClosedForm
     T: Array
-    position: Array
-    direction: Array
     h: Array
+    across: Array
+    above: Array
 
     def boxes(self, shoulder: Array, wrist: Array, elbow: Array) -> tuple[Array, Array, Mask]:
         """Boxes (k, 6) of the cells on branches given by their signs (k,), and a mask (k,) of the
         possible ones.
         """
-        form, at = self.form, self._wrist(shoulder, wrist)
-        reach = abs(abs(form.a2) - abs(form.a3)), abs(form.a2) + abs(form.a3)
-        distance = np.linalg.norm(at.place, axis=1)
-        near, far = distance - at.off - ROUNDING, distance + at.off + ROUNDING
-        held = at.held & (far >= reach[0]) & (near <= reach[1])
-        near, far = (np.clip(each, *reach) for each in (near, far))
-        squares, product2 = form.a2**2 + form.a3**2, 2 * form.a2 * form.a3
-        cosines = [np.clip((each**2 - squares) / product2, -1.0, 1.0) for each in (near, far)]
-        bent = _Interval.between(*(elbow * np.arccos(each) for each in cosines))
-        towards = _Interval(
-            np.arctan2(at.place[:, 1], at.place[:, 0]), _azimuth_off(at.off, distance)
-        )
-        with np.errstate(divide="ignore"):
-            rates = [0.5 + (form.a3**2 - form.a2**2) / (2 * each**2) for each in (near, far)]
-        first, second = (
-            np.maximum(*np.abs([offset - each for each in rates])) for offset in (0.0, 1.0)
-        )
-        inner = np.arctan2(form.a3 * np.sin(bent.at), form.a2 + form.a3 * np.cos(bent.at))
-        q2 = _Interval(towards.at - inner, towards.off + _times(first, bent.off))
-        q4 = _Interval(
-            at.heading.at - towards.at + inner - bent.at,
-            at.heading.off + towards.off + _times(second, bent.off),
-        )
-        joints = (at.q1, q2, bent, q4, at.q5, at.q6)
-        centre = np.stack([each.at for each in joints], axis=1)
-        half = np.stack([np.minimum(each.off + ROUNDING, np.pi) for each in joints], axis=1)
-        return centre, half, held
+        at = self._wrist(shoulder, wrist)
+        links = PlanarArm.reaching(at.place, at.off, (self.form.a2, self.form.a3), elbow)
+        q4 = Interval(at.heading.at - links.second.at, at.heading.off + links.second.off)
+        centre, half = boxed((at.q1, links.first, links.bent, q4, at.q5, at.q6))
+        return centre, half, at.held & links.held
 
     def _wrist(self, shoulder: Array, wrist: Array) -> _Wrist:
-        form, T, h = self.form, self.T, self.h
+        form, T, h, moved = self.form, self.T, self.h, self.across
         x_axis, y_axis, z_axis = (T[:, :3, k] for k in range(3))
         centre = T[:, :3, 3] - form.d6 * z_axis
-        # The last axis' origin moves on a circle about the tool's axis.
-        beside = centre - self.position
-        radius = np.linalg.norm(np.cross(beside, self.direction), axis=1)
-        moved = 2 * np.sin(h / 2) * radius + ROUNDING
         rho = np.hypot(centre[:, 0], centre[:, 1])
         low, high = np.maximum(rho - moved, abs(form.d4)), rho + moved
         held = high >= abs(form.d4)
         high = np.maximum(high, abs(form.d4))
         with np.errstate(divide="ignore", invalid="ignore"):
-            aside = _Interval.between(
+            aside = Interval.between(
                 *(np.arcsin(np.clip(form.d4 / each, -1.0, 1.0)) for each in (low, high))
             )
         towards = np.arctan2(centre[:, 1], centre[:, 0])
         q1_at = towards + np.where(shoulder > 0, aside.at, np.pi - aside.at)
-        q1 = _Interval(q1_at, np.minimum(aside.off + _azimuth_off(moved, rho), np.pi))
-        ahead = _Interval.between(
+        q1 = Interval(q1_at, np.minimum(aside.off + azimuth_off(moved, rho), np.pi))
+        ahead = Interval.between(
             *(shoulder * np.sqrt(np.maximum(each**2 - form.d4**2, 0.0)) for each in (low, high))
         )
         c1, s1, zero = np.cos(q1.at), np.sin(q1.at), np.zeros_like(q1.at)
         n, outward = np.stack([s1, -c1, zero], axis=1), np.stack([c1, s1, zero], axis=1)
         u, v, w = ((each * n).sum(axis=1) for each in (x_axis, y_axis, z_axis))
         angle, off = np.arctan2(np.hypot(u, v), w), q1.off + h
-        q5 = _Interval.between(
+        q5 = Interval.between(
             *(wrist * np.clip(each, 0.0, np.pi) for each in (angle - off, angle + off))
         )
-        seen = _seen_from_pole(off, angle)
-        q6 = _Interval(np.arctan2(-wrist * v, wrist * u), seen)
+        seen = seen_from_pole(off, angle)
+        q6 = Interval(np.arctan2(-wrist * v, wrist * u), seen)
         fifth = -(np.sin(q6.at)[:, None] * x_axis + np.cos(q6.at)[:, None] * y_axis)
         along, above = form.tilted((fifth * outward).sum(axis=1), fifth[:, 2])
-        heading = _Interval(np.arctan2(along, -above), seen)
+        heading = Interval(np.arctan2(along, -above), seen)
         anywhere = seen >= np.pi
         arm = np.where(anywhere, 0.0, form.d5)[:, None]
         level = np.stack([ahead.at - form.a1, centre[:, 2] - form.d1], axis=1)
         place = level - arm * np.stack([np.sin(heading.at), -np.cos(heading.at)], axis=1)
         swung = np.where(anywhere, abs(form.d5), 2 * abs(form.d5) * np.sin(seen / 2))
-        return _Wrist(held, q1, q5, q6, place, np.hypot(ahead.off, moved) + swung, heading)
+        return _Wrist(held, q1, q5, q6, place, np.hypot(ahead.off, self.above) + swung, heading)
 
 
-def _seen_from_pole(off: Array, angle: Array) -> Array:
+@dataclass(frozen=True)
+class PlanarArm:
+    """Angles of two links of an arm in its plane, in each cell (k,).
+
+    Attributes:
+        held: mask of the cells within reach.
+        first: angle of the first link.
+        bent: angle from the first link to the second.
+        second: angle of the second link, which changes less than the sum of both.
+    """
+
+    held: Mask
+    first: Interval
+    bent: Interval
+    second: Interval
+
+    @classmethod
+    def reaching(
+        cls, place: Array, off: Array, lengths: tuple[float, float], elbow: Array
+    ) -> PlanarArm:
+        """The links of given lengths [m] that end within `off` (k,) of a place (k, 2) [m]; `elbow`
+        (k,) is the sign of `bent`.
+        """
+        a, b = lengths
+        reach = abs(abs(a) - abs(b)), abs(a) + abs(b)
+        distance = np.linalg.norm(place, axis=1)
+        near, far = distance - off - ROUNDING, distance + off + ROUNDING
+        held = (far >= reach[0]) & (near <= reach[1])
+        near, far = (np.clip(each, *reach) for each in (near, far))
+        cosines = [
+            np.clip((each**2 - a**2 - b**2) / (2 * a * b), -1.0, 1.0) for each in (near, far)
+        ]
+        bent = Interval.between(*(elbow * np.arccos(each) for each in cosines))
+        towards = Interval(np.arctan2(place[:, 1], place[:, 0]), azimuth_off(off, distance))
+        with np.errstate(divide="ignore"):
+            rates = [0.5 + (b**2 - a**2) / (2 * each**2) for each in (near, far)]
+        first, second = (
+            np.maximum(*np.abs([offset - each for each in rates])) for offset in (0.0, 1.0)
+        )
+        inner = np.arctan2(b * np.sin(bent.at), a + b * np.cos(bent.at))
+        return cls(
+            held,
+            Interval(towards.at - inner, towards.off + _times(first, bent.off)),
+            bent,
+            Interval(towards.at - inner + bent.at, towards.off + _times(second, bent.off)),
+        )
+
+
+def boxed(joints: Sequence[Interval]) -> tuple[Array, Array]:
+    """Middles and half sides (k, nq) [rad] of boxes with given intervals of the joints."""
+    centre = np.stack([each.at for each in joints], axis=1)
+    half = np.stack([np.minimum(each.off + ROUNDING, np.pi) for each in joints], axis=1)
+    return centre, half
+
+
+def seen_from_pole(off: Array, angle: Array) -> Array:
     """Largest change (k,) [rad] of the azimuth of a unit vector at an `angle` from a pole that
     moves by `off`.
     """
@@ -230,7 +267,7 @@ def _seen_from_pole(off: Array, angle: Array) -> Array:
     return np.where(inside, np.arcsin(np.minimum(sine, 1.0)), np.pi)
 
 
-def _azimuth_off(off: Array, distance: Array) -> Array:
+def azimuth_off(off: Array, distance: Array) -> Array:
     """Largest change (k,) [rad] of the azimuth of a point at a `distance` from an axis that moves
     by `off` [m].
     """

@@ -77,6 +77,8 @@ class SphericalWrist:
     """Wrist angle at q5 = 0 [rad]."""
     up: Array
     """Direction (3,) of the first axis."""
+    forward: Array
+    """Direction (3,) ahead of the first axis in the arm's plane, at zero."""
     origin: Array
     """Point (3,) on the first axis [m]."""
     wrist: Array
@@ -114,6 +116,7 @@ class SphericalWrist:
             offset=float((wrist - p[0]) @ normal),
             bend=atan2(float(np.cross(z[3], z[5]) @ z[4]), float(z[3] @ z[5])),
             up=up,
+            forward=forward,
             origin=p[0],
             wrist=axes.T_zero[:3, :3].T @ (wrist - axes.T_zero[:3, 3]),
             last_axis=axes.T_zero[:3, :3].T @ z[5],

@@ -152,6 +152,15 @@ def test_no_time_at_all_is_an_error_of_its_own() -> None:
         place(two_stops(), Places([at(0.1)]), deadline=1e-3, progress=False)
 
 
+def test_places_without_a_decision_are_no_proof_that_there_is_none() -> None:
+    ticks = iter(range(10**9))
+    placement = Placement(
+        cycles=[WeightedCycle(two_stops())], moved=[Moved(Places([at(-3.0)]))], deadline=1.0
+    )
+    with pytest.raises(DeadlineExceeded):
+        place_robot(placement, clock=lambda: 0.02 * next(ticks), progress=False)
+
+
 def test_progress_is_told() -> None:
     events = list[Event]()
     found = place(two_stops(), Places([at(-0.05), at(-3.0)]), deadline=AMPLE, tell=events.append)

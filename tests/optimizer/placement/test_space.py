@@ -46,6 +46,11 @@ def test_without_a_resolution_the_map_is_as_fine_as_its_size_allows() -> None:
     assert MAP.points / 3 < len(places) <= MAP.points < len(finer.map()[0])
 
 
+def test_the_map_of_a_tiny_region_is_no_finer_than_any_resolution() -> None:
+    space = Space.of(placement(Moved(Region(x=(-1e-8, 1e-8), y=(-1e-8, 1e-8)))))
+    assert len(space.map()[0]) == 4
+
+
 def test_a_whole_turn_has_each_yaw_once() -> None:
     space = Space.of(placement(Moved(Region(yaw=(0.0, 2 * np.pi))), resolution=0.15 * np.pi / 2))
     yaw = [float(each.x[0]) for each in space.map()[0]]

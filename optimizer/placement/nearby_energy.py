@@ -1,0 +1,73 @@
+"""Energies at places near one whose best cycles are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from joulepath.models.robot import Array
+from joulepath.optimizer.cycle.known_motions import KnownMotions
+from joulepath.optimizer.deadline import Deadline, end_if_stopped
+from joulepath.optimizer.placement.nearby_chain import NEARBY
+from joulepath.optimizer.placement.rounds import Round, Rounds
+from joulepath.optimizer.placement.space import Place
+
+
+class NearbyEnergy:
+    """Energies at places through configurations near those of a known round.
+
+    Args:
+        rounds: computes the rounds.
+        start: round at the first place.
+        end: deadline.
+        solve: finds the best cycles at a place. It is asked far from the last place that it was
+            asked for, and where there are no nearby configurations.
+        estimates: whether estimates suffice, if there are any for the cycles.
+    """
+
+    def __init__(
+        self,
+        rounds: Rounds,
+        start: Round,
+        end: Deadline,
+        solve: Callable[[Place], Round],
+        estimates: bool = False,
+    ) -> None:
+        self.rounds, self.end, self.solve = rounds, end, solve
+        self.known, self.least = start, np.inf
+        self._estimates = estimates and rounds.can_estimate
+        self._memo: dict[bytes, float] = {}
+
+    def __call__(self, x: Array) -> float | None:
+        """Energy [J] at coordinates (n,): inf without cycles, None if the time is up."""
+        end_if_stopped()
+        if self.end.passed:
+            return None
+        key = np.round(x, 9).tobytes()
+        if key not in self._memo:
+            value = self._energy(self.rounds.space.place(self.known.place.choice, x))
+            if value is None and self.end.left < 0:
+                return None
+            self._memo[key] = np.inf if value is None else value
+        return self._memo[key]
+
+    def _energy(self, place: Place) -> float | None:
+        rounds, known = self.rounds, self.known
+        cycles = rounds.nearby(place, known.visited) if self._is_near(place) else None
+        if cycles is None:
+            known = self.solve(place)
+            cycles = rounds.nearby(place, known.visited)
+        elif not self._estimates:
+            known = rounds.solved(place, self.end, KnownMotions(), cycles=cycles)
+        estimates = self._estimates and cycles is not None
+        value = rounds.estimated(cycles or [], self.end) if estimates else known.energy
+        if value is not None and value < self.least:
+            self.known, self.least = known, value
+        return value
+
+    def _is_near(self, place: Place) -> bool:
+        """Whether the best cycles of a place are likely in the known configurations."""
+        scale = [axis.scale for axis in self.rounds.space.axes]
+        away = np.abs((place.x - self.known.place.x) / scale).max(initial=0.0)
+        return bool(away <= NEARBY.reach)
