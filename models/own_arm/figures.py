@@ -111,6 +111,12 @@ def _chain_warnings(chain: Chain) -> list[str]:
             "Angles of joint origins written with few decimals, such as 1.571, are read as the "
             f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
         )
+    if chain.idle:
+        warnings.append(
+            f"Joints beside the chain that mimic moving ones: {listed(chain.idle)}. They are held, "
+            "so that their links do not move as those of the arm do: neither their mass nor their "
+            "shape. Their positions can be given in `locked`."
+        )
     if chain.coarse:
         warnings.append(
             f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as they "
@@ -125,8 +131,10 @@ def _shared_axes(chain: Chain, upright: UprightChain) -> list[str]:
         f"Joints {first!r} and {second!r} turn about one line, whatever the configuration: an "
         "<origin> or an <axis> of the URDF is likely wrong, or the second joint is no part of the "
         "arm. Poses are then held on self-motions, and most are refused as singular."
-        for (first, second), T in zip(pairwise(chain.joints), upright.placements[1:], strict=True)
-        if np.hypot(*T.translation[:2]) < ALIGNED and np.hypot(*T.rotation[:2, 2]) < ALIGNED
+        for (first, second), T in zip(pairwise(chain.turning), upright.placements[1:], strict=True)
+        if {first, second} <= {*chain.joints}
+        and np.hypot(*T.translation[:2]) < ALIGNED
+        and np.hypot(*T.rotation[:2, 2]) < ALIGNED
     ]
 
 
@@ -148,7 +156,7 @@ def _kinematics(
         "the joint turns about z."
     )
     figures = {
-        "joint_names": stated(description, list(chain.joints), "1", "From base to flange."),
+        "joint_names": stated(description, list(chain.turning), "1", "From base to flange."),
         "link_names": stated(description, links, "1", "The link that each joint moves."),
         "joint_origin": stated(
             description, [_row(each) for each in upright.placements], "m, rad", frame
@@ -160,6 +168,12 @@ def _kinematics(
             f"{_PLACEMENT} of the tip in the frame of the last link.",
         ),
     }
+    if chain.coupling.follows:
+        text = (
+            "Of each joint: place from base to flange of the joint that it follows, multiplier, "
+            "and offset. A joint that follows none is a joint of the arm, and follows itself."
+        )
+        figures["coupling"] = stated(description, chain.coupling.rows, "1, 1, rad", text)
     if (ros_base := chain.T_base_base_link) is not None:
         text = f"{_PLACEMENT} of the link `base_link` in the base."
         figures["base_link_origin"] = stated(description, _row(pin.SE3(ros_base)), "m, rad", text)
@@ -202,7 +216,7 @@ def _inertials(
             description, of_volume, [body.lever.tolist() for body in bodies], "m", in_link
         ),
         "inertia_frame_rpy": stated(
-            description, [[0.0] * 3] * chain.nq, "rad", "Axes of the link frame."
+            description, [[0.0] * 3] * len(bodies), "rad", "Axes of the link frame."
         ),
         "inertia": _of(
             description, of_volume or bool(chain.estimate.mended), tensors, "kg·m²", about

@@ -20,7 +20,7 @@ from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
 from joulepath.optimizer.cycle.rest_energy import least_holding_power, rest_energy
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
@@ -75,7 +75,8 @@ def _bound_of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
     """Bound [J] of the motions of a leg with an unknown end; a bound of `enough` suffices."""
     if all(layer.complete and not layer.sampled_poses for layer in leg.layers):
         return _bound_of_self_motions(leg, deadline)
-    if all(
+    follows = leg.prepared.arm.robot.coupling.follows
+    if not follows and all(
         layer.free_pose is not None or (layer.complete and not layer.sampled)
         for layer in leg.layers
     ):
@@ -134,5 +135,5 @@ def _levels(leg: Leg, layer: Layer) -> tuple[float, float]:
     known = [leg.prepared.potential(end.q) for end in layer.ends]
     if layer.complete and not layer.sampled:
         return min(known), max(known)
-    reach = np.pi * float(potential_rates(leg.prepared.model, leg.prepared.arm.gravity).sum())
+    reach = np.pi * float(greatest_rates(leg.prepared.arm).sum())
     return max(known) - reach, min(known) + reach

@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.kinematics.tcp import T_last_tcp
@@ -82,7 +82,7 @@ class PoseBoxes:
 
     @cached_property
     def _rates(self) -> Array:
-        return potential_rates(rigid_body_model(self.arm), np.asarray(self.arm.gravity))
+        return greatest_rates(self.arm)
 
     @cached_property
     def _bodies(self) -> tuple[Array, Array]:

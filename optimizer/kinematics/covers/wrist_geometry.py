@@ -184,6 +184,12 @@ class WristGeometry:
         ]
 
 
+def greatest_rates(arm: Arm) -> Array:
+    """Largest derivative (nq,) [J/rad] of the potential energy by each joint of an arm."""
+    rates = potential_rates(rigid_body_model(arm), np.asarray(arm.gravity))
+    return arm.robot.coupling.most_on_arm(rates)
+
+
 def potential_rates(model: pin.Model, gravity: Array, links: int | None = None) -> Array:
     """Largest derivative (links,) [J/rad] of the potential energy of the first links by each of
     their joints.

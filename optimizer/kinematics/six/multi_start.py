@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import pinocchio as pin
 
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
@@ -74,11 +73,9 @@ class MultiStart:
         self._found = lru_cache(maxsize=MULTI_START.cached_poses)(self._solve)
 
     @classmethod
-    def of(cls, model: pin.Model) -> MultiStart | None:
-        """Inverse kinematics of a Pinocchio model with a frame `flange`; None unless it has six
-        joints.
-        """
-        return cls(Chain.of(model)) if model.nq == 6 else None
+    def of(cls, chain: Chain) -> MultiStart | None:
+        """Inverse kinematics of a chain; None unless it has six joints."""
+        return cls(chain) if chain.nq == 6 else None
 
     def label(self, q: Array) -> BranchLabel:
         """Branch of a configuration (6,) [rad]: the number of the nearest solution, 1 on a
