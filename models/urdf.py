@@ -30,7 +30,8 @@ def urdf_of(name: str, figures: dict[str, Any]) -> str:
     columns = (
         [BASE, *links[:-1]],
         links,
-        *(kinematics[part]["value"] for part in ("joint_names", "joint_origin")),
+        kinematics.get("turning_joint_names", kinematics["joint_names"])["value"],
+        kinematics["joint_origin"]["value"],
         *(
             inertials[part]["value"]
             for part in ("mass", "center_of_mass", "inertia_frame_rpy", "inertia")

@@ -116,8 +116,7 @@ class _Replay:
 
     def __init__(self, arm: Arm, spline: Spline) -> None:
         self.arm, self.model, self._spline = arm, rigid_body_model(arm), spline
-        self._coupling = arm.robot.coupling
-        self.data = self.model.createData()
+        self._coupling, self.data = arm.robot.coupling, self.model.createData()
         self._last, self._T_last_tcp = self.model.njoints - 1, T_last_tcp(arm)
         self.t, curve = grid(spline.duration), spline.curve
         if len(self.t) > CERTIFICATE.block:
@@ -151,11 +150,8 @@ class _Replay:
         potential, kinetic = pin.computePotentialEnergy, pin.computeKineticEnergy
         q, v = self._coupling.positions(self.q[[0, -1]]), self._coupling.rates(self.v[[0, -1]])
         ends = [
-            (
-                potential(self.model, self.data, q[k]),
-                kinetic(self.model, self.data, q[k], v[k]),
-            )
-            for k in (0, -1)
+            (potential(self.model, self.data, q[k]), kinetic(self.model, self.data, q[k], v[k]))
+            for k in range(2)
         ]
         gain_potential, gain_kinetic = (after - before for before, after in zip(*ends, strict=True))
         weights = simpson_weights(self.t)

@@ -156,7 +156,7 @@ def _kinematics(
         "the joint turns about z."
     )
     figures = {
-        "joint_names": stated(description, list(chain.turning), "1", "From base to flange."),
+        "joint_names": stated(description, list(chain.joints), "1", "From base to flange."),
         "link_names": stated(description, links, "1", "The link that each joint moves."),
         "joint_origin": stated(
             description, [_row(each) for each in upright.placements], "m, rad", frame
@@ -170,8 +170,11 @@ def _kinematics(
     }
     if chain.coupling.follows:
         text = (
-            "Of each joint: place from base to flange of the joint that it follows, multiplier, "
-            "and offset. A joint that follows none is a joint of the arm, and follows itself."
+            "Of each turning joint: place from base to flange of the joint that it follows, "
+            "multiplier, and offset. A joint that follows none follows itself."
+        )
+        figures["turning_joint_names"] = stated(
+            description, list(chain.turning), "1", "Of the joints, and of those that follow them."
         )
         figures["coupling"] = stated(description, chain.coupling.rows, "1, 1, rad", text)
     if (ros_base := chain.T_base_base_link) is not None:

@@ -232,10 +232,7 @@ def _merged(
     """The chain, read and reduced by Pinocchio."""
     ranges, (bare, rounded) = coupled_ranges(moving, coupling), _for_pinocchio(root)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
-    given = {f"joint {k}": name_of(joint) for k, joint in enumerate(bare.findall("joint"))}
-    for unique, joint in zip(given, bare.findall("joint"), strict=True):
-        # Joints and links of a URDF may share names, frames of Pinocchio may not.
-        joint.set("name", unique)
+    given = {f"joint {k}": name_of(joint) for k, joint in enumerate(root.findall("joint"))}
     try:
         whole = pin.buildModelFromXML(ElementTree.tostring(bare, encoding="unicode"))
         q, held = (
@@ -258,9 +255,6 @@ def _merged(
             raise ValueError(f"of {len(moving)} joints it finds {model.nq}")
     except (RuntimeError, ValueError, IndexError) as error:
         refuse("urdf", f"Pinocchio does not read the URDF: {error}.")
-    rigid: list[list[str]] = [[] for _ in range(len(moving) + 1)]
-    for name in tree.links:
-        rigid[tree.carrier(name, names)].append(name)
     q_min, q_max, v_max, tau_max = ranges.T
     joints = tuple(list(names)[k] for k in coupling.own) or tuple(names)
     axes = np.array([joint_axis(joint) for joint in moving])
@@ -270,7 +264,7 @@ def _merged(
         joints,
         coupling,
         tuple(joint_end(joint, "child") for joint in moving),
-        tuple(map(tuple, rigid)),
+        _rigid(tree, names),
         axes,
         T_base.homogeneous,
         T_tip.homogeneous,
@@ -287,6 +281,14 @@ def _merged(
     )
 
 
+def _rigid(tree: UrdfTree, names: Mapping[str, int]) -> tuple[tuple[str, ...], ...]:
+    """Names of the links fixed to the base and to every moving link."""
+    rigid: list[list[str]] = [[] for _ in range(len(names) + 1)]
+    for link in tree.links:
+        rigid[tree.carrier(link, names)].append(link)
+    return tuple(map(tuple, rigid))
+
+
 def _for_pinocchio(root: Element) -> tuple[Element, float]:
     """A copy of a URDF without shapes, with restored figures and complete limits, and the largest
     change of an angle [rad].
@@ -296,8 +298,10 @@ def _for_pinocchio(root: Element) -> tuple[Element, float]:
     bare, rounded = copy.deepcopy(root), 0.0
     # urdfdom, Pinocchio's reader, wants a name.
     bare.attrib = {"name": "robot"}
-    for joint in bare.findall("joint"):
+    for k, joint in enumerate(bare.findall("joint")):
         rounded = max(rounded, restore_rounded(joint))
+        # Joints and links of a URDF may share names, frames of Pinocchio may not.
+        joint.set("name", f"joint {k}")
         limit = joint.find("limit")
         if joint.get("type") in (FIXED, "floating", "planar"):
             continue

@@ -49,8 +49,8 @@ def bound_of_missed_branches(
     """Lower bound on motions between poses in configurations of no candidate [J]; inf for none.
 
     - If all branches are known, the other configurations are members of self-motions.
-    - Else, if joints follow others, whose boxes are not known, it covers the motions between any two
-      configurations.
+    - Else, if joints follow others, whose boxes are not known, the bound covers the motions between
+      any two configurations.
     - Else, if the arm is nearly of a form with known curves, `branch_covers` hold them.
     - Else, between given joint positions and poses, the bound covers the poses with any rotation
       about the last joint's axis, by boxes of joint positions, without inverse kinematics.

@@ -52,8 +52,8 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
     (
         "urdf",
-        "'twist' mimics",
-        change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="pan"/>'),
+        "'twist' mimics itself",
+        change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="twist"/>'),
     ),
     ("urdf", "'elbow' has no <limit>", change('lower="-2" upper="2.5" ', "")),
     ("urdf", "'elbow' cannot move", change('lower="-2" upper="2.5"', 'lower="1" upper="1"')),
