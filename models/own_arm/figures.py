@@ -117,6 +117,11 @@ def _chain_warnings(chain: Chain) -> list[str]:
             "so that their links do not move as those of the arm do: neither their mass nor their "
             "shape. Their positions can be given in `locked`."
         )
+    if chain.facts.endless:
+        warnings.append(
+            f"Continuous joints whose `lower` and `upper` have no effect: "
+            f"{listed(chain.facts.endless)}. Make them revolute if they have these limits."
+        )
     if chain.coarse:
         warnings.append(
             f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as they "

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from joulepath.models.coupling import Coupling
-from joulepath.models.own_arm.description import Problems
+from joulepath.models.own_arm.description import PLAUSIBLE, Problems
 from joulepath.models.own_arm.robot_xml import number
 from joulepath.models.own_arm.urdf_tree import UrdfTree, joint_range, name_of, refuse
 from joulepath.models.robot import Array
@@ -104,8 +104,13 @@ def _row(
         passed.add(leader)
         multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
         leader = mimic.leader
-    if multiplier == 0:
-        refuse("urdf", f"Joint {name!r} mimics with a multiplier of 0: make it fixed.")
+    if not PLAUSIBLE.least_multiplier <= abs(multiplier) <= 1 / PLAUSIBLE.least_multiplier:
+        refuse(
+            "urdf",
+            f"Joint {name!r} mimics {leader!r} with a multiplier of {multiplier:g}: its size must "
+            f"be from {PLAUSIBLE.least_multiplier:g} to {1 / PLAUSIBLE.least_multiplier:g}. Make "
+            "the joint fixed if it does not move.",
+        )
     return names[leader], multiplier, offset
 
 

@@ -25,7 +25,6 @@ from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
-    CONTINUOUS,
     UrdfTree,
     is_coarse,
     joint_axis,
@@ -106,12 +105,7 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
                 )
     for name in given:
         with problems.noted():
-            if name not in tree.joints:
-                refuse(
-                    "locked",
-                    f"There is no joint {name!r} in the URDF: its joints are "
-                    f"{listed(tree.joints)}.",
-                )
+            _check_held(tree, name)
     problems.raise_any()
     path = tree.path(base, description.tip)
     others = _others(tree, path) if isinstance(locked, str) else given
@@ -125,6 +119,9 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
             f"Between base and tip {len(moving)} joints move: from 1 to {CHAIN.joints} are "
             "possible.",
         )
+    for joint in tree.joints.values():
+        with problems.noted():
+            _check_place(joint)
     for joint in moving:
         with problems.noted():
             _check_moving(joint)
@@ -170,27 +167,52 @@ def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:
     return held
 
 
+def _check_held(tree: UrdfTree, name: str) -> None:
+    """Raises InvalidArm unless a joint exists that has one position."""
+    if name not in tree.joints:
+        refuse(
+            "locked",
+            f"There is no joint {name!r} in the URDF: its joints are {listed(tree.joints)}.",
+        )
+    kind = tree.joints[name].get("type")
+    if kind in ("floating", "planar"):
+        refuse(
+            "locked",
+            f"Joint {name!r} is {kind}: no single position holds it. Make it fixed instead.",
+        )
+
+
+def _check_place(joint: Element) -> None:
+    """Raises InvalidArm for numbers of a joint that Pinocchio would not read."""
+    where = f"Joint {name_of(joint)!r} has an <origin>"
+    for part in ("xyz", "rpy"):
+        numbers(joint.find("origin"), part, where, ZERO)
+    if joint.get("type") != FIXED:
+        joint_axis(joint)
+
+
 def _check_moving(joint: Element) -> None:
     """Raises InvalidArm unless a moving joint is revolute and has limits, or those of another."""
     name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
     if kind not in TURNING:
-        refuse(
-            "urdf",
-            f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in "
-            "`locked`.",
-        )
+        held = "Give its position in `locked`" if kind == "prismatic" else "Make it fixed"
+        refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move. {held}.")
     if joint.find("mimic") is not None:
         return
     limit = joint.find("limit")
     if kind == "revolute" and (
         limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
     ):
-        refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
+        refuse(
+            "urdf",
+            f"Joint {name!r} has no <limit> with `lower` and `upper`: add them, or make it "
+            "continuous.",
+        )
     if kind == "revolute" and not joint_limit(joint, "lower") < joint_limit(joint, "upper"):
         refuse(
             "urdf",
-            f"Joint {name!r} cannot move, its lower limit being no less than the upper: make it "
-            "fixed.",
+            f"Joint {name!r} cannot move, its lower limit being no less than the upper: exchange "
+            "them, or make it fixed.",
         )
     lower, upper, *_ = joint_range(joint)
     if not lower < upper:
@@ -290,10 +312,10 @@ def _rigid(tree: UrdfTree, names: Mapping[str, int]) -> tuple[tuple[str, ...], .
 
 
 def _for_pinocchio(root: Element) -> tuple[Element, float]:
-    """A copy of a URDF without shapes, with restored figures and complete limits, and the largest
+    """A copy of a URDF with the places and bodies alone, with restored figures, and the largest
     change of an angle [rad].
 
-    Pinocchio gives a continuous joint two coordinates, and skips incomplete limits.
+    Pinocchio gives a continuous joint two coordinates.
     """
     bare, rounded = copy.deepcopy(root), 0.0
     # urdfdom, Pinocchio's reader, wants a name.
@@ -302,18 +324,13 @@ def _for_pinocchio(root: Element) -> tuple[Element, float]:
         rounded = max(rounded, restore_rounded(joint))
         # Joints and links of a URDF may share names, frames of Pinocchio may not.
         joint.set("name", f"joint {k}")
-        limit = joint.find("limit")
-        if joint.get("type") in (FIXED, "floating", "planar"):
-            continue
-        limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
-        limit.attrib.update({"lower": "0", "upper": "0"} | limit.attrib)
-        # read by `joint_range`; a negative one would be refused
-        limit.attrib.update({"effort": "0", "velocity": "0"})
+        joint[:] = [each for each in joint if each.tag in ("parent", "child", "origin", "axis")]
         if joint.get("type") == "continuous":
             joint.set("type", "revolute")
-            limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})
+        # read by `joint_range`; Pinocchio would refuse some, and skip incomplete ones
+        ElementTree.SubElement(joint, "limit", lower="-1", upper="1", effort="0", velocity="0")
     for link in bare.findall("link"):
-        link[:] = [each for each in link if each.tag not in ("visual", "collision")]
+        link[:] = link.findall("inertial")
     return bare, rounded
 
 
