@@ -22,6 +22,7 @@ from joulepath.optimizer.kinematics.isolated import ISOLATED, distinct, lies_on_
 from joulepath.optimizer.kinematics.newton import solved
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.six.loop_closure import LoopClosure
 from joulepath.optimizer.kinematics.six.named_branches import in_order, numbered
 from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
@@ -69,7 +70,7 @@ class MultiStart:
     complete, confirmed = False, False
 
     def __init__(self, chain: Chain) -> None:
-        self._chain = chain
+        self._chain, self._closure = chain, LoopClosure.of(chain)
         self._found = lru_cache(maxsize=MULTI_START.cached_poses)(self._solve)
 
     @classmethod
@@ -117,9 +118,10 @@ class MultiStart:
         if self._chain.beyond_length(T) > REACH.beyond:
             return np.zeros((0, self._chain.nq))
         shape = (MULTI_START.round_size, self._chain.nq)
-        rng, found, idle = np.random.default_rng(0), np.zeros((0, self._chain.nq)), 0
+        found, is_settled = self._roots(T)
+        rng, idle = np.random.default_rng(0), 0
         starts = rng.uniform(-np.pi, np.pi, shape)
-        for _ in range(MULTI_START.rounds):
+        for _ in range(0 if is_settled else MULTI_START.rounds):
             checkpoint()
             fresh = self._joined(found, starts, T)
             idle = idle + 1 if len(fresh) == len(found) else 0
@@ -141,6 +143,17 @@ class MultiStart:
         found = in_order(found)
         found.setflags(write=False)
         return found
+
+    def _roots(self, T: Array) -> tuple[Array, bool]:
+        """Configurations (n, 6) [rad] by the eigenvalues of the closed loop, and whether they are
+        all that are real.
+        """
+        found = np.zeros((0, self._chain.nq))
+        for roots in () if self._closure is None else self._closure.roots(T):
+            found = self._joined(found, roots.q, T)
+            if 0 < len(found) == roots.certain:
+                return found, True
+        return found, False
 
     def _joined(self, found: Array, starts: Array, T: Array) -> Array:
         """The known solutions (n, 6) [rad], and the distinct new ones found from starts (m, 6)."""
