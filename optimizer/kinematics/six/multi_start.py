@@ -1,15 +1,16 @@
 """Inverse kinematics of any six-joint arm by Newton's method from many starts: the last resort.
 
-Starts are drawn uniformly over all joint positions, with a fixed seed, in rounds until several
-consecutive rounds find nothing new. A branch with a small basin of attraction may still be missed,
-so the result is never `complete`. A general arm has at most sixteen branches (E. J. F. Primrose,
-"On the input-output equation of the general 7R-mechanism", 1986).
+The first starts are the roots of `loop_closure`, which has all configurations. If Newton's method
+does not reach as many as are real, or for other numbers of joints, starts are drawn uniformly over
+all joint positions, with a fixed seed, in rounds until several consecutive rounds find nothing new.
+A branch may still be missed, so the result is never `complete`. A general arm has at most sixteen
+branches (E. J. F. Primrose, "On the input-output equation of the general 7R-mechanism", 1986).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -70,7 +71,7 @@ class MultiStart:
     complete, confirmed = False, False
 
     def __init__(self, chain: Chain) -> None:
-        self._chain, self._closure = chain, LoopClosure.of(chain)
+        self._chain = chain
         self._found = lru_cache(maxsize=MULTI_START.cached_poses)(self._solve)
 
     @classmethod
@@ -144,6 +145,10 @@ class MultiStart:
         found.setflags(write=False)
         return found
 
+    @cached_property
+    def _closure(self) -> LoopClosure | None:
+        return LoopClosure.of(self._chain)
+
     def _roots(self, T: Array) -> tuple[Array, bool]:
         """Configurations (n, 6) [rad] by the eigenvalues of the closed loop, and whether they are
         all that are real.
@@ -151,7 +156,7 @@ class MultiStart:
         found = np.zeros((0, self._chain.nq))
         for roots in () if self._closure is None else self._closure.roots(T):
             found = self._joined(found, roots.q, T)
-            if 0 < len(found) == roots.certain:
+            if len(found) == roots.certain and (len(found) or not len(roots.q)):
                 return found, True
         return found, False
 

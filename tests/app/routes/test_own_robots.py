@@ -279,7 +279,10 @@ def test_joints_that_follow_others(client: TestClient) -> None:
         assert made.json()["kinematics"]["coupling"]["value"][2] == [1, -1, 0]
         model = mujoco.MjModel.from_xml_string(client.get("/robots/palletiser/mjcf").text)
         assert [model.actuator(k).name for k in range(model.nu)] == joints
-        ends = {"start": {"q": [0.0] * 4}, "goal": {"pose": {"position": [0.8, 0.1, 0.9], "rpy": [0, 0, 0]}}}
+        ends = {
+            "start": {"q": [0.0] * 4},
+            "goal": {"pose": {"position": [0.8, 0.1, 0.9], "rpy": [0, 0, 0]}},
+        }
         path = client.post("/optimize", json={"robot": "palletiser", "path": {}, **ends})
         assert "joints follow others" in str(refused(path, InvalidRequest)["errors"])
     finally:
