@@ -129,6 +129,12 @@ def test_rods_beside_the_chain_are_held_and_named() -> None:
     assert any("mimic moving ones: crank" in each for each in warnings)
 
 
+def test_friction_of_a_follower_is_named() -> None:
+    rubbing = PALLETISER.replace(PLATE, PLATE + '<dynamics friction="2" damping="0"/>')
+    warnings = own_figures("mine", description(rubbing))[1]
+    assert any("<dynamics> has no effect: m3. Give" in each for each in warnings)
+
+
 @pytest.mark.parametrize(
     ("law", "said"),
     [
