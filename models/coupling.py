@@ -36,6 +36,12 @@ class Coupling:
         """Whether a full turn of a joint turns all its followers by full turns."""
         return all(float(multiplier).is_integer() for _, multiplier, _ in self.rows)
 
+    @property
+    def has_free_end(self) -> bool:
+        """Whether the last joint of the chain is the arm's, and no other follows it."""
+        last = len(self.rows) - 1
+        return [leader for leader, _, _ in self.rows].count(last) == (1 if self.rows else 0)
+
     @cached_property
     def own(self) -> list[int]:
         """Places in the chain of the joints of the arm, shape (nq,)."""
@@ -73,6 +79,10 @@ class Coupling:
         does a derivative, by the chain rule.
         """
         return np.asarray(x @ self.matrix) if self.rows else x
+
+    def reaches(self, half: Array) -> Array:
+        """Greatest moves (..., n) of the chain's joints from those of the arm's (..., nq)."""
+        return np.asarray(half @ np.abs(self.matrix).T) if self.rows else half
 
     def most_on_arm(self, x: Array) -> Array:
         """Bounds (..., nq) on absolute derivatives by the arm's joints from those by the chain's

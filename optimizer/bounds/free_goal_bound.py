@@ -25,7 +25,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.end_curves import EndCurves
 from joulepath.optimizer.bounds.least_displacement import least_displacement
-from joulepath.optimizer.bounds.lower_bound import LeastBound, bound_of_any
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.bounds.pair import Pair
 from joulepath.optimizer.bounds.subdivide import DEFAULT_LIMITS, Boxes, BoxSubdivision, SearchLimits
 from joulepath.optimizer.collision.bodies import Indices
@@ -80,19 +80,16 @@ def bound_of_free_goals(
         deadline: deadline of the search, which then returns its bound so far.
         enough: sufficient bound, at which the search ends [J].
     """
-    goal, arm = prepared.problem.goal, prepared.arm
+    goal = prepared.problem.goal
     targets = goal.targets if isinstance(goal, AnyOf) else (goal,)
     reached = {pair.goal.target for pair in pairs if pair.goal.tolerance is not None}
     poses = [
-        within_cone(arm, pose)
+        within_cone(prepared.arm, pose)
         for k, pose in enumerate(targets)
         if k in reached and isinstance(pose, ConeOrientedPose)
     ]
     if not poses:
         return np.inf
-    if arm.robot.coupling.follows:
-        # no boxes are known of joints that follow others
-        return bound_of_any(prepared)
     curves = EndCurves.of([pair.start for pair in pairs])
     starts, half = curves.boxes(curves.first())
     limits = SearchLimits.of(prepared, deadline, enough, searches=len(poses))

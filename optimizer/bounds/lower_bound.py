@@ -15,7 +15,6 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.cruise import EvenTravel
 from joulepath.optimizer.bounds.net_energy import NetEnergy, electrical
 from joulepath.optimizer.dynamics.dwell import holding_power, linear_dwells
-from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS
@@ -198,18 +197,6 @@ class LeastBound:
     def _hold(self) -> float:
         """Least power [W] to stand still: without torque."""
         return float(holding_power(self.prepared.arm, np.zeros(self.prepared.arm.robot.nq)))
-
-
-def bound_of_any(prepared: PreparedProblem) -> float:
-    """Lower bound on the motions between any two configurations [J].
-
-    No joint need move between two configurations. But for full turns, which leave the potential
-    energy as it is, configurations differ by at most half a turn in each joint: the potential
-    energy falls by at most its greatest rate over half a turn.
-    """
-    fall = np.pi * float(greatest_rates(prepared.arm).sum())
-    still = np.zeros((1, prepared.arm.robot.nq))
-    return float(LeastBound(prepared).of(still, np.array([-fall]))[0])
 
 
 def mechanical(potential_gain: Array) -> Array:

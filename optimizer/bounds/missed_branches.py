@@ -13,13 +13,14 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.end_curves import Curve, EndCurves
 from joulepath.optimizer.bounds.free_ends_bound import bound_between_boxes, reversed_problem
 from joulepath.optimizer.bounds.free_goal_bound import PoseFamily, family_bound
-from joulepath.optimizer.bounds.lower_bound import bound_of_any
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.bounds.pair import Pair
 from joulepath.optimizer.bounds.pose_cover import POSE_COVER, CoveredPose, cover
 from joulepath.optimizer.bounds.self_motion_bound import bound_between_curves, self_motion_bound
 from joulepath.optimizer.bounds.subdivide import SUBDIVISION, SearchLimits
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.kinematics.covers.branch_covers import branch_covers
+from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import within_cone
@@ -49,8 +50,6 @@ def bound_of_missed_branches(
     """Lower bound on motions between poses in configurations of no candidate [J]; inf for none.
 
     - If all branches are known, the other configurations are members of self-motions.
-    - Else, if joints follow others, whose boxes are not known, the bound covers the motions between
-      any two configurations.
     - Else, if the arm is nearly of a form with known curves, `branch_covers` hold them.
     - Else, between given joint positions and poses, the bound covers the poses with any rotation
       about the last joint's axis, by boxes of joint positions, without inverse kinematics.
@@ -66,8 +65,6 @@ def bound_of_missed_branches(
     problem = prepared.problem
     if all_branches_known(problem):
         return self_motion_bound(prepared, candidates, deadline, enough)
-    if problem.arm.robot.coupling.follows:
-        return bound_of_any(prepared)
     has_free_goal = any(isinstance(goal, ConeOrientedPose) for goal in members(problem.goal))
     if not (_poses(problem.start) and has_free_goal):
         starts = _covered(prepared, [pair.start for pair in candidates], problem.start)
@@ -75,7 +72,7 @@ def bound_of_missed_branches(
         if starts is not None and goals is not None:
             return bound_between_curves(prepared, starts, goals, deadline, enough)
     if _poses(problem.start) and problem.arm.robot.nq > POSE_FREEDOMS:
-        return bound_of_any(prepared)
+        return _bound_of_any(prepared)
     return _bound_by_boxes(prepared, candidates, deadline)
 
 
@@ -160,6 +157,18 @@ def _covered(
 def _rounds(problem: Problem) -> int:
     """Rounds of the subdivision of boxes, shared by all searches."""
     return SUBDIVISION.tight_rounds if problem.bound == "tight" else SUBDIVISION.early_rounds
+
+
+def _bound_of_any(prepared: PreparedProblem) -> float:
+    """Lower bound on the motions between any two configurations [J].
+
+    No joint need move between two configurations. But for full turns, which leave the potential
+    energy as it is, configurations differ by at most half a turn in each joint: the potential
+    energy falls by at most its greatest rate over half a turn.
+    """
+    fall = np.pi * float(greatest_rates(prepared.arm).sum())
+    still = np.zeros((1, prepared.arm.robot.nq))
+    return float(LeastBound(prepared).of(still, np.array([-fall]))[0])
 
 
 def _poses(target: Target) -> list[Pose]:

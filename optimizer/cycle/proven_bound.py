@@ -75,8 +75,7 @@ def _bound_of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
     """Bound [J] of the motions of a leg with an unknown end; a bound of `enough` suffices."""
     if all(layer.complete and not layer.sampled_poses for layer in leg.layers):
         return _bound_of_self_motions(leg, deadline)
-    follows = leg.prepared.arm.robot.coupling.follows
-    if not follows and all(
+    if all(
         layer.free_pose is not None or (layer.complete and not layer.sampled)
         for layer in leg.layers
     ):

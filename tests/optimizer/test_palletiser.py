@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -29,6 +27,8 @@ from joulepath import (
 )
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from joulepath.optimizer.motion.quadrature import grid, simpson_weights
 from tests.models.own_arm.arms import robot
@@ -39,13 +39,6 @@ START, GOAL = np.array([-1.0, 0.1, 0.6, 0.0]), np.array([1.2, 0.7, 0.2, 1.0])
 QUADRATURE, DIFFERENCES, STEP = 1e-4, 1e-6, 1e-6
 # m and rad: residual of a pose, and difference of a configuration found again
 ACCURACY, FOUND = 1e-9, 1e-6
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _no_compiler() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("PATH", "")
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -107,9 +100,26 @@ def test_poses_are_found_and_answered(arm: Arm) -> None:
     for goal in goals:
         answer = optimize(Problem(arm=arm, start=START, goal=goal), progress=False)
         assert answer.certificate.valid and answer.status == "feasible"
-        assert answer.lower_bound < answer.energy.electrical.total
+        assert 0 < answer.lower_bound < answer.energy.electrical.total
         apart = tcp_pose(arm, answer.trajectory.q[-1])[:3, 3] - tcp_pose(arm, GOAL)[:3, 3]
         assert np.abs(apart).max() < ACCURACY
+
+
+def test_boxes_keep_the_configurations_of_a_pose(arm: Arm) -> None:
+    """The lower bounds towards poses narrow boxes of joint positions, and bound their potential
+    energy.
+    """
+    rng, plant = np.random.default_rng(8), Plant(arm)
+    for k in range(60):
+        q, half = rng.uniform(-1, 1, 4), rng.uniform(0.01, 0.5, 4)
+        centre, T = q + rng.uniform(-1, 1, 4) * half, tcp_pose(arm, q)
+        about = ConeOrientedPose.about(Pose(T), np.array([0.0, 0.0, 1.0]))
+        boxes = PoseBoxes(arm, about if k % 2 else ConeOrientedPose(T[:3, 3]))
+        middle, side, possible = boxes.narrowed(centre[None], half[None])
+        assert possible[0] and (np.abs(q - middle[0]) <= side[0] + ACCURACY).all()
+        inside = centre + rng.uniform(-1, 1, (20, 4)) * half
+        least = boxes.least_potential(centre[None], half[None])[0]
+        assert least <= min(plant.potential(each) for each in inside)
 
 
 def test_a_cycle_is_planned_and_exported(arm: Arm) -> None:

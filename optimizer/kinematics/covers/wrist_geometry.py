@@ -79,7 +79,9 @@ class WristGeometry:
     @classmethod
     def of(cls, arm: Arm) -> WristGeometry | None:
         """Geometry of an arm; None for a chain without an inner joint."""
-        return cls(arm, rigid_body_model(arm)) if arm.robot.nq > WRIST_JOINTS else None
+        if arm.robot.nq <= WRIST_JOINTS or arm.robot.coupling.follows:
+            return None
+        return cls(arm, rigid_body_model(arm))
 
     @property
     def inner(self) -> int:
