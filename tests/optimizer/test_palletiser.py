@@ -13,6 +13,7 @@ from joulepath import (
     Cycle,
     InvalidProblem,
     Obstacle,
+    Places,
     Pose,
     Problem,
     Scene,
@@ -21,16 +22,20 @@ from joulepath import (
     ToolPath,
     evaluate,
     export,
+    identify,
     inverse_kinematics,
     optimize,
+    place,
     plan_cycle,
 )
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
 from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from joulepath.optimizer.motion.quadrature import grid, simpson_weights
+from joulepath.optimizer.replay.simulated_arm import SimulatedArm
 from tests.models.own_arm.arms import robot
 from tests.models.own_arm.palletiser import PALLETISER, PLATE, description
 
@@ -171,6 +176,13 @@ def test_parts_of_turns_leave_joint_positions_as_targets() -> None:
 
 
 def test_what_is_not_modelled_is_refused(arm: Arm) -> None:
-    with pytest.raises(InvalidProblem, match="some of its joints follow others") as caught:
-        Problem(arm=arm, start=START, goal=Pose(tcp_pose(arm, GOAL)), tool_path=ToolPath())
-    assert caught.value.field == "tool_path"
+    stops = [Stop(name="place", target=GOAL)]
+    for refused in (
+        lambda: Problem(arm=arm, start=START, goal=Pose(tcp_pose(arm, GOAL)), tool_path=ToolPath()),
+        lambda: ExcitationProblem(arm=arm),
+        lambda: SimulatedArm(arm),
+        lambda: identify(arm.robot, []),
+        lambda: place(Cycle(arm=arm, start=START, stops=stops), Places([np.eye(4)])),
+    ):
+        with pytest.raises(InvalidProblem, match="some of its joints follow others"):
+            refused()
