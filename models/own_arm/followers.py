@@ -118,8 +118,8 @@ def coupled_ranges(moving: Sequence[Element], coupling: Coupling) -> Array:
     """Least and greatest position [rad], speed [rad/s] and torque [N·m] (nq, 4) of the joints that
     follow no other, within which their followers keep their own ranges and speeds.
 
-    A follower without a range, or without a speed above 0, has no limit of its own. Its effort is
-    no limit either, as it has no motor.
+    A follower that is continuous, or has no range, or no speed above 0, has no such limit of its
+    own. Its effort is no limit either, as it has no motor.
 
     Raises:
         InvalidArm: a joint and its follower have no common range.
@@ -135,7 +135,7 @@ def coupled_ranges(moving: Sequence[Element], coupling: Coupling) -> Array:
         if leader == place:
             continue
         row = found[number_of]
-        if lower < upper:
+        if lower < upper and moving[place].get("type") != "continuous":
             ends = sorted(((lower - offset) / k, (upper - offset) / k))
             row[:2] = max(row[0], ends[0]), min(row[1], ends[1])
         if speed > 0:

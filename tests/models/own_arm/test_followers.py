@@ -57,6 +57,12 @@ def test_positions_limits_and_names_are_those_of_the_joints_with_motors() -> Non
     np.testing.assert_allclose(arm.limits.v_max, [2.0, 2.0, 1.5, 2.0])
 
 
+def test_a_follower_without_a_range_leaves_that_of_its_leader() -> None:
+    for old, new in (('name="m3" type="revolute"', 'name="m3" type="continuous"'), ("-1.2", "0.3")):
+        arm = robot(description(PALLETISER.replace(old, new)))
+        assert (arm.limits.q_min[2], arm.limits.q_max[2]) == (-0.3, 1.4)
+
+
 @pytest.mark.parametrize("oblique", [False, True])
 def test_torques_and_poses_are_those_of_mimic_joints_in_pinocchio(oblique: bool) -> None:
     """Pinocchio reads the <mimic> of the URDF written by the robot, and of the user's own."""
