@@ -23,7 +23,7 @@ from joulepath.models.robot import (
     link_names,
 )
 from joulepath.models.shape_sizes import check_lengths
-from joulepath.models.urdf import urdf_of
+from joulepath.models.urdf import coupling_of, urdf_of
 
 # figures of the section `collision` beside the capsules of links
 NO_LINKS = ("elbow", "meshes", "never_meet")
@@ -32,10 +32,12 @@ NO_LINKS = ("elbow", "meshes", "never_meet")
 def robot_of(name: str, figures: dict[str, Any]) -> Robot:
     """The robot of these figures. Raises ValueError if an array does not have nq entries."""
     model = pin.buildModelFromXML(urdf_of(name, figures))
+    coupling = coupling_of(figures["kinematics"])
+    nq = len(coupling.own) or int(model.nq)
     drives = Drives(
-        **{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__}
+        **{part: _joints(figures["drives"][part], nq) for part in Drives.__dataclass_fields__}
     )
-    model.armature = drives.rotor_inertia
+    model.armature = coupling.of_motors(drives.rotor_inertia)
     limits, electronics = figures["limits"], figures["electronics"]
     capsules = _capsules(figures, model)
     return Robot(
@@ -43,19 +45,19 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         title=figures["title"],
         model=model,
         limits=Limits(
-            q_min=_joints(limits["position_min"], model.nq),
-            q_max=_joints(limits["position_max"], model.nq),
-            v_max=_joints(limits["velocity"], model.nq),
-            a_max=_joints(limits["acceleration"], model.nq),
-            j_max=_joints(limits["jerk"], model.nq),
-            tau_max=_joints(limits["torque"], model.nq),
+            q_min=_joints(limits["position_min"], nq),
+            q_max=_joints(limits["position_max"], nq),
+            v_max=_joints(limits["velocity"], nq),
+            a_max=_joints(limits["acceleration"], nq),
+            j_max=_joints(limits["jerk"], nq),
+            tau_max=_joints(limits["torque"], nq),
         ),
         rated_payload=float(limits["rated_payload"]["value"]),
         drives=drives,
         electronics=Electronics(
             **{part: float(electronics[part]["value"]) for part in Electronics.__dataclass_fields__}
         ),
-        friction_laws=_friction_laws(figures, model.nq),
+        friction_laws=_friction_laws(figures, nq),
         default_motion=_default_motion(figures),
         capsules=capsules,
         never_in_collision=frozenset(
@@ -67,6 +69,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         T_base_base_link=_base_link(figures["kinematics"]),
         gravity=_gravity(figures["kinematics"]),
         mains=_mains(figures.get("mains")),
+        coupling=coupling,
     )
 
 

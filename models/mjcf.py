@@ -7,6 +7,7 @@ gets the nearest possible one, which changes torques by some mN·m in published 
 rise of friction in strain-wave gears, which MuJoCo does not have, is divided between `frictionloss`
 and `damping` by least squares over the speeds up to the limit; friction that grows with the load is
 left out.
+A joint that follows another is bound to it by an `equality`, and has no motor.
 """
 
 from __future__ import annotations
@@ -66,18 +67,21 @@ def mjcf(robot: Robot) -> str:
         root, "option", gravity=gravity, timestep=repr(MJCF.timestep), integrator="implicitfast"
     )
     links = [SubElement(SubElement(root, "worldbody"), "body", name=robot.link_names[0])]
-    friction, damping = _friction(robot.friction, robot.limits.v_max)
+    limits, coupling = robot.limits, robot.coupling
+    ranges = np.sort([coupling.positions(each) for each in (limits.q_min, limits.q_max)], axis=0).T
+    drives = np.array([robot.drives.rotor_inertia, *_friction(robot.friction, limits.v_max)])
+    armature, friction, damping = map(coupling.of_motors, drives)
     for k, name in enumerate(robot.link_names[1:], start=1):
         body = SubElement(links[-1], "body", name=name, **_pose(robot.model.jointPlacements[k]))
         _inertial(body, robot.model.inertias[k])
         SubElement(
             body,
             "joint",
-            name=robot.joint_names[k - 1],
+            name=robot.model.names[k],
             type="hinge",
             axis="0 0 1",
-            range=_text(np.array([robot.limits.q_min[k - 1], robot.limits.q_max[k - 1]])),
-            armature=repr(float(robot.drives.rotor_inertia[k - 1])),
+            range=_text(ranges[k - 1]),
+            armature=repr(float(armature[k - 1])),
             frictionloss=repr(float(friction[k - 1])),
             damping=repr(float(damping[k - 1])),
         )
@@ -86,12 +90,25 @@ def mjcf(robot: Robot) -> str:
         _geom(links[capsule.link], capsule)
     SubElement(links[-1], "site", name=FLANGE, **_pose(pin.SE3(robot.T_last_flange)))
     _contacts(root, robot)
+    _followers(root, robot)
     motors = SubElement(root, "actuator")
-    for joint, most in zip(robot.joint_names, robot.limits.tau_max.tolist(), strict=True):
+    for joint, most in zip(robot.joint_names, limits.tau_max.tolist(), strict=True):
         limit = _text(np.array([-most, most]))
         SubElement(motors, "motor", name=joint, joint=joint, ctrlrange=limit)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def _followers(root: Element, robot: Robot) -> None:
+    """Binds the joints that follow others to these."""
+    if not robot.coupling.follows:
+        return
+    equality, names = SubElement(root, "equality"), list(robot.model.names)[1:]
+    for place, (leader, multiplier, offset) in enumerate(robot.coupling.rows):
+        if leader != place:
+            law = _text(np.array([offset, multiplier, 0.0, 0.0, 0.0]))
+            bound = {"joint1": names[place], "joint2": names[leader], "polycoef": law}
+            SubElement(equality, "joint", bound)
 
 
 def _inertial(body: Element, inertia: pin.Inertia) -> None:
@@ -132,7 +149,7 @@ def _geom(link: Element, capsule: LinkCapsule) -> None:
 def _contacts(root: Element, robot: Robot) -> None:
     """Excludes the pairs of links that never meet, or are next to each other."""
     contact, names = SubElement(root, "contact"), robot.link_names
-    neighbours = {(k, k + 1) for k in range(robot.nq)}
+    neighbours = {(k, k + 1) for k in range(robot.last_link)}
     for first, second in sorted(neighbours | robot.never_in_collision):
         SubElement(contact, "exclude", body1=names[first], body2=names[second])
 

@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from joulepath.models.coupling import UNCOUPLED, Coupling
+
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 TorqueSide = Literal["motor", "link"]
@@ -188,7 +190,8 @@ class Robot:
     speed limit; None for an arm without an elbow. `torque_side` is `motor` if the torque limits
     include rotor and friction, `link` if they exclude them. `T_base_base_link` (4, 4) is the pose
     of ROS's frame `base_link` in `base`. `gravity` (3,) [m/s²] is that in `base` unless an arm has
-    another mounting. `mains` is None where nobody measured what the control box draws.
+    another mounting. `mains` is None where nobody measured what the control box draws. `coupling`
+    has the joints of the chain that follow others; the others are the nq joints of the arm.
     """
 
     name: str
@@ -208,24 +211,31 @@ class Robot:
     T_base_base_link: Array = field(default_factory=lambda: np.eye(4), repr=False)
     gravity: Array = field(default_factory=lambda: UPRIGHT, repr=False)
     mains: Mains | None = None
+    coupling: Coupling = UNCOUPLED
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.nq} joints, payload up to {self.rated_payload:g} kg)"
 
     @property
     def nq(self) -> int:
-        """Number of joints."""
-        return int(self.model.nq)
+        """Number of joints, without those that follow others."""
+        return len(self.coupling.own) or int(self.model.nq)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints from base to flange."""
-        return tuple(self.model.names)[1:]
+        """Names of the joints from base to flange, without those that follow others."""
+        names = tuple(self.model.names)[1:]
+        return tuple(names[k] for k in self.coupling.own) or names
 
     @property
     def link_names(self) -> tuple[str, ...]:
-        """Names of the base and the nq moving links."""
+        """Names of the base and of the moving links."""
         return link_names(self.model)
+
+    @property
+    def last_link(self) -> int:
+        """Number of the link that carries the flange."""
+        return int(self.model.njoints) - 1
 
     @property
     def T_last_flange(self) -> Array:
@@ -257,12 +267,12 @@ class Robot:
             com: its centre of mass (3,) [m] in the flange frame.
             inertia: its inertia (3, 3) [kg·m²] about the centre of mass, in flange axes.
             gravity: gravity (3,) [m/s²] in the base frame.
-            link_mass_scale: factors (nq,) on mass and inertia of the moving links, without rotors.
+            link_mass_scale: factors (nq,) on mass and inertia of the links that each joint turns,
+                without rotors.
         """
         model = self.model.copy()
-        for i, scale in enumerate(
-            [] if link_mass_scale is None else link_mass_scale.tolist(), start=1
-        ):
+        scales = np.zeros(0) if link_mass_scale is None else self.coupling.of_links(link_mass_scale)
+        for i, scale in enumerate(scales.tolist(), start=1):
             body = model.inertias[i]
             model.inertias[i] = pin.Inertia(scale * body.mass, body.lever, scale * body.inertia)
         last = model.njoints - 1

@@ -116,7 +116,7 @@ class _Replay:
 
     def __init__(self, arm: Arm, spline: Spline) -> None:
         self.arm, self.model, self._spline = arm, rigid_body_model(arm), spline
-        self.data = self.model.createData()
+        self._coupling, self.data = arm.robot.coupling, self.model.createData()
         self._last, self._T_last_tcp = self.model.njoints - 1, T_last_tcp(arm)
         self.t, curve = grid(spline.duration), spline.curve
         if len(self.t) > CERTIFICATE.block:
@@ -131,6 +131,7 @@ class _Replay:
         """Torques (k, nq) [N·m] of rigid bodies and rotors; Pinocchio's recursion includes armature
         · a.
         """
+        q, (v, a) = self._coupling.positions(q), map(self._coupling.rates, (v, a))
         tau = np.empty((v.shape[1], len(v)), order="F")
         # Pinocchio's loop over the columns in this thread is twice as fast as single calls
         pool = pin.ModelPool(self.model, 1)
@@ -141,18 +142,16 @@ class _Replay:
             pin.rneaInParallel(
                 1, pool, *(np.asfortranarray(x[block].T) for x in (q, v, a)), tau[:, block]
             )
-        return tau.T
+        return self._coupling.on_arm(tau.T)
 
     @property
     def energy(self) -> Energy:
         """Energy of the motion by Simpson's rule, without the dwell."""
         potential, kinetic = pin.computePotentialEnergy, pin.computeKineticEnergy
+        q, v = self._coupling.positions(self.q[[0, -1]]), self._coupling.rates(self.v[[0, -1]])
         ends = [
-            (
-                potential(self.model, self.data, self.q[k]),
-                kinetic(self.model, self.data, self.q[k], self.v[k]),
-            )
-            for k in (0, -1)
+            (potential(self.model, self.data, q[k]), kinetic(self.model, self.data, q[k], v[k]))
+            for k in range(2)
         ]
         gain_potential, gain_kinetic = (after - before for before, after in zip(*ends, strict=True))
         weights = simpson_weights(self.t)
@@ -278,7 +277,8 @@ class _Replay:
         """
         rotations = np.empty((len(self.q) if rotating else 0, 3, 3))
         twists = {joint: np.empty((len(self.q), 6)) for joint in moving}
-        for k, (q, v) in enumerate(zip(self.q, self.v, strict=True)):
+        states = zip(self._coupling.positions(self.q), self._coupling.rates(self.v), strict=True)
+        for k, (q, v) in enumerate(states):
             if k % CERTIFICATE.block == CERTIFICATE.block - 1:
                 checkpoint()
             pin.forwardKinematics(self.model, self.data, q, v)
@@ -317,7 +317,7 @@ class _Replay:
 
     def tcp_pose(self, q: Array) -> Array:
         """T_base_tcp (4, 4) at q (nq,) [rad] by Pinocchio's forward kinematics."""
-        pin.forwardKinematics(self.model, self.data, q)
+        pin.forwardKinematics(self.model, self.data, self._coupling.positions(q))
         return np.asarray(self.data.oMi[self._last].homogeneous @ self._T_last_tcp)
 
 

@@ -191,7 +191,8 @@ def _of_free_orientation(arm: Arm, pose: ConeOrientedPose, windings: bool) -> li
     """Solutions of a pose whose orientation is free in part; isolated ones with their full
     turns.
     """
-    limits, chain, names = arm.active_limits, Chain.of(arm.robot.model), arm.robot.joint_names
+    limits, names = arm.active_limits, arm.robot.joint_names
+    chain = Chain.of(arm.robot.model, arm.robot.coupling)
     found = tolerant_configurations(arm, pose, FREE_SAMPLES)
     smallest = np.linalg.svd(chain.flange_and_jacobian(found)[1], compute_uv=False)[:, -1]
     solutions = list[IKSolution]()

@@ -147,7 +147,8 @@ class Surroundings:
     def with_clearance(self, pairs: Indices) -> PathConstraints:
         """Path constraints of the arm, with the clearance of `pairs` (k,) of the model."""
         constraints = [*path_constraint_list(self.arm), ClearanceConstraint(self.model, pairs)]
-        return PathConstraints(joint_placements(self.arm.robot.model), constraints)
+        robot = self.arm.robot
+        return PathConstraints(joint_placements(robot.model), constraints, robot.coupling)
 
     def planned_paths(
         self,

@@ -105,7 +105,8 @@ def _radius(description: Description, upright: UprightChain) -> float:
     try:
         check_lengths("collision.radius", radius, PLAUSIBLE.radius)
     except WrongSize as error:
-        raise InvalidArm("collision.radius", str(error)) from None
+        follows = "" if given is not None else " It follows from the <origin> of the joints."
+        raise InvalidArm("collision.radius", f"{error}{follows}") from None
     return radius
 
 

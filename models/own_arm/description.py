@@ -34,6 +34,8 @@ class PlausibleRanges:
     """Least positive limit, inertia or friction [SI]."""
     most: float = 1e6
     """Greatest limit, inertia or friction [SI]."""
+    least_multiplier: float = 1e-3
+    """Least multiplier of a joint that follows another [1]; the greatest is its inverse."""
     name: int = 200
     """Most characters of a name or path repeated in a message."""
 

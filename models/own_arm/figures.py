@@ -4,13 +4,13 @@ arm."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from joulepath.models.from_figures import NO_LINKS
+from joulepath.models.own_arm.chain_warnings import chain_warnings
 from joulepath.models.own_arm.collision_figures import collision_figures
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm, Problems
 from joulepath.models.own_arm.energy_figures import drives, electronics, friction
@@ -25,18 +25,13 @@ from joulepath.models.own_arm.plausible_units import (
     check_bodies,
 )
 from joulepath.models.own_arm.rules import NOTES, RULES
-from joulepath.models.own_arm.upright import UprightChain
+from joulepath.models.own_arm.upright import UprightChain, gravity_in_base
 from joulepath.models.own_arm.urdf_chain import Chain, chain_of
-from joulepath.models.own_arm.urdf_tree import CHAIN, listed, refuse
-from joulepath.models.robot import UPRIGHT, Array
+from joulepath.models.own_arm.urdf_tree import listed, refuse
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 from joulepath.models.urdf import BASE, FLANGE
 
 _PLACEMENT = "x, y, z, roll, pitch, yaw"
-ALIGNED = 1e-6
-"""Distance [m] and sine of the angle between axes below which they are one line."""
-LEVEL = 1e-6
-"""Deviation of gravity [m/s²] below which a base is upright: rounding of angles."""
 
 
 def own_figures(
@@ -54,7 +49,7 @@ def own_figures(
     """
     chain = chain_of(description, checkpoint)
     upright, links = UprightChain.of(chain), _link_names(chain)
-    warnings = [*_chain_warnings(chain), *_shared_axes(chain, upright)]
+    warnings = chain_warnings(chain, upright)
     problems = Problems()
     with problems.noted():
         inertials = _inertials(description, chain, upright, warnings)
@@ -97,39 +92,6 @@ def own_figures(
     ] if defaults else warnings
 
 
-def _chain_warnings(chain: Chain) -> list[str]:
-    """Warnings of estimated masses, of a tilted base and of rounded angles."""
-    warnings, gravity = chain.estimate.warnings(), _gravity(chain)
-    if gravity is not None:
-        warnings.append(
-            "The base is tilted against the root link of the URDF, which is taken to be upright: "
-            f"gravity in its frame is {gravity.round(4).tolist()} m/s² unless a request gives "
-            "another."
-        )
-    if chain.rounded > CHAIN.rounded_angle:
-        warnings.append(
-            "Angles of joint origins written with few decimals, such as 1.571, are read as the "
-            f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
-        )
-    if chain.coarse:
-        warnings.append(
-            f"Joints with angles of 1.57 or 3.14: {listed(chain.coarse)}. They are read as they "
-            "stand, so that the axes are not at right angles. Write 1.5708 and 3.1416 if they are."
-        )
-    return warnings
-
-
-def _shared_axes(chain: Chain, upright: UprightChain) -> list[str]:
-    """Warnings of neighbouring joints that turn about one line."""
-    return [
-        f"Joints {first!r} and {second!r} turn about one line, whatever the configuration: an "
-        "<origin> or an <axis> of the URDF is likely wrong, or the second joint is no part of the "
-        "arm. Poses are then held on self-motions, and most are refused as singular."
-        for (first, second), T in zip(pairwise(chain.joints), upright.placements[1:], strict=True)
-        if np.hypot(*T.translation[:2]) < ALIGNED and np.hypot(*T.rotation[:2, 2]) < ALIGNED
-    ]
-
-
 def _link_names(chain: Chain) -> list[str]:
     """Names of the moving links; names with another meaning in the figures get a suffix."""
     names = list[str]()
@@ -160,19 +122,22 @@ def _kinematics(
             f"{_PLACEMENT} of the tip in the frame of the last link.",
         ),
     }
+    if chain.coupling.follows:
+        text = (
+            "Of each turning joint: place from base to flange of the joint that it follows, "
+            "multiplier, and offset. A joint that follows none follows itself."
+        )
+        figures["turning_joint_names"] = stated(
+            description, list(chain.turning), "1", "Of the joints, and of those that follow them."
+        )
+        figures["coupling"] = stated(description, chain.coupling.rows, "1, 1, rad", text)
     if (ros_base := chain.T_base_base_link) is not None:
         text = f"{_PLACEMENT} of the link `base_link` in the base."
         figures["base_link_origin"] = stated(description, _row(pin.SE3(ros_base)), "m, rad", text)
-    if (gravity := _gravity(chain)) is not None:
+    if (gravity := gravity_in_base(chain)) is not None:
         text = "In the base, whose frame is tilted against the root link; for requests without it."
         figures["gravity"] = stated(description, gravity, "m/s²", text)
     return figures
-
-
-def _gravity(chain: Chain) -> Array | None:
-    """Gravity (3,) [m/s²] in the base if the root link is upright; None for an upright base."""
-    gravity = chain.T_base[:3, :3].T @ UPRIGHT
-    return None if np.abs(gravity - UPRIGHT).max() < LEVEL else np.asarray(gravity)
 
 
 def _row(placement: pin.SE3) -> list[float]:
@@ -202,7 +167,7 @@ def _inertials(
             description, of_volume, [body.lever.tolist() for body in bodies], "m", in_link
         ),
         "inertia_frame_rpy": stated(
-            description, [[0.0] * 3] * chain.nq, "rad", "Axes of the link frame."
+            description, [[0.0] * 3] * len(bodies), "rad", "Axes of the link frame."
         ),
         "inertia": _of(
             description, of_volume or bool(chain.estimate.mended), tensors, "kg·m²", about

@@ -64,11 +64,12 @@ class HoldingTorques:
         samples = np.random.default_rng(0).uniform(
             chain.q_min, chain.q_max, (SETTINGS.samples, chain.nq)
         )
-        for q in samples:
-            weight = np.abs(pin.computeGeneralizedGravity(bare, data, q))
+        on_arm = chain.coupling.on_arm
+        for q in chain.coupling.positions(samples):
+            weight = np.abs(on_arm(pin.computeGeneralizedGravity(bare, data, q)))
             holding = np.maximum(holding, weight)
-            weight = np.abs(pin.computeGeneralizedGravity(loaded, loaded_data, q))
-            inertia = np.diag(pin.crba(loaded, loaded_data, q))
+            weight = np.abs(on_arm(pin.computeGeneralizedGravity(loaded, loaded_data, q)))
+            inertia = np.diag(on_arm(on_arm(pin.crba(loaded, loaded_data, q)).T))
             needed = np.maximum(needed, weight + inertia * acceleration)
         return HoldingTorques(holding, np.maximum(needed, SETTINGS.least_share * needed.max()))
 

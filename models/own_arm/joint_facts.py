@@ -10,7 +10,14 @@ import numpy as np
 from joulepath.models.own_arm.description import Drives
 from joulepath.models.own_arm.robot_xml import number
 from joulepath.models.own_arm.rules import RULES
-from joulepath.models.own_arm.urdf_tree import READ, listed, name_of, soft_range
+from joulepath.models.own_arm.urdf_tree import (
+    CONTINUOUS,
+    READ,
+    joint_limit,
+    listed,
+    name_of,
+    soft_range,
+)
 from joulepath.models.robot import Array
 
 
@@ -21,7 +28,7 @@ class JointFacts:
     `acceleration` [rad/s²] and `jerk` [rad/s³] are limits of URDF 1.2, the lesser of `acceleration`
     and `deceleration`. `coulomb` [N·m] and `viscous` [N·m·s/rad] are `friction` and `damping` of
     <dynamics>. `soft` are the names of joints whose soft limits are tighter than their range, and
-    `ignored` the other elements of the URDF.
+    `ignored` the other elements of the URDF, `endless` the continuous joints with a range.
     """
 
     acceleration: Array
@@ -30,6 +37,7 @@ class JointFacts:
     viscous: Array
     soft: tuple[str, ...]
     ignored: tuple[str, ...]
+    endless: tuple[str, ...]
 
     @staticmethod
     def of(root: Element, joints: tuple[str, ...]) -> JointFacts:
@@ -49,6 +57,7 @@ class JointFacts:
             _column(moving, "dynamics", "damping"),
             tuple(name_of(joint) for joint in moving if _is_softly_limited(joint)),
             tuple(sorted({each.tag for each in root if each.tag not in READ})),
+            tuple(name_of(joint) for joint in moving if _has_ends_without_effect(joint)),
         )
 
     def warnings(self, given: Drives, joints: tuple[str, ...], ruling: Array) -> list[str]:
@@ -84,6 +93,11 @@ def _is_softly_limited(joint: Element) -> bool:
     return soft is not None and (
         soft[0] > number(limit, "lower", where, "0") or soft[1] < number(limit, "upper", where, "0")
     )
+
+
+def _has_ends_without_effect(joint: Element) -> bool:
+    lower, upper = (joint_limit(joint, part) for part in ("lower", "upper"))
+    return joint.get("type") == "continuous" and -CONTINUOUS < lower < upper < CONTINUOUS
 
 
 def _column(joints: list[Element], part: str, attribute: str) -> Array:

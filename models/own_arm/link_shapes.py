@@ -150,8 +150,8 @@ class LinkShapes:
         if len(self._seen) > LIMITS.shapes:
             raise InvalidArm(
                 field,
-                f"With link {link!r}, the arm has more than {LIMITS.shapes} shapes: give fewer "
-                "capsules.",
+                f"With link {link!r}, the arm has more than {LIMITS.shapes} shapes: give "
+                "`collision.capsules`, fewer of them, for the links with the most shapes.",
             )
 
     def _frame(self, k: int, link: str) -> pin.SE3:

@@ -67,7 +67,7 @@ def pairs_that_meet(
         guessed: whether the capsules of a link are an assumption.
         checkpoint: ends the computation by an exception.
     """
-    pairs = [(a, b) for a, b in combinations(range(chain.nq + 1), 2) if a + 1 < b]
+    pairs = [(a, b) for a, b in combinations(range(len(capsules)), 2) if a + 1 < b]
     meets = np.zeros(len(pairs))
     shapes = [
         [(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules
@@ -78,7 +78,8 @@ def pairs_that_meet(
         chain.q_min, chain.q_max, (OVERLAP.samples, chain.nq)
     ):
         frames = [pin.SE3.Identity()]
-        for angle, placement in zip(q, upright.placements, strict=True):
+        angles = chain.coupling.positions(q)
+        for angle, placement in zip(angles, upright.placements, strict=True):
             frames.append(
                 frames[-1] * placement * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3))
             )

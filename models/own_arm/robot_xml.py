@@ -47,6 +47,8 @@ def numbers(
         InvalidArm: the attribute does not have `count` finite numbers.
     """
     text = default if element is None else element.get(part, default)
+    if not text:
+        raise InvalidArm("urdf", f"{where} without the attribute `{part}`.")
     words = text.split(maxsplit=count)
     try:
         values = np.array([float(each) for each in words])

@@ -8,7 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.own_arm.urdf_chain import Chain
-from joulepath.models.robot import Array
+from joulepath.models.robot import UPRIGHT, Array
+
+LEVEL = 1e-6
+"""Deviation of gravity [m/s²] below which a base is upright: rounding of angles."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,12 @@ class UprightChain:
                 for turn, body in zip(turns[1:], list(chain.model.inertias)[1:], strict=True)
             ),
         )
+
+
+def gravity_in_base(chain: Chain) -> Array | None:
+    """Gravity (3,) [m/s²] in the base if the root link is upright; None for an upright base."""
+    gravity = chain.T_base[:3, :3].T @ UPRIGHT
+    return None if np.abs(gravity - UPRIGHT).max() < LEVEL else np.asarray(gravity)
 
 
 def turn_onto(axis: Array) -> Array:

@@ -11,14 +11,20 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
+from joulepath.models.coupling import Coupling
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, Problems
 from joulepath.models.own_arm.estimated_masses import Estimate, add_inertials
+from joulepath.models.own_arm.followers import (
+    coupled_ranges,
+    coupling_of_joints,
+    left_behind,
+    with_followers,
+)
 from joulepath.models.own_arm.joint_facts import JointFacts
 from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
-    CONTINUOUS,
     UrdfTree,
     is_coarse,
     joint_axis,
@@ -42,22 +48,25 @@ FIXED = "fixed"
 
 @dataclass(frozen=True)
 class Chain:
-    """The `nq` moving joints from base to tip of a URDF.
+    """The n moving joints from base to tip of a URDF, of which nq follow no other.
 
     `model` is Pinocchio's model with these joints alone, all other bodies merged into their links.
-    `links` are the names of the moving links, `axes` (nq, 3) the unit axes of the joints in their
-    frames. `T_base` (4, 4) is the pose of the base link in the model's world, `T_tip` (4, 4) the
-    pose of the tip in the frame of the last joint, `T_base_base_link` (4, 4) the pose of the link
-    `base_link` in the base; None if it is the base or not fixed to it. Limits (nq,) are position
-    [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of the URDF
-    links fixed to the base and to every moving link. `facts` are further figures of the joints,
-    `estimate` the estimated masses. `rounded` [rad] is the largest change of a
-    rounded angle to the quarter turn that it stands for, `coarse` has the names of the joints with
-    angles rounded too far for this.
+    `turning` are the names of all n joints, `joints` those of the nq; `coupling` has the laws of
+    the others. `links` are the names of the moving links, `axes` (n, 3) the unit axes of the joints
+    in their frames. `T_base` (4, 4) is the pose of the base link in the model's world, `T_tip`
+    (4, 4) the pose of the tip in the frame of the last joint, `T_base_base_link` (4, 4) the pose of
+    the link `base_link` in the base; None if it is the base or not fixed to it. Limits (nq,) are
+    position [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of
+    the URDF links fixed to the base and to every moving link. `facts` are further figures of the
+    joints, `estimate` the estimated masses. `rounded` [rad] is the largest change of a rounded
+    angle to the quarter turn that it stands for, `coarse` has the names of the joints with angles
+    rounded too far for this. `idle` are the held joints that follow moving ones by the URDF.
     """
 
     model: pin.Model
+    turning: tuple[str, ...]
     joints: tuple[str, ...]
+    coupling: Coupling
     links: tuple[str, ...]
     rigid: tuple[tuple[str, ...], ...]
     axes: Array
@@ -73,10 +82,11 @@ class Chain:
     estimate: Estimate
     rounded: float
     coarse: tuple[str, ...]
+    idle: tuple[str, ...] = ()
 
     @property
     def nq(self) -> int:
-        """Number of joints."""
+        """Number of joints that follow no other."""
         return len(self.joints)
 
 
@@ -95,16 +105,11 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
                 )
     for name in given:
         with problems.noted():
-            if name not in tree.joints:
-                refuse(
-                    "locked",
-                    f"There is no joint {name!r} in the URDF: its joints are "
-                    f"{listed(tree.joints)}.",
-                )
+            _check_held(tree, name)
     problems.raise_any()
     path = tree.path(base, description.tip)
     others = _others(tree, path) if isinstance(locked, str) else given
-    held = _with_followers(tree, others, set(given))
+    held = with_followers(tree, others, set(given))
     moving = [
         joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in held
     ]
@@ -114,9 +119,14 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
             f"Between base and tip {len(moving)} joints move: from 1 to {CHAIN.joints} are "
             "possible.",
         )
+    for joint in tree.joints.values():
+        with problems.noted():
+            _check_place(joint)
     for joint in moving:
         with problems.noted():
             _check_moving(joint)
+    with problems.noted():
+        coupling = coupling_of_joints(moving)
     with problems.noted():
         _check_rest(tree, moving, held)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
@@ -126,9 +136,10 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
             _check_inertial(element)
     problems.raise_any()
     estimate = add_inertials(root, [*map(name_of, carried)], description, checkpoint)
-    chain = _merged(root, tree, moving, held, base, description.tip)
+    chain = _merged(root, tree, moving, held, base, description.tip, coupling)
+    idle = left_behind(tree, set(others) - set(given), chain.turning)
     mended = _mended(chain) if description.mend_inertias else ()
-    return replace(chain, estimate=replace(estimate, mended=mended))
+    return replace(chain, estimate=replace(estimate, mended=mended), idle=tuple(idle))
 
 
 def _mended(chain: Chain) -> tuple[str, ...]:
@@ -156,55 +167,52 @@ def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:
     return held
 
 
-def _with_followers(tree: UrdfTree, held: Mapping[str, float], given: set[str]) -> dict[str, float]:
-    """Positions [rad] or [m] of held joints, and of those that mimic one: multiplier · its position
-    + offset. The positions of joints `given` by name stay.
-    """
-    positions, follows = dict(held), True
-    mimics = {
-        name: mimic
-        for name, joint in tree.joints.items()
-        if name not in given and (mimic := joint.find("mimic")) is not None
-    }
-    while follows:
-        follows = False
-        for name, mimic in list(mimics.items()):
-            leader = mimic.get("joint", "")
-            if leader in positions and leader not in mimics:
-                where = f"Joint {name!r} has a <mimic>"
-                factor = number(mimic, "multiplier", where, "1")
-                shift = number(mimic, "offset", where, "0")
-                positions[name] = factor * positions[leader] + shift
-                del mimics[name]
-                follows = True
-    return positions
+def _check_held(tree: UrdfTree, name: str) -> None:
+    """Raises InvalidArm unless a joint exists that has one position."""
+    if name not in tree.joints:
+        refuse(
+            "locked",
+            f"There is no joint {name!r} in the URDF: its joints are {listed(tree.joints)}.",
+        )
+    kind = tree.joints[name].get("type")
+    if kind in ("floating", "planar"):
+        refuse(
+            "locked",
+            f"Joint {name!r} is {kind}: no single position holds it. Make it fixed instead.",
+        )
+
+
+def _check_place(joint: Element) -> None:
+    """Raises InvalidArm for numbers of a joint that Pinocchio would not read."""
+    where = f"Joint {name_of(joint)!r} has an <origin>"
+    for part in ("xyz", "rpy"):
+        numbers(joint.find("origin"), part, where, ZERO)
+    if joint.get("type") != FIXED:
+        joint_axis(joint)
 
 
 def _check_moving(joint: Element) -> None:
-    """Raises InvalidArm unless a moving joint is revolute and has limits."""
+    """Raises InvalidArm unless a moving joint is revolute and has limits, or those of another."""
     name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
     if kind not in TURNING:
-        refuse(
-            "urdf",
-            f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in "
-            "`locked`.",
-        )
+        held = "Give its position in `locked`" if kind == "prismatic" else "Make it fixed"
+        refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move. {held}.")
     if joint.find("mimic") is not None:
-        refuse(
-            "urdf",
-            f"Joint {name!r} mimics another one that moves, as in a parallelogram: such arms are "
-            "not followed. Give its position in `locked`, or that of the other one.",
-        )
+        return
     limit = joint.find("limit")
     if kind == "revolute" and (
         limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
     ):
-        refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
+        refuse(
+            "urdf",
+            f"Joint {name!r} has no <limit> with `lower` and `upper`: add them, or make it "
+            "continuous.",
+        )
     if kind == "revolute" and not joint_limit(joint, "lower") < joint_limit(joint, "upper"):
         refuse(
             "urdf",
-            f"Joint {name!r} cannot move, its lower limit being no less than the upper: make it "
-            "fixed.",
+            f"Joint {name!r} cannot move, its lower limit being no less than the upper: exchange "
+            "them, or make it fixed.",
         )
     lower, upper, *_ = joint_range(joint)
     if not lower < upper:
@@ -241,14 +249,12 @@ def _merged(
     locked: Mapping[str, float],
     base: str,
     tip: str,
+    coupling: Coupling,
 ) -> Chain:
     """The chain, read and reduced by Pinocchio."""
-    ranges, (bare, rounded) = [joint_range(joint) for joint in moving], _for_pinocchio(root)
+    ranges, (bare, rounded) = coupled_ranges(moving, coupling), _for_pinocchio(root)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
-    given = {f"joint {k}": name_of(joint) for k, joint in enumerate(bare.findall("joint"))}
-    for unique, joint in zip(given, bare.findall("joint"), strict=True):
-        # Joints and links of a URDF may share names, frames of Pinocchio may not.
-        joint.set("name", unique)
+    given = {f"joint {k}": name_of(joint) for k, joint in enumerate(root.findall("joint"))}
     try:
         whole = pin.buildModelFromXML(ElementTree.tostring(bare, encoding="unicode"))
         q, held = (
@@ -271,16 +277,16 @@ def _merged(
             raise ValueError(f"of {len(moving)} joints it finds {model.nq}")
     except (RuntimeError, ValueError, IndexError) as error:
         refuse("urdf", f"Pinocchio does not read the URDF: {error}.")
-    rigid: list[list[str]] = [[] for _ in range(len(moving) + 1)]
-    for name in tree.links:
-        rigid[tree.carrier(name, names)].append(name)
-    q_min, q_max, v_max, tau_max = (np.array(column) for column in zip(*ranges, strict=True))
+    q_min, q_max, v_max, tau_max = ranges.T
+    joints = tuple(list(names)[k] for k in coupling.own) or tuple(names)
     axes = np.array([joint_axis(joint) for joint in moving])
     return Chain(
         model,
         tuple(names),
+        joints,
+        coupling,
         tuple(joint_end(joint, "child") for joint in moving),
-        tuple(map(tuple, rigid)),
+        _rigid(tree, names),
         axes,
         T_base.homogeneous,
         T_tip.homogeneous,
@@ -290,36 +296,41 @@ def _merged(
         v_max,
         tau_max,
         root,
-        JointFacts.of(root, tuple(names)),
+        JointFacts.of(root, joints),
         Estimate(),
         rounded,
         tuple(name for name in names if is_coarse(tree.joints[name])),
     )
 
 
+def _rigid(tree: UrdfTree, names: Mapping[str, int]) -> tuple[tuple[str, ...], ...]:
+    """Names of the links fixed to the base and to every moving link."""
+    rigid: list[list[str]] = [[] for _ in range(len(names) + 1)]
+    for link in tree.links:
+        rigid[tree.carrier(link, names)].append(link)
+    return tuple(map(tuple, rigid))
+
+
 def _for_pinocchio(root: Element) -> tuple[Element, float]:
-    """A copy of a URDF without shapes, with restored figures and complete limits, and the largest
+    """A copy of a URDF with the places and bodies alone, with restored figures, and the largest
     change of an angle [rad].
 
-    Pinocchio gives a continuous joint two coordinates, and skips incomplete limits.
+    Pinocchio gives a continuous joint two coordinates.
     """
     bare, rounded = copy.deepcopy(root), 0.0
     # urdfdom, Pinocchio's reader, wants a name.
     bare.attrib = {"name": "robot"}
-    for joint in bare.findall("joint"):
+    for k, joint in enumerate(bare.findall("joint")):
         rounded = max(rounded, restore_rounded(joint))
-        limit = joint.find("limit")
-        if joint.get("type") in (FIXED, "floating", "planar"):
-            continue
-        limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
-        limit.attrib.update({"lower": "0", "upper": "0"} | limit.attrib)
-        # read by `joint_range`; a negative one would be refused
-        limit.attrib.update({"effort": "0", "velocity": "0"})
+        # Joints and links of a URDF may share names, frames of Pinocchio may not.
+        joint.set("name", f"joint {k}")
+        joint[:] = [each for each in joint if each.tag in ("parent", "child", "origin", "axis")]
         if joint.get("type") == "continuous":
             joint.set("type", "revolute")
-            limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})
+        # read by `joint_range`; Pinocchio would refuse some, and skip incomplete ones
+        ElementTree.SubElement(joint, "limit", lower="-1", upper="1", effort="0", velocity="0")
     for link in bare.findall("link"):
-        link[:] = [each for each in link if each.tag not in ("visual", "collision")]
+        link[:] = link.findall("inertial")
     return bare, rounded
 
 

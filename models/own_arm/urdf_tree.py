@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
+from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm, Problems
 from joulepath.models.own_arm.robot_xml import number, numbers, robot_element
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint
@@ -58,33 +58,22 @@ class UrdfTree:
 
     @staticmethod
     def of(robot: Element) -> UrdfTree:
-        """The tree of a <robot>. Raises InvalidArm for duplicate names, loops or several roots."""
-        links = tuple(name_of(each) for each in robot.findall("link"))
-        joints = {name_of(each): each for each in robot.findall("joint")}
-        for kind, names, count in (
-            ("link", links, len(set(links))),
-            ("joint", joints, len(robot.findall("joint"))),
-        ):
-            if count != len(names):
-                refuse(
-                    "urdf", f"Two {kind}s of the URDF have one name: give each a name of its own."
-                )
-        above: dict[str, Element] = {}
-        for name, joint in joints.items():
-            parent, child = (joint_end(joint, side) for side in ("parent", "child"))
-            for link in (parent, child):
-                if link not in links:
-                    refuse(
-                        "urdf", f"Joint {name!r} is at a link {link!r} that the URDF does not have."
-                    )
-            if child in above:
-                refuse("urdf", f"Link {child!r} hangs on two joints: a URDF is a tree.")
-            above[child] = joint
+        """The tree of a <robot>. Raises InvalidArm for repeated names, loops or several roots."""
+        links, joints = (_named(robot, kind) for kind in ("link", "joint"))
         if not links:
             refuse("urdf", "The URDF has no <link>.")
+        above, problems = dict[str, Element](), Problems()
+        for name, joint in joints.items():
+            with problems.noted():
+                _hang(name, joint, links, above)
+        problems.raise_any()
         roots = [each for each in links if each not in above]
         if len(roots) != 1:
-            refuse("urdf", f"A URDF has one root link, not {len(roots)}: {listed(roots)}.")
+            refuse(
+                "urdf",
+                f"A URDF has one root link, not {len(roots)}: {listed(roots)}. Connect them by "
+                "fixed joints, or remove those that are no part of the arm.",
+            )
         reached, front = {roots[0]}, [roots[0]]
         below: dict[str, list[str]] = {}
         for link, joint in above.items():
@@ -96,7 +85,7 @@ class UrdfTree:
             refuse(
                 "urdf", f"Links hang on each other in a loop: {listed(loose)}. A URDF is a tree."
             )
-        return UrdfTree(links, joints, above, roots[0])
+        return UrdfTree(tuple(links), joints, above, roots[0])
 
     def path(self, base: str, tip: str) -> list[Element]:
         """Joints from base to tip."""
@@ -120,6 +109,44 @@ class UrdfTree:
                 return moving[name_of(joint)]
             link = joint_end(joint, "parent")
         return 0
+
+
+def _named(robot: Element, kind: str) -> dict[str, Element]:
+    """Links or joints by name. Raises InvalidArm for missing and for repeated names."""
+    found, problems, repeated = dict[str, Element](), Problems(), list[str]()
+    for each in robot.findall(kind):
+        with problems.noted():
+            name = name_of(each)
+            if name in found:
+                repeated.append(name)
+            found[name] = each
+    if repeated:
+        with problems.noted():
+            refuse(
+                "urdf",
+                f"Two {kind}s of the URDF have one name: {listed(dict.fromkeys(repeated))}. Give "
+                "each a name of its own.",
+            )
+    problems.raise_any()
+    return found
+
+
+def _hang(
+    name: str, joint: Element, links: Mapping[str, Element], above: dict[str, Element]
+) -> None:
+    """Adds a joint to those above their child links. Raises InvalidArm."""
+    parent, child = (joint_end(joint, side) for side in ("parent", "child"))
+    for link in (parent, child):
+        if link not in links:
+            refuse("urdf", f"Joint {name!r} is at a link {link!r} that the URDF does not have.")
+    if child in above:
+        other = name_of(above[child])
+        refuse(
+            "urdf",
+            f"Link {child!r} hangs on two joints, {other!r} and {name!r}: a URDF is a tree. Remove "
+            "one of them.",
+        )
+    above[child] = joint
 
 
 def parsed_urdf(text: str, checkpoint: Checkpoint) -> Element:
@@ -263,8 +290,10 @@ def name_of(element: Element) -> str:
     """The name of a link or joint. Raises InvalidArm."""
     name = element.get("name")
     if not name or len(name) > 100 or not name.isprintable():
+        instead = f", but {name[:100]!r}" if name else ""
         refuse(
-            "urdf", f"A {element.tag} of the URDF has no name of up to 100 printable characters."
+            "urdf",
+            f"A {element.tag} of the URDF has no name of up to 100 printable characters{instead}.",
         )
     return name
 

@@ -37,7 +37,7 @@ from joulepath.optimizer.kinematics.covers.wrist_geometry import (
     Shell,
     WristBody,
     WristGeometry,
-    potential_rates,
+    greatest_rates,
 )
 from joulepath.optimizer.kinematics.orientation_tolerance import within_cone
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -122,7 +122,7 @@ def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array |
     potentials = np.array([prepared.potential(q) for q in centre])
     if half is None:
         return potentials
-    return np.asarray(potentials + half @ potential_rates(prepared.model, prepared.arm.gravity))
+    return np.asarray(potentials + half @ greatest_rates(prepared.arm))
 
 
 def one_turn_boxes(nq: int, boxes_per_joint: int) -> tuple[Array, Array]:

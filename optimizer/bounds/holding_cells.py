@@ -57,7 +57,7 @@ class HoldingCells:
         """The bounds; None where they do not hold.
 
         They need the electrical objective without a dwell, concave friction that does not grow with
-        the load, and copper loss in every joint.
+        the load, copper loss in every joint, and joints that follow no other.
         """
         arm, problem = prepared.arm, prepared.problem
         law, loss = arm.friction_law, copper_loss(arm)
@@ -71,6 +71,7 @@ class HoldingCells:
             or law.load is not None
             or not concave
             or loss.min() <= 0
+            or arm.robot.coupling.follows
         ):
             return None
         return cls(prepared, HoldingBound(arm, ChainDerivatives.of(arm), loss))

@@ -276,6 +276,9 @@ def mechanical_bounds(
         potentials: potential energies of start and goal, shape (P, 2) [J].
     """
     arm, problem = EnergyRange(prepared), prepared.problem
+    if problem.arm.robot.coupling.follows:
+        # the lengths of `EnergyRange` are those of a chain whose joints follow no other
+        return np.abs(np.diff(potentials, axis=1)[:, 0])
     longest = np.full(
         len(q_start), DURATIONS.longest if problem.duration_max is None else problem.duration_max
     )

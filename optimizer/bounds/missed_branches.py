@@ -20,7 +20,7 @@ from joulepath.optimizer.bounds.self_motion_bound import bound_between_curves, s
 from joulepath.optimizer.bounds.subdivide import SUBDIVISION, SearchLimits
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.kinematics.covers.branch_covers import branch_covers
-from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import within_cone
@@ -166,7 +166,7 @@ def _bound_of_any(prepared: PreparedProblem) -> float:
     energy as it is, configurations differ by at most half a turn in each joint: the potential
     energy falls by at most its greatest rate over half a turn.
     """
-    fall = np.pi * float(potential_rates(prepared.model, prepared.arm.gravity).sum())
+    fall = np.pi * float(greatest_rates(prepared.arm).sum())
     still = np.zeros((1, prepared.arm.robot.nq))
     return float(LeastBound(prepared).of(still, np.array([-fall]))[0])
 

@@ -58,8 +58,9 @@ class PairBounds:
     def of(cls, prepared: PreparedProblem) -> PairBounds | None:
         """The data; None where the dual bound does not hold or cannot be higher than the plain one.
 
-        It needs the electrical objective, a concave friction law, and at least two joints. Friction
-        of the same torque at every speed has no convexity to spare for the confinement.
+        It needs the electrical objective, a concave friction law, and at least two joints, none of
+        which follows another: bounds on the derivatives of a chain are known by its own joints.
+        Friction of the same torque at every speed has no convexity to spare for the confinement.
         """
         arm = prepared.arm
         friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)
@@ -67,6 +68,7 @@ class PairBounds:
             prepared.problem.objective != "electrical"
             or friction is None
             or arm.robot.nq < GRID_JOINTS
+            or arm.robot.coupling.follows
         ):
             return None
         stiffness = friction.stiffness(arm.friction_law)

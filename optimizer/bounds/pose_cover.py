@@ -102,6 +102,8 @@ class CoveredPose:
         Returns:
             Middles and half sides, shape (b, nq) [rad], of at most `most_boxes` boxes.
         """
+        if not self.family.prepared.arm.robot.coupling.has_free_end:
+            return cover(self.family, limits)
         parts = _PoseCover(self.family).run(limits)
         return united(*self._with_last_joint(parts.centre, parts.half), POSE_COVER.most_boxes)
 
@@ -109,11 +111,14 @@ class CoveredPose:
         """The boxes (b, nq) [rad] that hold configurations of the pose, narrowed in the last
         joint.
         """
-        placements = joint_placements(self.family.prepared.model)
-        last = link_frames(placements[:-1], centre[:, :-1])[:, -1] @ placements[-1]
+        prepared = self.family.prepared
+        placements, coupling = joint_placements(prepared.model), prepared.arm.robot.coupling
+        q = coupling.positions(centre)
+        last = link_frames(placements[:-1], q[:, :-1])[:, -1] @ placements[-1]
         M = last[:, :3, :3].transpose(0, 2, 1) @ self.R
         _, _, z, w = Rotation.from_matrix(M).as_quat().T
-        sigma = np.minimum(half[:, :-1].sum(axis=1), np.pi)
+        reaches = coupling.reaches(half)
+        sigma = np.minimum(reaches[:, :-1].sum(axis=1), np.pi)
         least = np.cos(sigma / 2) / np.maximum(np.hypot(w, z), POSE_COVER.rounding)
         held = least <= 1 + POSE_COVER.rounding
         centre, half = centre.copy(), half.copy()

@@ -5,7 +5,7 @@ gives a box of joint positions around all members of a cell. Between two boxes,
 
 - the displacement of each joint is at least their distance,
 - the gain of potential energy is at least the gain between their middles less the greatest change
-  within them (`potential_rates`).
+  within them (`greatest_rates`).
 
 `lower_bounds` falls with neither, so its value at both bounds every motion between the boxes. Pairs
 of cells of least bound are halved until their boxes are small. The least value over all pairs
@@ -36,7 +36,7 @@ from joulepath.optimizer.bounds.subdivide import (
 )
 from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.prepared_problem import PreparedProblem
 
 
@@ -148,7 +148,7 @@ class _CellPairs(Subdivision[_Pairs]):
     def __init__(self, prepared: PreparedProblem, start: EndCurves, goal: EndCurves) -> None:
         self.prepared, self.start, self.goal = prepared, start, goal
         self.bound = LeastBound(prepared)
-        self.rates = potential_rates(prepared.model, prepared.arm.gravity)
+        self.rates = greatest_rates(prepared.arm)
         self.limits = prepared.arm.active_limits
         self.least_member = np.inf
         """Least bound of any pair of members seen [J]."""

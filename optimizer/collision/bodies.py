@@ -71,7 +71,7 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
     """Bodies of an arm: the capsules of the robot, then tool and payload, then the obstacles of the
     scene.
     """
-    robot, last, names = arm.robot, arm.robot.nq, arm.robot.link_names
+    robot, last, names = arm.robot, arm.robot.last_link, arm.robot.link_names
     T_last_flange = robot.T_last_flange
     links = [
         Body(names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
@@ -120,5 +120,5 @@ def _touched(part: Attachment, robot: Robot) -> frozenset[int]:
     """
     names = robot.link_names
     return frozenset(
-        [robot.nq] if part.touches is None else [names.index(name) for name in part.touches]
+        [robot.last_link] if part.touches is None else [names.index(name) for name in part.touches]
     )

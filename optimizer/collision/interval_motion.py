@@ -55,16 +55,17 @@ class IntervalMotion:
         return np.asarray(acceleration * h[interval] ** 2 / 8)
 
     def rate_bounds(self, begin: Array, end: Array) -> tuple[Array, Array, Array]:
-        """Bounds on |v| [rad/s] and |a| [rad/s²] (k, nq) over intervals (k,) [s], and the lengths
-        (k,) [s] of the intervals.
+        """Bounds on |v| [rad/s] and |a| [rad/s²] (k, n) of the joints of the chain over intervals
+        (k,) [s], and the lengths (k,) [s] of the intervals.
 
         Every interval must lie within a knot span.
         """
         h, degree = end - begin, self._degree
         # Polynomial of every interval in powers of the elapsed fraction of the interval.
+        rates = self._model.coupling.rates
         powers = np.stack(
             [
-                self._curve(begin, d) * (h**d / math.factorial(d))[:, None]
+                rates(self._curve(begin, d)) * (h**d / math.factorial(d))[:, None]
                 for d in range(1, degree + 1)
             ]
         )

@@ -58,12 +58,12 @@ class CollisionModel:
     def __init__(self, arm: Arm) -> None:
         self.bodies = bodies_of(arm)
         self.pairs = _checked_pairs(arm, self.bodies)
-        self.geometry = PairGeometry(self.bodies, self.pairs, arm.robot.nq)
-        self.nq = arm.robot.nq
+        self.nq, self.coupling = arm.robot.nq, arm.robot.coupling
         self._placements = joint_placements(arm.robot.model)
-        joints = np.arange(1, self.nq + 1)
+        self.geometry = PairGeometry(self.bodies, self.pairs, len(self._placements))
+        joints = np.arange(1, len(self._placements) + 1)
         first, second = self.geometry.links[self.pairs].T
-        # Joints (p, nq) that move the second body relative to the first.
+        # Joints of the chain (p, n) that move the second body relative to the first.
         self.joints_between = (joints > first[:, None]) & (joints <= second[:, None])
 
     def names(self, pair: int) -> tuple[str, str]:
@@ -73,7 +73,7 @@ class CollisionModel:
 
     def frames(self, q: Array) -> Array:
         """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad]."""
-        return link_frames(self._placements, q)
+        return link_frames(self._placements, self.coupling.positions(q))
 
     def signed_distances(self, q: Array, within: float = np.inf) -> tuple[Array, Array]:
         """Signed distances (n, p) [m] of every pair at q (n, nq) [rad], and their gradients (n, p,
@@ -157,7 +157,7 @@ class CollisionModel:
         """Greatest changes (n, p) [m] of the distances of `pairs` (p,) under joint displacements
         `move` (n, nq) [rad].
         """
-        return np.asarray(np.abs(move) @ self.levers_between[pairs].T)
+        return np.asarray(np.abs(self.coupling.rates(move)) @ self.levers_between[pairs].T)
 
     def pairs_within(self, frames: Array, within: float) -> Mask:
         """Mask (p,) of pairs less than `within` [m] apart at any of n configurations.
@@ -239,23 +239,23 @@ class CollisionModel:
         By the envelope theorem, the motion of the witness points over the bodies does not
         contribute.
         """
-        return self.geometry.gradients(frames, configuration, pair, witness)
+        return self.coupling.on_arm(self.geometry.gradients(frames, configuration, pair, witness))
 
     @cached_property
     def levers_between(self) -> Array:
-        """Levers (p, nq) [m] of the joints between the bodies of a pair, zero for other joints:
-        greatest changes of the pair's distance per radian.
+        """Levers (p, n) [m] of the chain's joints between the bodies of a pair: greatest changes of
+        the pair's distance per radian. Those of other joints are zero.
         """
         return np.asarray(self.levers() * self.joints_between)
 
     def levers(self) -> Array:
-        """Upper bounds (p, nq) [m], over all configurations, on the distance of a pair's second
-        core from every joint axis.
+        """Upper bounds (p, n) [m], over all configurations, on the distance of a pair's second
+        core from the axis of every joint of the chain.
         """
         offsets = self._placements[:, :3, 3]
         across = np.hypot(offsets[:, 0], offsets[:, 1])
         lengths = np.linalg.norm(offsets, axis=1)
-        result = np.zeros((len(self.bodies), self.nq))
+        result = np.zeros((len(self.bodies), len(self._placements)))
         for k, body in enumerate(self.bodies):
             if body.link == 0:
                 continue

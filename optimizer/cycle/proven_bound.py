@@ -20,7 +20,7 @@ from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
 from joulepath.optimizer.cycle.rest_energy import least_holding_power, rest_energy
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
+from joulepath.optimizer.kinematics.covers.wrist_geometry import greatest_rates
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
@@ -134,5 +134,5 @@ def _levels(leg: Leg, layer: Layer) -> tuple[float, float]:
     known = [leg.prepared.potential(end.q) for end in layer.ends]
     if layer.complete and not layer.sampled:
         return min(known), max(known)
-    reach = np.pi * float(potential_rates(leg.prepared.model, leg.prepared.arm.gravity).sum())
+    reach = np.pi * float(greatest_rates(leg.prepared.arm).sum())
     return max(known) - reach, min(known) + reach

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
+from joulepath.models.coupling import UNCOUPLED, Coupling
 from joulepath.models.robot import flange_placement
 
 _Z = ca.DM([0, 0, 1])
@@ -54,9 +55,12 @@ def inverse_dynamics(
     gravity: ca.SX,
     rotor: ca.SX,
     link_mass_scale: ca.SX | None = None,
+    coupling: Coupling = UNCOUPLED,
 ) -> ca.SX:
     """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with a payload at the
     flange.
+
+    With a `coupling`, nv is the number of joints that follow no other.
 
     Args:
         model: serial chain with a frame `flange`; its armature and gravity are not read.
@@ -66,8 +70,9 @@ def inverse_dynamics(
         payload: body at the frame `flange`.
         gravity: acceleration of gravity (3,) [m/s²] in the base frame.
         rotor: reflected rotor inertia (nv,) [kg·m²].
-        link_mass_scale: factor (nv,) [1] on mass and inertia of the moving links, but not of the
-            payload; None means 1.
+        link_mass_scale: factor (nv,) [1] on mass and inertia of the links that each joint turns,
+            but not of the payload; None means 1.
+        coupling: joints of the chain that follow others.
 
     Raises:
         ValueError: a joint is not revolute about its z axis.
@@ -76,8 +81,15 @@ def inverse_dynamics(
     scales: Sequence[ca.SX | int] = (
         [1] * model.nv if link_mass_scale is None else ca.vertsplit(link_mass_scale)
     )
+    chain = q, v, a
+    if coupling.follows:
+        matrix = ca.sparsify(ca.DM(coupling.matrix))
+        chain = matrix @ q + ca.DM(coupling.offset), matrix @ v, matrix @ a
+        scales = [scales[leader] for leader in coupling.leaders]
     bodies = [_link(model, i, payload, scale) for i, scale in enumerate(scales, 1)]
-    torques = body_torques(model, q, v, a, gravity, bodies)
+    torques = body_torques(model, *chain, gravity, bodies)
+    if coupling.follows:
+        torques = ca.vertsplit(matrix.T @ ca.vertcat(*torques))
     return ca.vertcat(*(torque + rotor[j] * a[j] for j, torque in enumerate(torques)))
 
 

@@ -28,6 +28,7 @@ and runs only a tenth faster. Without contraction, all processors round equally.
 """
 
 SOURCE_MODULES = (
+    joulepath.models.coupling,
     joulepath.models.robot,
     inverse_dynamics,
     losses,
@@ -49,7 +50,7 @@ def digest(robot: Robot, vectors: VectorUnit) -> str:
     ):
         h.update(Path(path).read_bytes())
     h.update(repr((version("casadi"), COMPILER_FLAGS, vectors, os.uname().machine)).encode())
-    h.update(repr(robot.has_load_friction).encode())
+    h.update(repr((robot.has_load_friction, robot.coupling)).encode())
     flange = flange_placement(robot.model)
     constants = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
     constants += [body.toDynamicParameters() for body in robot.model.inertias]

@@ -178,7 +178,15 @@ def _functions(robot: Robot) -> list[ca.Function]:
     if not robot.has_load_friction:
         par = replace(par, load=None)
     tau = inverse_dynamics(
-        robot.model, q, v, a, par.payload, par.gravity, par.rotor_inertia, par.link_mass_scale
+        robot.model,
+        q,
+        v,
+        a,
+        par.payload,
+        par.gravity,
+        par.rotor_inertia,
+        par.link_mass_scale,
+        robot.coupling,
     )
     multiplier, weight = ca.SX.sym("multiplier", nq), ca.SX.sym("weight")
     power = _power(par, tau, v, a, multiplier)

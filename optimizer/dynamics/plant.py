@@ -187,6 +187,7 @@ class Plant:
 
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""
+        q = self.arm.robot.coupling.positions(q)
         return float(pin.computePotentialEnergy(self.model, self._data, q))
 
     def energy(self, spline: Spline) -> Energy:

@@ -313,9 +313,9 @@ class _Evaluator:
 
     def _kinetic(self, nodes: _Nodes, k: int) -> float:
         """Kinetic energy [J] of arm, payload and rotors at a node."""
-        return float(
-            pin.computeKineticEnergy(self._plant.model, self._data, nodes.q[k], nodes.v[k])
-        )
+        coupling = self._arm.robot.coupling
+        q, v = coupling.positions(nodes.q[k]), coupling.rates(nodes.v[k])
+        return float(pin.computeKineticEnergy(self._plant.model, self._data, q, v))
 
     def _arm_with_charge(self, charge: float) -> Arm:
         """The arm with a charge [J] of its energy storage, if it has one."""

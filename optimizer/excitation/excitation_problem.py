@@ -12,6 +12,7 @@ from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen, per_joint
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 
 Part = Literal["inertials", "rotor", "friction"]
 """Parameters to determine: base parameters of the links, rotor inertias, friction (Coulomb,
@@ -106,6 +107,7 @@ class ExcitationProblem:
             raise InvalidProblem(
                 "tool_cone", "An excitation turns the tool in every direction: leave tool_cone out."
             )
+        check_uncoupled(self.arm.robot, "robot", "There are no excitations")
         nq = self.arm.robot.nq
         if self.centre is not None:
             centre = self.arm.inside("centre", frozen(self.centre, (nq,), "centre"))

@@ -53,6 +53,7 @@ from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.presentation.result import Result
 from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
 
 
@@ -211,6 +212,7 @@ def identify(
         PayloadUnknown: torque constants are requested, and the payload is not known.
         NothingHeldOut: the logs have fewer than two different motions.
     """
+    check_uncoupled(robot, "robot", "Figures are not identified")
     logs, options = prepare(robot, logs, options or IdentificationOptions())
     with progress_bar("Identifying", tell, progress) as tell:
         return _identified(robot, logs, options, tell)

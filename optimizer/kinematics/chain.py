@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
+from joulepath.models.coupling import UNCOUPLED, Coupling
 from joulepath.models.robot import Array, flange_placement
 from joulepath.optimizer.kinematics.forward import joint_placements
 
@@ -33,22 +34,24 @@ CHAIN = ChainSettings()
 class Chain:
     """Serial chain of revolute joints about z, with the flange fixed to the last link.
 
-    `placements` (nq, 4, 4) are the poses of the joints, each in the frame of the previous link.
+    `placements` (n, 4, 4) are the poses of the joints, each in the frame of the previous link. With
+    a `coupling`, q are the positions of the nq ≤ n joints that follow no other.
     """
 
     placements: Array
     T_last_flange: Array
+    coupling: Coupling = UNCOUPLED
 
     @classmethod
-    def of(cls, model: pin.Model) -> Chain:
+    def of(cls, model: pin.Model, coupling: Coupling = UNCOUPLED) -> Chain:
         """Chain of a Pinocchio model with a frame `flange`."""
         flange = flange_placement(model)
-        return cls(joint_placements(model), np.asarray(flange.homogeneous))
+        return cls(joint_placements(model), np.asarray(flange.homogeneous), coupling)
 
     @property
     def nq(self) -> int:
-        """Number of joints."""
-        return len(self.placements)
+        """Number of joints, without those that follow others."""
+        return len(self.coupling.own) or len(self.placements)
 
     @cached_property
     def length(self) -> float:
@@ -75,7 +78,7 @@ class Chain:
         """Flange poses T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
         if len(q) > CHAIN.small_batch:
             return _poses(self.flange_components(q))
-        harmonics = self._harmonics
+        harmonics, q = self._harmonics, self.coupling.positions(q)
         parts = np.cos(q)[..., None, None] * harmonics[0]
         parts += np.sin(q)[..., None, None] * harmonics[1]
         parts += harmonics[2]
@@ -116,12 +119,14 @@ class Chain:
             The flange poses as `flange_components` (3, n, 4), and the Jacobians (6, nq, n).
         """
         frames, flange = self._frames(q)
-        jacobian = np.empty((6, *q.shape[::-1]))
+        jacobian = np.empty((6, len(frames), len(q)))
         axis = jacobian[3:]
         axis[:] = frames[..., 2].transpose(1, 0, 2)
         u, v, w = flange[:, None, :, 3] - frames[..., 3].transpose(1, 0, 2)
         x, y, z = axis
         jacobian[0], jacobian[1], jacobian[2] = y * w - z * v, z * u - x * w, x * v - y * u
+        if self.coupling.follows:
+            jacobian = self.coupling.matrix.T @ jacobian
         return flange, jacobian
 
     def flange_components(self, q: Array) -> Array:
@@ -130,6 +135,7 @@ class Chain:
 
     def _frames(self, q: Array) -> tuple[Array, Array]:
         """First three rows of the poses of the links (nq, 3, n, 4) and of the flange (3, n, 4)."""
+        q = self.coupling.positions(q)
         n, nq = q.shape
         turns, angles = np.empty((nq, n), dtype=complex), q.T
         turns.real, turns.imag = np.cos(angles), -np.sin(angles)

@@ -127,7 +127,7 @@ class ConfirmedInverseKinematics:
     def __init__(self, robot: Robot, solver: PoseSolver) -> None:
         self._limits = robot.limits
         self._solver = solver
-        self._chain = Chain.of(robot.model)
+        self._chain = Chain.of(robot.model, robot.coupling)
 
     @property
     def complete(self) -> bool:

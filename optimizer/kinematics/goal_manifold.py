@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from joulepath.models.coupling import Coupling
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.kinematics.jacobians import geometric_jacobian
@@ -63,14 +64,14 @@ class GoalManifold:
     T_last: Array
     q_min: Array
     q_max: Array
+    coupling: Coupling
 
     @classmethod
     def of(cls, arm: Arm, pose: ConeOrientedPose) -> GoalManifold:
         """Manifold of an arm within its active limits."""
-        limits = arm.active_limits
-        return cls(
-            pose, joint_placements(arm.robot.model), T_last_tcp(arm), limits.q_min, limits.q_max
-        )
+        limits, robot = arm.active_limits, arm.robot
+        placements, T_last = joint_placements(robot.model), T_last_tcp(arm)
+        return cls(pose, placements, T_last, limits.q_min, limits.q_max, robot.coupling)
 
     def put(self, q: Array) -> tuple[Array, Mask]:
         """Projects configurations onto the manifold by Newton's method.
@@ -145,9 +146,10 @@ class GoalManifold:
 
         The Jacobian rows of free rotations are zero.
         """
-        frames = link_frames(self.placements, q)
+        frames = link_frames(self.placements, self.coupling.positions(q))
         T = frames[:, -1] @ self.T_last
-        rows, error = geometric_jacobian(frames, T[:, :3, 3]), np.zeros((len(q), 6))
+        rows = self.coupling.on_arm(geometric_jacobian(frames, T[:, :3, 3]))
+        error = np.zeros((len(q), 6))
         error[:, :3] = self.pose.position - T[:, :3, 3]
         direction, pointing = self.pose.direction, T[:, :3, :3] @ self.pose.axis
         normal = np.cross(direction, pointing)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from joulepath.models.coupling import Coupling
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.chain import pose_error
 from joulepath.optimizer.kinematics.tcp import T_last_tcp, tcp_pose
@@ -50,13 +51,20 @@ class HeldPose:
     T: Array
     q_min: Array
     q_max: Array
+    coupling: Coupling
 
     @staticmethod
     def of(arm: Arm, q: Array) -> HeldPose:
         """Curve of an arm through q (nq,) [rad], within its active limits."""
         model, limits = arm.robot.model, arm.active_limits
         return HeldPose(
-            model, model.createData(), T_last_tcp(arm), tcp_pose(arm, q), limits.q_min, limits.q_max
+            model,
+            model.createData(),
+            T_last_tcp(arm),
+            tcp_pose(arm, q),
+            limits.q_min,
+            limits.q_max,
+            arm.robot.coupling,
         )
 
     def put(self, q: Array) -> Array | None:
@@ -117,8 +125,8 @@ class HeldPose:
 
     def _tcp_and_jacobian(self, q: Array) -> tuple[Array, Array]:
         """TCP pose (4, 4) at q (nq,), and geometric Jacobian (6, nq) in base axes."""
-        about_base = pin.computeJointJacobians(self.model, self.data, q)
+        about_base = pin.computeJointJacobians(self.model, self.data, self.coupling.positions(q))
         T = self.data.oMi[self.model.njoints - 1].homogeneous @ self.T_last
         jacobian = about_base.copy()
         jacobian[:3] -= pin.skew(T[:3, 3]) @ about_base[3:]
-        return T, jacobian
+        return T, self.coupling.on_arm(jacobian)

@@ -6,13 +6,15 @@ those of the second kind are members of a self-motion, a curve of solutions.
 
 `InverseKinematics` is the interface; `inverse_kinematics_for` selects the implementation for a
 robot. Six joints use, in this order: the closed form of arms of Universal Robots' form in any
-convention (`ur_closed_form`), the closed form of arms with three parallel or meeting axes
-(`decomposition`), and Newton's method from many starts (`multi_start`), which may miss branches.
+convention (`ur_closed_form`), the closed form of arms with a spherical wrist, or nearly of
+Universal Robots' form (`decomposition`), and the eigenvalues of the closed loop with Newton's
+method (`loop_closure`, `multi_start`), which may miss branches near singularities.
 Seven joints hold every pose on self-motions and use the closed form of arms with a spherical
 shoulder (`redundant_arm`), or self-motions traced point by point (`traced_arm`), some of which may
 be missed. Fewer joints are searched for the poses that they can hold (`few_joints`); poses of
-partly free orientation need no inverse kinematics (`goal_manifold`). An arm of more joints has no
-inverse kinematics and takes joint positions as targets.
+partly free orientation need no inverse kinematics (`goal_manifold`). Arms with joints that follow
+others are searched, too, unless a full turn of a joint turns its follower by a part of a turn. An
+arm of more joints has no inverse kinematics and takes joint positions as targets.
 """
 
 from __future__ import annotations
@@ -22,7 +24,12 @@ from typing import Protocol
 
 from joulepath.models.robot import MOST_ROBOTS, Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.kinematics.confirmed_inverse import INVERSE, ConfirmedInverseKinematics
+from joulepath.optimizer.kinematics.chain import Chain
+from joulepath.optimizer.kinematics.confirmed_inverse import (
+    INVERSE,
+    ConfirmedInverseKinematics,
+    PoseSolver,
+)
 from joulepath.optimizer.kinematics.ik_solutions import LimitedSolution, PrincipalSolution
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
@@ -98,10 +105,14 @@ class InverseKinematics(Protocol):
 @lru_cache(MOST_ROBOTS)
 def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """Inverse kinematics of a robot, built once; None for an arm without one."""
-    model = robot.model
-    exact = URClosedForm.of(model) or DecomposedArm.of(model) or RedundantArm.of(model)
-    searched = FewJoints.of(model) or MultiStart.of(model) or TracedArm.of(model)
-    solver = exact or searched
+    model, coupling = robot.model, robot.coupling
+    chain = Chain.of(model, coupling)
+    solver: PoseSolver | None = None
+    if coupling.is_periodic:
+        solver = FewJoints.of(chain) or MultiStart.of(chain)
+    if not coupling.follows:
+        exact = URClosedForm.of(model) or DecomposedArm.of(model) or RedundantArm.of(model)
+        solver = exact or solver or TracedArm.of(model)
     return None if solver is None else ConfirmedInverseKinematics(robot, solver)
 
 

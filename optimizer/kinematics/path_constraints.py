@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from joulepath.models.coupling import UNCOUPLED, Coupling
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
 from joulepath.optimizer.kinematics.jacobians import (
@@ -71,6 +72,7 @@ class ToolConeConstraint:
     axis: Array
     direction: Array
     half_angle: float
+    coupling: Coupling = UNCOUPLED
 
     names: ClassVar[tuple[str, ...]] = ("tool_cone",)
 
@@ -80,7 +82,10 @@ class ToolConeConstraint:
         link.
         """
         return ToolConeConstraint(
-            T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle
+            T_last_tcp(arm)[:3, :3] @ cone.axis,
+            cone.direction,
+            cone.half_angle,
+            arm.robot.coupling,
         )
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
@@ -95,7 +100,7 @@ class ToolConeConstraint:
         """
         pointing = frames[:, -1, :3, :3] @ self.axis
         angle = self._angle(pointing)
-        slope = -(self.direction @ direction_jacobian(frames, pointing))
+        slope = -self.coupling.on_arm(self.direction @ direction_jacobian(frames, pointing))
         by_q = slope / (np.maximum(np.sin(angle), REGULAR) * self.half_angle)[:, None]
         return ConstraintRatios(
             (angle / self.half_angle)[:, None],
@@ -117,6 +122,7 @@ class PointSpeedConstraint:
     link: int
     points: Array
     limit: float
+    coupling: Coupling = UNCOUPLED
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -125,9 +131,8 @@ class PointSpeedConstraint:
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
         """Ratios (n, c) for link frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
-        velocities = [
-            point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)
-        ]
+        rates = self.coupling.rates(v)[..., None]
+        velocities = [point_jacobian(frames, self.link, x) @ rates for x in self._positions(frames)]
         return (
             np.stack([np.linalg.norm(velocity[..., 0], axis=1) for velocity in velocities], axis=1)
             / self.limit
@@ -138,14 +143,15 @@ class PointSpeedConstraint:
     ) -> ConstraintRatios:
         """Ratios and gradients at the same states."""
         value, by_q, by_v = [], [], []
+        v = self.coupling.rates(v)
         for x in self._positions(frames):
             J = point_jacobian(frames, self.link, x)
             velocity = (J @ v[..., None])[..., 0]
             speed = np.linalg.norm(velocity, axis=1)
             along = (velocity / np.maximum(speed, REGULAR)[:, None])[:, None]
             value.append(speed)
-            by_q.append((along @ velocity_gradient(frames, J, v))[:, 0])
-            by_v.append((along @ J)[:, 0])
+            by_q.append(self.coupling.on_arm((along @ velocity_gradient(frames, J, v))[:, 0]))
+            by_v.append(self.coupling.on_arm((along @ J)[:, 0]))
         return ConstraintRatios(
             *(np.stack(each, axis=1) / self.limit for each in (value, by_q, by_v))
         )
@@ -159,10 +165,11 @@ class PointSpeedConstraint:
 
 @dataclass(frozen=True)
 class PathConstraints:
-    """All path constraints of an arm with joint placements (nq, 4, 4)."""
+    """All path constraints of an arm whose chain has joint placements (n, 4, 4)."""
 
     placements: Array
     limits: Sequence[PathConstraint]
+    coupling: Coupling = UNCOUPLED
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -176,12 +183,12 @@ class PathConstraints:
 
     def ratios(self, q: Array, v: Array) -> Array:
         """Ratios (n, c) at q [rad] and v [rad/s] (n, nq)."""
-        frames = link_frames(self.placements, q)
+        frames = self._frames(q)
         return np.concatenate([limit.ratios(frames, q, v) for limit in self.limits], axis=1)
 
     def speed_ratios(self, q: Array, v: Array) -> Array:
         """Largest speed ratio (n,) at q [rad] and v [rad/s] (n, nq); 0 without speed limits."""
-        frames, speeds = link_frames(self.placements, q), np.zeros((len(q), 1))
+        frames, speeds = self._frames(q), np.zeros((len(q), 1))
         limited = [
             each.ratios(frames, q, v)
             for each in self.limits
@@ -194,7 +201,7 @@ class PathConstraints:
 
         Entries outside the mask `wanted` (n, c) may be zero.
         """
-        frames = link_frames(self.placements, q)
+        frames = self._frames(q)
         if wanted is None:
             parts = [limit.linearised(frames, q, v) for limit in self.limits]
         else:
@@ -211,6 +218,9 @@ class PathConstraints:
             *(np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
         )
 
+    def _frames(self, q: Array) -> Array:
+        return link_frames(self.placements, self.coupling.positions(q))
+
 
 def path_constraint_list(arm: Arm) -> list[PathConstraint]:
     """Path constraints of an arm: tool cone, TCP speed, elbow speed."""
@@ -220,13 +230,21 @@ def path_constraint_list(arm: Arm) -> list[PathConstraint]:
     if arm.tcp_speed is not None:
         limits.append(
             PointSpeedConstraint(
-                "tcp_speed", arm.robot.nq, T_last_tcp(arm)[None, :3, 3], arm.tcp_speed
+                "tcp_speed",
+                arm.robot.last_link,
+                T_last_tcp(arm)[None, :3, 3],
+                arm.tcp_speed,
+                arm.robot.coupling,
             )
         )
     if arm.elbow_speed is not None and arm.robot.elbow is not None:
         limits.append(
             PointSpeedConstraint(
-                "elbow_speed", arm.robot.elbow.link, arm.robot.elbow.axis, arm.elbow_speed
+                "elbow_speed",
+                arm.robot.elbow.link,
+                arm.robot.elbow.axis,
+                arm.elbow_speed,
+                arm.robot.coupling,
             )
         )
     return limits
@@ -234,5 +252,7 @@ def path_constraint_list(arm: Arm) -> list[PathConstraint]:
 
 def path_constraints_of(arm: Arm) -> PathConstraints | None:
     """Combined path constraints of an arm; None if it has none."""
-    limits = path_constraint_list(arm)
-    return PathConstraints(joint_placements(arm.robot.model), limits) if limits else None
+    limits, robot = path_constraint_list(arm), arm.robot
+    if not limits:
+        return None
+    return PathConstraints(joint_placements(robot.model), limits, robot.coupling)

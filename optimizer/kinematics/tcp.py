@@ -30,7 +30,7 @@ def flange_pose(T_base_tcp: Array, T_flange_tcp: Array) -> Array:
 def tcp_pose(arm: Arm, q: Array) -> Array:
     """TCP poses T_base_tcp (..., 4, 4) in the base frame at q (..., nq) [rad]."""
     q = np.asarray(q, dtype=float)
-    frames = link_frames(joint_placements(arm.robot.model), q.reshape(-1, arm.robot.nq))
+    frames = _frames(arm, q.reshape(-1, arm.robot.nq))
     return np.asarray(frames[:, -1] @ T_last_tcp(arm)).reshape(*q.shape[:-1], 4, 4)
 
 
@@ -38,8 +38,13 @@ def tcp_jacobian(arm: Arm, q: Array) -> Array:
     """Geometric Jacobian (6, nq) of the TCP at q (nq,) [rad], in base axes, linear rows [m]
     first.
     """
-    frames = link_frames(joint_placements(arm.robot.model), q[None])
-    return np.asarray(geometric_jacobian(frames, (frames[:, -1] @ T_last_tcp(arm))[:, :3, 3])[0])
+    frames = _frames(arm, q[None])
+    jacobian = geometric_jacobian(frames, (frames[:, -1] @ T_last_tcp(arm))[:, :3, 3])[0]
+    return arm.robot.coupling.on_arm(jacobian)
+
+
+def _frames(arm: Arm, q: Array) -> Array:
+    return link_frames(joint_placements(arm.robot.model), arm.robot.coupling.positions(q))
 
 
 def rotated_poses(arm: Arm, q: Array, rotvecs: Sequence[Array]) -> list[tuple[Array, Array]]:

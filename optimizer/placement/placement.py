@@ -15,6 +15,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import Target, members
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.result.energy import Objective
 
 
@@ -91,6 +92,7 @@ class Placement:
             raise InvalidProblem(
                 "cycles", f"A placement has 1 to {PLACEMENT_RANGES.max_cycles} cycles."
             )
+        check_uncoupled(self.cycles[0].cycle.arm.robot, "robot", "There are no placements")
         if not 1 <= len(self.moved) <= PLACEMENT_RANGES.max_moved:
             raise InvalidProblem(
                 "moves", f"A placement moves 1 to {PLACEMENT_RANGES.max_moved} bodies."

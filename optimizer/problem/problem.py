@@ -16,6 +16,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.targets import AnyOf, Target, members, validated
 from joulepath.optimizer.problem.tool_path import ToolPath
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.result.energy import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
@@ -97,6 +98,7 @@ class Problem:
         ):
             raise InvalidProblem("duration", "duration.min must not exceed duration.max.")
         if self.tool_path is not None:
+            check_uncoupled(self.arm.robot, "tool_path", "Tool paths are not followed")
             for name in ("start", "goal"):
                 end = getattr(self, name)
                 if isinstance(end, AnyOf):

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.replay.shapes import add_shapes, pose
 from joulepath.optimizer.replay.simulator import mujoco
 
@@ -36,6 +37,7 @@ class SimulatedArm:
     """
 
     def __init__(self, arm: Arm) -> None:
+        check_uncoupled(arm.robot, "robot", "Motions are not replayed in MuJoCo")
         self._simulator = mujoco()
         spec = self._simulator.MjSpec()
         joints = arm.robot.nq

@@ -120,7 +120,8 @@ def _beyond_cone(prepared: PreparedProblem, q: Array) -> list[float]:
     problem = prepared.problem
     if problem.arm.tool_cone is None:
         return []
-    frames = link_frames(joint_placements(problem.arm.robot.model), q)
+    robot = problem.arm.robot
+    frames = link_frames(joint_placements(robot.model), robot.coupling.positions(q))
     share = ToolConeConstraint.of(problem.arm, problem.arm.tool_cone).ratios(
         frames, q, np.zeros_like(q)
     )[:, 0]

@@ -63,7 +63,7 @@ def joint_weights(arm: Arm, model: CollisionModel) -> Array:
     wrist would be checked as densely as a turn of the base. With a cone for the tool axis, wrists
     count as much as any joint.
     """
-    levers = model.levers().max(axis=0, initial=0.0)
+    levers = model.coupling.most_on_arm(model.levers().max(axis=0, initial=0.0))
     if arm.tool_cone is not None or not levers.any():
         return np.ones(arm.robot.nq)
     return np.asarray(np.maximum(np.sqrt(levers / levers.max()), PATH_SEARCH.least_weight))

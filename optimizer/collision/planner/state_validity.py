@@ -57,7 +57,8 @@ class StateValidityChecker:
 
     def is_valid(self, q: Array) -> bool:
         """Whether q (nq,) [rad] is collision-free with its margins, and within the tool cone."""
-        if pin.computeCollisions(self._robot, self._data, self._manager, q, True):
+        chain = self._model.coupling.positions(q)
+        if pin.computeCollisions(self._robot, self._data, self._manager, chain, True):
             return False
         if len(self._clouds) and self._hits_cloud(q):
             return False

@@ -134,7 +134,7 @@ class _SimpleArm:
 
 @lru_cache(MOST_ROBOTS)
 def _simple_arm(robot: Robot) -> _SimpleArm | None:
-    if robot.model.nq != 7:
+    if robot.nq != 7 or robot.coupling.follows:
         return None
     chain = Chain.of(robot.model)
     nearby = NearbyArm.of(chain)

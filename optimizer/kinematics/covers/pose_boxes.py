@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from joulepath.models.coupling import Coupling
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.covers.wrist_geometry import potential_rates
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
@@ -84,6 +85,10 @@ class PoseBoxes:
     def _rates(self) -> Array:
         return potential_rates(rigid_body_model(self.arm), np.asarray(self.arm.gravity))
 
+    @property
+    def _coupling(self) -> Coupling:
+        return self.arm.robot.coupling
+
     @cached_property
     def _bodies(self) -> tuple[Array, Array]:
         """Mass (nq,) [kg] and centre of mass (nq, 3) [m], in its own frame, of each link."""
@@ -96,7 +101,12 @@ class PoseBoxes:
 
     @cached_property
     def levers(self) -> Array:
-        """Largest distance (nq,) [m] of the TCP from the origin of each joint."""
+        """Largest path (nq,) [m/rad] of the TCP by each joint."""
+        return self._coupling.most_on_arm(self._lengths)
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """Largest distance (n,) [m] of the TCP from the origin of each joint of the chain."""
         lengths = np.linalg.norm(self._placements[1:, :3, 3], axis=1)
         steps = np.append(lengths, np.linalg.norm(self._T_last_tcp[:3, 3]))
         return np.asarray(np.cumsum(steps[::-1])[::-1])
@@ -109,14 +119,15 @@ class PoseBoxes:
         free = np.zeros(len(self.levers), dtype=bool)
         across = np.hypot(*self._T_last_tcp[:2, 3])
         tilted = np.hypot(*(self._T_last_tcp[:3, :3] @ self.pose.axis)[:2])
-        free[-1] = across < SETTINGS.rounding and (
+        on_axis = across < SETTINGS.rounding and self._coupling.has_free_end
+        free[-1] = on_axis and (
             tilted < SETTINGS.rounding or self.pose.half_angle >= SETTINGS.widest_cone
         )
         return free
 
     def placed(self, q: Array) -> Placed:
         """Arm at q (b, nq) [rad]."""
-        frames = link_frames(self._placements, q)[:, 1:]
+        frames = link_frames(self._placements, self._coupling.positions(q))[:, 1:]
         tcp = frames[:, -1] @ self._T_last_tcp
         centres = (
             np.einsum("bjxy,jy->bjx", frames[..., :3, :3], self._bodies[1]) + frames[..., :3, 3]
@@ -171,12 +182,14 @@ class PoseBoxes:
             each row.
         """
         arms, half = at.tcp[:, None] - at.origins, np.where(self.free, 0.0, half)
-        J = np.cross(at.axes, arms).transpose(0, 2, 1)
+        J, half = np.cross(at.axes, arms).transpose(0, 2, 1), self._coupling.reaches(half)
+        J = self._coupling.on_arm(J)
         error = self.pose.position - at.tcp
-        slack = np.repeat(second_order(self.levers, half)[:, None], 3, axis=1)
+        slack = np.repeat(second_order(self._lengths, half)[:, None], 3, axis=1)
         if self.pose.half_angle >= SETTINGS.widest_cone:
             return J, error, slack
         tilt = np.cross(at.axes, at.tool_axis[:, None]).transpose(0, 2, 1)
+        tilt = self._coupling.on_arm(tilt)
         chord = 2 * np.sin(self.pose.half_angle / 2)
         turned = second_order(np.ones(half.shape[1]), half) + chord
         return (
@@ -195,10 +208,11 @@ class PoseBoxes:
         # Σ_{i ≥ j} m_i (c_i - o_j), and -g · (z_j × this sum)
         beyond = np.cumsum((masses[:, None] * at.centres)[:, ::-1], axis=1)[:, ::-1]
         beyond = beyond - np.cumsum(masses[::-1])[::-1, None] * at.origins
-        gradient = -np.cross(at.axes, beyond) @ g
-        rates = self._rates
+        gradient = self._coupling.on_arm(-np.cross(at.axes, beyond) @ g)
+        rates, reaches = self._rates, self._coupling.reaches(half)
         fall = np.minimum(
-            np.einsum("bj,bj->b", np.abs(gradient), half) + second_order(rates, half), half @ rates
+            np.einsum("bj,bj->b", np.abs(gradient), half) + second_order(rates, reaches),
+            reaches @ rates,
         )
         return np.asarray(potential - fall)
 

@@ -100,10 +100,11 @@ class TurnedPose:
     def of(cls, arm: Arm, pose: ConeOrientedPose, given: Pose | None = None) -> TurnedPose | None:
         """Turned pose, with the angle measured from a `given` pose, or from an arbitrary one.
 
-        None for an arm of another form, or a pose with more freedom.
+        None for an arm of another form, or with joints that follow others, or a pose with more
+        freedom.
         """
         form = URClosedForm.of(arm.robot.model)
-        if form is None or pose.half_angle > 0:
+        if form is None or arm.robot.coupling.follows or pose.half_angle > 0:
             return None
         return cls(
             form, arm, pose, sample_orientations(pose, 1)[0] if given is None else given.T[:3, :3]

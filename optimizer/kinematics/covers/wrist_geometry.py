@@ -79,7 +79,9 @@ class WristGeometry:
     @classmethod
     def of(cls, arm: Arm) -> WristGeometry | None:
         """Geometry of an arm; None for a chain without an inner joint."""
-        return cls(arm, rigid_body_model(arm)) if arm.robot.nq > WRIST_JOINTS else None
+        if arm.robot.nq <= WRIST_JOINTS or arm.robot.coupling.follows:
+            return None
+        return cls(arm, rigid_body_model(arm))
 
     @property
     def inner(self) -> int:
@@ -182,6 +184,12 @@ class WristGeometry:
             WristBody(body.mass, far, low)
             for body, far, low in zip(bodies, reach, least, strict=True)
         ]
+
+
+def greatest_rates(arm: Arm) -> Array:
+    """Largest derivative (nq,) [J/rad] of the potential energy by each joint of an arm."""
+    rates = potential_rates(rigid_body_model(arm), np.asarray(arm.gravity))
+    return arm.robot.coupling.most_on_arm(rates)
 
 
 def potential_rates(model: pin.Model, gravity: Array, links: int | None = None) -> Array:

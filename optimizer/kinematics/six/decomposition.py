@@ -34,7 +34,7 @@ from joulepath.optimizer.kinematics.newton import NEWTON, solved
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.six.aligned_wrist import AlignedWrist
 from joulepath.optimizer.kinematics.six.multi_start import MultiStart
-from joulepath.optimizer.kinematics.six.named_branches import NamedBranches, in_order, numbered
+from joulepath.optimizer.kinematics.six.named_branches import NamedBranches
 from joulepath.optimizer.kinematics.six.nearly_singular_seeds import SEEDS, seeds_around
 from joulepath.optimizer.kinematics.six.simple_arm import SimpleArm
 from joulepath.optimizer.kinematics.six.spherical_wrist import (
@@ -45,7 +45,7 @@ from joulepath.optimizer.kinematics.six.spherical_wrist import (
 )
 from joulepath.optimizer.kinematics.six.ur_geometry import URGeometry
 from joulepath.optimizer.kinematics.six.wrist_angles import WristAngles
-from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
+from joulepath.optimizer.problem.branches import BranchLabel
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class DecomposedArm:
 
     confirmed = True
 
-    def __init__(self, chain: Chain, names: NamedBranches | None, simple: SimpleArm) -> None:
+    def __init__(self, chain: Chain, names: NamedBranches, simple: SimpleArm) -> None:
         self._chain, self._names, self._simple = chain, names, simple
         self._search = MultiStart(chain)
         self.complete = (
@@ -129,22 +129,16 @@ class DecomposedArm:
         if simple is None:
             return None
         names = SphericalWrist.of(axes) or URGeometry.of(model, SETTINGS.ur_deviation)
-        return cls(chain, names, simple)
+        # `loop_closure` is faster and finds more than EAIK for axes of other forms
+        return None if names is None else cls(chain, names, simple)
 
     def label(self, q: Array) -> BranchLabel:
-        """Branch of a configuration (6,) [rad]: its name, or the number of the nearest solution, 1
-        on a self-motion.
-        """
-        if self._names is not None:
-            return self._names.label(q)
-        try:
-            return numbered(q, self.solve(self._chain.flange(q[None])[0])[0])
-        except SingularPose:
-            return NumberedBranch(1)
+        """Branch of a configuration (6,) [rad]."""
+        return self._names.label(q)
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """Singular parts of the label at a configuration (6,) [rad]."""
-        return () if self._names is None else self._names.singular_parts(q)
+        return self._names.singular_parts(q)
 
     def solve(self, T: Array) -> tuple[Array, list[BranchLabel]]:
         """Isolated configurations (n, 6) [rad] in [-pi, pi] of the flange pose T (4, 4), and their
@@ -195,14 +189,9 @@ class DecomposedArm:
         for k in np.flatnonzero(smallest < ISOLATED.singular_value) if self._wrist is None else ():
             if lies_on_a_curve(self._chain, q[k], T):
                 raise SingularPose("goal", float(smallest[k]))
-        if self._names is None:
-            q = in_order(q)
-            labels: list[BranchLabel] = [numbered(each, q) for each in q]
-        else:
-            names = [self._names.label(each) for each in q]
-            order = sorted(range(len(q)), key=lambda k: (str(names[k]), *q[k].tolist()))
-            q, labels = q[order], [names[k] for k in order]
-        return _Found(q, labels, motions)
+        names = [self._names.label(each) for each in q]
+        order = sorted(range(len(q)), key=lambda k: (str(names[k]), *q[k].tolist()))
+        return _Found(q[order], [names[k] for k in order], motions)
 
     def _regular(self, rows: Array, T: Array) -> _Found | None:
         """The rows (n, 6) if all are exact, of distinct branches and far from any singularity;

@@ -8,7 +8,6 @@ The limit of sixteen branches holds, too: the arm is a six-joint arm with fixed 
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.kinematics.chain import Chain
@@ -27,11 +26,9 @@ class FewJoints(MultiStart):
     """
 
     @classmethod
-    def of(cls, model: pin.Model) -> FewJoints | None:
-        """Inverse kinematics of a Pinocchio model with a frame `flange`; None for six joints or
-        more.
-        """
-        return cls(Chain.of(model)) if model.nq < 6 else None
+    def of(cls, chain: Chain) -> FewJoints | None:
+        """Inverse kinematics of a chain; None for six joints or more."""
+        return cls(chain) if chain.nq < 6 else None
 
     def label(self, q: Array) -> NumberedBranch:
         """Branch of a configuration (nq,) [rad]: 1, or 2 if the first three joints move the flange

@@ -1,18 +1,18 @@
 """Inverse kinematics of any six-joint arm by Newton's method from many starts: the last resort.
 
-Starts are drawn uniformly over all joint positions, with a fixed seed, in rounds until several
-consecutive rounds find nothing new. A branch with a small basin of attraction may still be missed,
-so the result is never `complete`. A general arm has at most sixteen branches (E. J. F. Primrose,
-"On the input-output equation of the general 7R-mechanism", 1986).
+The first starts are the roots of `loop_closure`, which has all configurations. If Newton's method
+does not reach as many as are real, or for other numbers of joints, starts are drawn uniformly over
+all joint positions, with a fixed seed, in rounds until several consecutive rounds find nothing new.
+A branch may still be missed, so the result is never `complete`. A general arm has at most sixteen
+branches (E. J. F. Primrose, "On the input-output equation of the general 7R-mechanism", 1986).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
-import pinocchio as pin
 
 from joulepath.models.robot import Array, Limits, Mask
 from joulepath.optimizer.deadline import checkpoint
@@ -23,6 +23,7 @@ from joulepath.optimizer.kinematics.isolated import ISOLATED, distinct, lies_on_
 from joulepath.optimizer.kinematics.newton import solved
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
+from joulepath.optimizer.kinematics.six.loop_closure import LoopClosure
 from joulepath.optimizer.kinematics.six.named_branches import in_order, numbered
 from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
@@ -74,11 +75,9 @@ class MultiStart:
         self._found = lru_cache(maxsize=MULTI_START.cached_poses)(self._solve)
 
     @classmethod
-    def of(cls, model: pin.Model) -> MultiStart | None:
-        """Inverse kinematics of a Pinocchio model with a frame `flange`; None unless it has six
-        joints.
-        """
-        return cls(Chain.of(model)) if model.nq == 6 else None
+    def of(cls, chain: Chain) -> MultiStart | None:
+        """Inverse kinematics of a chain; None unless it has six joints."""
+        return cls(chain) if chain.nq == 6 else None
 
     def label(self, q: Array) -> BranchLabel:
         """Branch of a configuration (6,) [rad]: the number of the nearest solution, 1 on a
@@ -120,9 +119,10 @@ class MultiStart:
         if self._chain.beyond_length(T) > REACH.beyond:
             return np.zeros((0, self._chain.nq))
         shape = (MULTI_START.round_size, self._chain.nq)
-        rng, found, idle = np.random.default_rng(0), np.zeros((0, self._chain.nq)), 0
+        found, is_settled = self._roots(T)
+        rng, idle = np.random.default_rng(0), 0
         starts = rng.uniform(-np.pi, np.pi, shape)
-        for _ in range(MULTI_START.rounds):
+        for _ in range(0 if is_settled else MULTI_START.rounds):
             checkpoint()
             fresh = self._joined(found, starts, T)
             idle = idle + 1 if len(fresh) == len(found) else 0
@@ -144,6 +144,21 @@ class MultiStart:
         found = in_order(found)
         found.setflags(write=False)
         return found
+
+    @cached_property
+    def _closure(self) -> LoopClosure | None:
+        return LoopClosure.of(self._chain)
+
+    def _roots(self, T: Array) -> tuple[Array, bool]:
+        """Configurations (n, 6) [rad] by the eigenvalues of the closed loop, and whether they are
+        all that are real.
+        """
+        found = np.zeros((0, self._chain.nq))
+        for roots in () if self._closure is None else self._closure.roots(T):
+            found = self._joined(found, roots.q, T)
+            if len(found) == roots.certain and (len(found) or not len(roots.q)):
+                return found, True
+        return found, False
 
     def _joined(self, found: Array, starts: Array, T: Array) -> Array:
         """The known solutions (n, 6) [rad], and the distinct new ones found from starts (m, 6)."""

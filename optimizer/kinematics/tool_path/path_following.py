@@ -28,6 +28,7 @@ from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen
 from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,7 @@ def follow(
         OutsideLimits: the guess is outside the limits.
         DeadlineExceeded: the deadline passed before the first search.
     """
+    check_uncoupled(arm.robot, "points", "Tool paths are not followed")
     guess = arm.inside("guess", frozen(guess, (arm.robot.nq,), "guess"))
     if not len(targets):
         raise InvalidProblem("points", "The path needs at least one point.")

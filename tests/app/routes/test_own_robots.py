@@ -24,6 +24,7 @@ from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from tests.app.recorded import recorded_service
 from tests.app.requests import PATIENT
 from tests.app.routes.test_problems import refused
+from tests.models.own_arm.palletiser import PALLETISER
 
 MINE = {"robot": "mine"}
 START, GOAL = [0.2, 0.4], [-0.9, 1.3]
@@ -266,3 +267,23 @@ def test_doubts_about_a_urdf_are_kept_with_the_robot(client: TestClient) -> None
     for words in ("'elbow' cannot hold", "'shoulder' has a torque limit of 2000"):
         assert any(words in each for each in kept)
     client.delete("/robots/doubtful")
+
+
+def test_joints_that_follow_others(client: TestClient) -> None:
+    """The joints of the robot are those with motors, in requests, answers and files."""
+    palletiser = {"urdf": PALLETISER, "tip": "tool", "acceleration": 8.0, "payload": 5.0}
+    joints = ["a1", "a2", "a3", "a4"]
+    try:
+        made = client.put("/robots/palletiser", json=palletiser)
+        assert (made.status_code, made.json()["joints"]) == (201, joints)
+        assert made.json()["kinematics"]["coupling"]["value"][2] == [1, -1, 0]
+        model = mujoco.MjModel.from_xml_string(client.get("/robots/palletiser/mjcf").text)
+        assert [model.actuator(k).name for k in range(model.nu)] == joints
+        ends = {
+            "start": {"q": [0.0] * 4},
+            "goal": {"pose": {"position": [0.8, 0.1, 0.9], "rpy": [0, 0, 0]}},
+        }
+        path = client.post("/optimize", json={"robot": "palletiser", "path": {}, **ends})
+        assert "joints follow others" in str(refused(path, InvalidRequest)["errors"])
+    finally:
+        client.delete("/robots/palletiser")

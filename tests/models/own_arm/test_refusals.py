@@ -12,7 +12,7 @@ from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.models.own_arm.description import Collision, Drives, Electronics, InvalidArm, Motion
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.registry import load_robot
-from tests.models.own_arm.arms import RICH, RICH_ARM, refused
+from tests.models.own_arm.arms import HELD, RICH, RICH_ARM, refused
 
 
 def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
@@ -52,14 +52,23 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
     (
         "urdf",
-        "'twist' mimics",
-        change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="pan"/>'),
+        "'twist' mimics itself",
+        change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="twist"/>'),
     ),
     ("urdf", "'elbow' has no <limit>", change('lower="-2" upper="2.5" ', "")),
     ("urdf", "'elbow' cannot move", change('lower="-2" upper="2.5"', 'lower="1" upper="1"')),
     ("urdf", "`upper` that is no finite number", change('upper="2.5"', 'upper="inf"')),
-    ("urdf", "Two links", change('name="wrist"', 'name="hand"')),
-    ("urdf", "Two joints", change('"twist"', '"pan"')),
+    ("urdf", "Two links.*: hand. Give", change('name="wrist"', 'name="hand"')),
+    ("urdf", "Two joints.*: pan. Give", change('"twist"', '"pan"')),
+    ("urdf", r"but 'a\\u200b'", change('"twist"', '"a\u200b"')),
+    ("urdf", "'bracket' has an <origin>", change('xyz="0 0.05 0.1"', 'xyz="0 0,05 0.1"')),
+    ("urdf", "'twist' is floating", change('"twist" type="revolute"', '"twist" type="floating"')),
+    (
+        "locked",
+        "no single position",
+        {"locked": HELD | {"twist": 0.0}}
+        | change('"twist" type="revolute"', '"twist" type="floating"'),
+    ),
     (
         "urdf",
         "that the URDF does not have",
@@ -106,7 +115,7 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
         change('lower="-2" upper="2.5"', 'lower="-180" upper="180"'),
     ),
     ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
-    ("urdf", "`iyz` that is no finite number", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
+    ("urdf", "without the attribute `iyz`", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
     (
         "urdf",
         "3 finite numbers",

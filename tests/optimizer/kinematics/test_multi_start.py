@@ -12,6 +12,7 @@ import pytest
 from joulepath import Arm, Pose, Problem, optimize
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import UnreachablePose
+from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.six.multi_start import MULTI_START, MultiStart
@@ -54,7 +55,7 @@ def test_the_configuration_is_found(number: int, count: int) -> None:
 
 def test_the_same_pose_has_the_same_answer() -> None:
     T = flange(CHAIN, move(6)[0])
-    once, again = (MultiStart.of(CHAIN.model) for _ in range(2))
+    once, again = (MultiStart.of(Chain.of(CHAIN.model)) for _ in range(2))
     assert once is not None and again is not None
     assert (once.solve(T)[0] == again.solve(T)[0]).all()
     assert [str(label) for label in once.solve(T)[1]] == [

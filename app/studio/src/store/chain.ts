@@ -82,8 +82,11 @@ export function obstaclesOf(request: ApiRequest, robot: Robot): Obstacle[] {
 export class Chain {
   private readonly placements: Matrix[];
   private readonly flange: Matrix;
+  /** For every joint that turns: place of the joint that it follows, multiplier, offset. */
+  private readonly coupling: [number, number, number][] | undefined;
 
   constructor(robot: Robot) {
+    this.coupling = robot.kinematics.coupling?.value as [number, number, number][] | undefined;
     this.placements = (robot.kinematics.joint_origin!.value as number[][]).map(ofOrigin);
     this.flange = ofOrigin(robot.kinematics.flange_origin!.value as number[]);
   }
@@ -93,12 +96,22 @@ export class Chain {
    */
   frames(q: number[]): Matrix[] {
     const frames = [IDENTITY];
+    const angles = this.angles(q);
     this.placements.forEach((placement, joint) => {
-      const turn = rows(new Matrix4().makeRotationZ(q[joint] ?? 0));
+      const turn = rows(new Matrix4().makeRotationZ(angles[joint] ?? 0));
       frames.push(multiply(multiply(frames[joint]!, placement), turn));
     });
     frames.push(multiply(frames.at(-1)!, this.flange));
     return frames;
+  }
+
+  /** Angles of all joints that turn: of those with positions q, and of those that follow them. */
+  private angles(q: number[]): number[] {
+    const { coupling } = this;
+    if (!coupling) return q;
+    let count = 0;
+    const number = coupling.map(([leader], place) => (leader === place ? count++ : -1));
+    return coupling.map(([leader, factor, offset]) => factor * (q[number[leader]!] ?? 0) + offset);
   }
 
   /** The pose of the TCP at q; `tcp` is its pose at the flange. */
