@@ -15,7 +15,7 @@ class NoJointLimits(JoulepathError):
     """
 
     title = "No joint limits"
-    remedy = "Give a lighter payload, or narrower ranges in `limits.position`."
+    remedy = "Give a lighter payload, or an arm with narrower joint ranges."
 
     joint: str
     """Name of the joint with the least reserve."""
@@ -28,5 +28,5 @@ class NoJointLimits(JoulepathError):
         return (
             f"No limits on speed and acceleration are proven for all postures: gravity alone takes "
             f"{self.torque:.4g} of the {self.limit:.4g} N·m that {self.joint} has after friction. "
-            "Give a lighter payload, or narrower ranges of the joints."
+            "Give a lighter payload, or an arm with narrower joint ranges."
         )

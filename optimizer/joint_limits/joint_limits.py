@@ -26,8 +26,8 @@ class SearchSettings:
     """Settings of the search for limits."""
 
     attempts: tuple[tuple[float, int], ...] = (
-        (0.1, 100_000),
-        (0.35, 100_000),
+        (0.1, 250_000),
+        (0.35, 150_000),
         (0.65, 600_000),
         (0.85, 600_000),
     )
@@ -53,39 +53,49 @@ class JointLimits:
     """Limits of joints, of which none lets a torque exceed its limit.
 
     Attributes:
-        joints: names of the joints from base to tip.
+        arm: the arm, with the payload for which they hold.
+        scope: the postures for which they hold, in words.
         v: limits on speeds, shape (nq,) [rad/s].
         a: limits on accelerations, shape (nq,) [rad/s²].
         j: limits on jerks, those of the robot, shape (nq,) [rad/s³]; infinite without one.
         spare: share of the torque that gravity and friction leave which the proof has to spare.
     """
 
-    joints: tuple[str, ...]
+    arm: Arm
+    scope: str
     v: Array
     a: Array
     j: Array
     spare: float
 
-    def to_yaml(self, head: Sequence[str] = (), prefix: str = "") -> str:
-        """The limits as `joint_limits.yaml` of MoveIt, which ros2_control reads, too.
+    def to_yaml(self, prefix: str = "") -> str:
+        """The limits as `joint_limits.yaml` of MoveIt, which ros2_control has, too.
 
         Args:
-            head: lines of a comment before them.
             prefix: prefix of all joint names.
+
+        Returns:
+            The text of the file. A comment at its head says for what the limits hold.
         """
-        kinds = (("velocity", self.v), ("acceleration", self.a), ("jerk", self.j))
-        limits = {
-            prefix + joint: {
-                key: value
-                for kind, values in kinds
-                for key, value in (
-                    (f"has_{kind}_limits", bool(np.isfinite(values[k]))),
-                    (f"max_{kind}", float(values[k])),
-                )
-                if np.isfinite(values[k]) or key.startswith("has_")
-            }
-            for k, joint in enumerate(self.joints)
-        }
+        limits = {}
+        for k, joint in enumerate(self.arm.robot.joint_names):
+            own = limits[prefix + joint] = dict[str, bool | float]()
+            for kind, most in (("velocity", self.v), ("acceleration", self.a), ("jerk", self.j)):
+                own[f"has_{kind}_limits"] = known = bool(np.isfinite(most[k]))
+                if known:
+                    own[f"max_{kind}"] = float(most[k])
+        payload = self.arm.payload
+        com = ", ".join(f"{x:.4g}" for x in payload.com)
+        head = (
+            f"joint_limits.yaml of {self.arm.robot.name}, for MoveIt and ros2_control",
+            "No torque exceeds its limit. Proven for all speeds and accelerations within these "
+            "limits at once,",
+            f"for {self.scope},",
+            f"and for payloads of up to {payload.mass:.4g} kg with the centre of mass ({com}) m in "
+            "the flange frame.",
+            f"The proof has {self.spare:.0%} of the torque to spare that gravity and friction "
+            "leave. Jerks are the robot's own limits.",
+        )
         comment = "".join(f"# {line}\n" for line in head)
         return comment + yaml.safe_dump({"joint_limits": limits}, sort_keys=False)
 
@@ -108,7 +118,7 @@ def joint_limits(arm: Arm) -> JointLimits:
         NoJointLimits: gravity leaves too little torque in some posture.
         DeadlinePassed: the watched deadline passed.
     """
-    return _limits([(arm, PostureSet.of_ranges(arm))])
+    return _limits([(arm, PostureSet.of_ranges(arm))], "all postures within the joint ranges")
 
 
 def joint_limits_along(moves: Sequence[tuple[Spline, Arm]]) -> JointLimits:
@@ -124,7 +134,8 @@ def joint_limits_along(moves: Sequence[tuple[Spline, Arm]]) -> JointLimits:
         NoJointLimits: gravity leaves too little torque in some posture.
         DeadlinePassed: the watched deadline passed.
     """
-    return _limits([(arm, PostureSet.along(spline, arm)) for spline, arm in moves])
+    sets = [(arm, PostureSet.along(spline, arm)) for spline, arm in moves]
+    return _limits(sets, "the postures of the motion alone")
 
 
 class _Case:
@@ -173,7 +184,7 @@ class _Case:
 
 
 @one_thread()
-def _limits(sets: Sequence[tuple[Arm, PostureSet]]) -> JointLimits:
+def _limits(sets: Sequence[tuple[Arm, PostureSet]], scope: str) -> JointLimits:
     arms = [arm for arm, _ in sets]
     most = _common_limits(arms)
     loads = [(TorqueLoad(arm), postures) for arm, postures in sets]
@@ -191,7 +202,8 @@ def _limits(sets: Sequence[tuple[Arm, PostureSet]]) -> JointLimits:
         if rates is not None and (rates.v >= creeping.v).all():
             down = 10.0**SEARCH.decimals
             v, a = (np.floor(each * down) / down for each in (rates.v, rates.a))
-            return JointLimits(names, v, a, most.j_max, spare)
+            heaviest = max(arms, key=lambda arm: arm.payload.mass)
+            return JointLimits(heaviest, scope, v, a, most.j_max, spare)
     raise refusal
 
 

@@ -2,8 +2,8 @@
 
 With fixed speeds, accelerations and payload, a torque τ_i(q) deviates from its multilinear
 interpolation between the corners of a box with half sides h by at most Σ_k h_k² / 2 · max
-|∂²τ_i/∂q_k²|. The greatest |τ_i| over speeds and accelerations is convex in the terms of τ_i, and an
-interpolated term is a mean of those at the corners. Hence the greatest |τ_i| in a box is at most
+|∂²τ_i/∂q_k²|. The greatest |τ_i| over speeds and accelerations is convex in the terms of τ_i, and
+an interpolated term is a mean of those at the corners. Hence the greatest |τ_i| in a box is at most
 that at its corners plus this deviation.
 
 Bounds on the second derivatives of inertia and velocity terms hold for all postures
@@ -88,7 +88,9 @@ class TorqueCover(Subdivision[_Boxes]):
         """Postures with an excess above `enough`, shape (k, nq) [rad]."""
         k, v = np.arange(chain.nq), rates.v
         inertia, slopes = chain.inertia_bound(2)[k, k], chain.inertia_bound(3)[k, k]
-        along = np.einsum("klij,j,l->ki", slopes, v, v) + np.einsum("kijl,j,l->ki", slopes, v, v) / 2
+        along = (
+            np.einsum("klij,j,l->ki", slopes, v, v) + np.einsum("kijl,j,l->ki", slopes, v, v) / 2
+        )
         self._motion = (inertia @ rates.a + along) / unit
         self._later = np.maximum.outer(k, k)
         gravity = chain.potential_bound(3)[k, k]

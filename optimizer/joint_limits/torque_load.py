@@ -41,9 +41,7 @@ class TorqueLoad:
         self._rotor = arm.drives.rotor_inertia if at_motor else zero
         self._load = zero if law.load is None or not at_motor else law.load
         self._bend = law.bend
-        self.chains = [
-            ChainDerivatives.of(each) for each in (arm, replace(arm, payload=Payload()))
-        ]
+        self.chains = [ChainDerivatives.of(each) for each in (arm, replace(arm, payload=Payload()))]
         """The arm with and without its payload. τ is linear in the mass of a payload with the same
         centre of mass and radii of gyration: |τ| of a lighter one exceeds neither.
         """

@@ -30,27 +30,25 @@ def worst_ratio(arm: Arm, rates: Rates, lower: Array, upper: Array) -> float:
         upper: largest joint positions, shape (nq,) [rad].
     """
     random = np.random.default_rng(1)
-    arms = [arm, replace(arm, payload=Payload()), replace(arm, payload=_half(arm.payload))]
     postures = random.uniform(lower, upper, (STARTS, arm.robot.nq))
-    ratios = np.array([_ratios(arms, q, rates) for q in postures])
+    ratios = np.array([torque_ratios(arm, q, rates) for q in postures])
     best = 0.0
     for joint in range(arm.robot.nq):
         q, most = postures[ratios[:, joint].argmax()], float(ratios[:, joint].max())
         for step in np.geomspace(1.0, 0.003, STEPS):
             tried = np.clip(q + step * random.normal(size=len(q)), lower, upper)
-            ratio = float(_ratios(arms, tried, rates)[joint])
+            ratio = float(torque_ratios(arm, tried, rates)[joint])
             if ratio > most:
                 q, most = tried, ratio
         best = max(best, most)
     return best
 
 
-def _half(payload: Payload) -> Payload:
-    return Payload(payload.mass / 2, payload.com, payload.inertia / 2)
-
-
-def _ratios(arms: list[Arm], q: Array, rates: Rates) -> Array:
-    """Largest torque / limit of each joint at a posture, shape (nq,), with all signs of speeds."""
+def torque_ratios(arm: Arm, q: Array, rates: Rates) -> Array:
+    """Largest torque / limit of each joint at a posture q (nq,) [rad], shape (nq,)."""
+    payload = arm.payload
+    half = Payload(payload.mass / 2, payload.com, payload.inertia / 2)
+    arms = [arm, replace(arm, payload=half), replace(arm, payload=Payload())]
     signs = np.array(list(product((1.0, -1.0), repeat=len(q))))
     found = []
     for arm in arms:

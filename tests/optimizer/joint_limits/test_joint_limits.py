@@ -22,8 +22,10 @@ from joulepath.optimizer.joint_limits.posture_terms import PostureTerms
 from joulepath.optimizer.joint_limits.torque_cover import TorqueCover
 from joulepath.optimizer.joint_limits.torque_load import Rates, TorqueLoad, greatest_torques
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.motion.spline import sample
+from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm, Payload
-from tests.optimizer.joint_limits.attack import worst_ratio
+from tests.optimizer.joint_limits.attack import torque_ratios, worst_ratio
 
 ROUNDING = 1e-9
 """Rounding of torques [N·m], which are below 1e3 N·m."""
@@ -122,3 +124,31 @@ def test_a_payload_that_gravity_makes_too_heavy(name: str) -> None:
     with pytest.raises(NoJointLimits) as raised:
         joint_limits(loaded(name))
     assert raised.value.torque > raised.value.limit and raised.value.joint in str(raised.value)
+
+
+def test_the_postures_of_a_motion_hold_more() -> None:
+    arm = loaded("ur5e", com=(0, 0, 0.1))
+    start, goal = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.array([1, -1.2, 1.2, -1.6, -1.2, 0.5])
+    rest = np.zeros((2, 6))
+    spline = spline_through(np.array([0.0, 1.5]), np.stack([start, goal]), rest, rest)
+    here = joint_limits_along([(spline, arm)])
+    anywhere = joint_limits(arm)
+    assert (here.v >= anywhere.v).all() and here.a[1] > 1.5 * anywhere.a[1]
+    rates = Rates(here.v, here.a)
+    path = sample(spline, np.linspace(0, 1.5, 40))[0]
+    assert 0.8 < max(torque_ratios(arm, q, rates).max() for q in path) <= 1
+
+
+def test_the_file_of_moveit() -> None:
+    arm = loaded("ur5e", 0.5)
+    found = replace(joint_limits(arm), j=np.array([1.0, 1.0, np.inf, 1.0, 1.0, 1.0]))
+    limits = yaml.safe_load(found.to_yaml("left_"))["joint_limits"]
+    assert list(limits) == ["left_" + name for name in arm.robot.joint_names]
+    assert limits["left_elbow_joint"] == {
+        "has_velocity_limits": True,
+        "max_velocity": found.v[2],
+        "has_acceleration_limits": True,
+        "max_acceleration": found.a[2],
+        "has_jerk_limits": False,
+    }
+    assert "up to 2.5 kg" in found.to_yaml()
