@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from joulepath.app.client.errors import ServiceUnreachable
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.ros2.messages import JointNames, Json, pose_target, refusal
@@ -52,14 +54,15 @@ def error_code(error: BaseException) -> int:
 
 
 def request_of(
-    request: Any, names: JointNames, limits: Mapping[str, list[float]], frame: str, link: str
+    request: Any, names: JointNames, limits: Mapping[str, Any], frame: str, link: str
 ) -> Json:
     """The fields of `POST /optimize` that a moveit_msgs/msg/MotionPlanRequest has.
 
     Args:
         request: the message.
         names: joints of the robot.
-        limits: limits on `velocity` [rad/s] and `acceleration` [rad/s²] that its factors scale.
+        limits: `limits` of `POST /optimize`, of which its factors scale `velocity` [rad/s] and
+            `acceleration` [rad/s²].
         frame: frame of the robot's base.
         link: link whose pose a goal may constrain, which has the TCP.
 
@@ -78,14 +81,14 @@ def request_of(
         fields["start"] = {"q": q}
     if request.allowed_planning_time > 0:
         fields["deadline"] = request.allowed_planning_time
-    slower = {
-        kind: [factor * limit for limit in limits[kind]]
-        for kind in ("velocity", "acceleration")
-        if 0 < (factor := getattr(request, f"max_{kind}_scaling_factor")) < 1
-    }
+    slower = dict(limits)
+    for kind in ("velocity", "acceleration"):
+        if 0 < (factor := getattr(request, f"max_{kind}_scaling_factor")) < 1:
+            slower[kind] = (factor * np.array(limits[kind])).tolist()
     if request.max_cartesian_speed > 0:
-        slower["tcp_speed"] = request.max_cartesian_speed
-    return fields | ({"limits": slower} if slower else {})
+        speeds = (request.max_cartesian_speed, limits.get("tcp_speed"))
+        slower["tcp_speed"] = min(each for each in speeds if each is not None)
+    return fields | {"limits": slower}
 
 
 def _goal(goals: Any, names: JointNames, frame: str, link: str) -> Json:

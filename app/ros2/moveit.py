@@ -49,7 +49,7 @@ class MoveitInterface:
         answer.group_name = request.group_name
         if not isinstance(plan, Plan):
             answer.error_code.val = error_code(plan)
-            answer.error_code.message = str(plan)
+            answer.error_code.message = str(plan) or "The plan was cancelled."
             return response
         trajectory = trajectory_message(plan.trajectory)
         answer.error_code.val = SUCCESS
@@ -64,4 +64,5 @@ class MoveitInterface:
         if planner is None:
             raise refusal((REQUEST,), "No robot is known yet: see the parameter `robot`.")
         names = JointNames(planner.joints, own.prefix)
-        return request_of(request, names, planner.limits, own.base_frame, own.tip_link)
+        limits = {**planner.limits, **own.request().get("limits", {})}
+        return request_of(request, names, limits, own.base_frame, own.tip_link)

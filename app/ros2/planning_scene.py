@@ -9,6 +9,7 @@ import base64
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -129,12 +130,19 @@ class PlanningScene:
                 f"world.collision_objects.{message.id}.planes",
                 "Planes are not read: give a half space in the parameter `request_file`.",
             )
-        solids = [self._solid(message.id, each) for each in message.primitives]
-        meshes = [_mesh(each) for each in message.meshes]
-        return (
-            *zip(solids, message.primitive_poses, strict=True),
-            *zip(meshes, message.mesh_poses, strict=True),
-        )
+        shapes: list[tuple[Json, Any]] = []
+        for read, found, poses in (
+            (self._solid, message.primitives, message.primitive_poses),
+            (self._mesh, message.meshes, message.mesh_poses),
+        ):
+            if len(poses) > len(found):
+                raise self._refused(
+                    f"world.collision_objects.{message.id}",
+                    f"There are {len(poses)} poses for {len(found)} shapes: give one for each.",
+                )
+            # a shape without a pose has that of its object
+            shapes += zip_longest((read(message.id, each) for each in found), poses)
+        return tuple(shapes)
 
     def _solid(self, name: str, solid: Any) -> Json:
         shape, sizes = SOLIDS.get(solid.type), list(solid.dimensions)
@@ -150,18 +158,24 @@ class PlanningScene:
             "send a box, sphere, cylinder or mesh.",
         )
 
+    def _mesh(self, name: str, mesh: Any) -> Json:
+        """A mesh as a binary STL file."""
+        points = np.array([[p.x, p.y, p.z] for p in mesh.vertices])
+        triangles = np.array([each.vertex_indices for each in mesh.triangles], dtype=int)
+        if not triangles.size or triangles.max() >= len(points):
+            raise self._refused(
+                f"world.collision_objects.{name}.meshes",
+                f"A mesh has {len(triangles)} triangles between {len(points)} vertices, some of "
+                "which do not exist: number its vertices from 0.",
+            )
+        corners = points[triangles].astype("<f4")
+        # every triangle: normal, which readers ignore, corners, attribute
+        faces = b"".join(bytes(12) + each.tobytes() + bytes(2) for each in corners)
+        content = bytes(80) + struct.pack("<I", len(corners)) + faces
+        return {"shape": "mesh_file", "format": "stl", "data": base64.b64encode(content).decode()}
+
     def _refused(self, field: str, message: str) -> InvalidRequest:
         return refusal((self._topic, *field.split(".")), message)
-
-
-def _mesh(mesh: Any) -> Json:
-    """A mesh as a binary STL file."""
-    points = np.array([[p.x, p.y, p.z] for p in mesh.vertices])
-    corners = points[[list(each.vertex_indices) for each in mesh.triangles]].astype("<f4")
-    # every triangle: normal, which readers ignore, corners, attribute
-    faces = b"".join(bytes(12) + each.tobytes() + bytes(2) for each in corners)
-    content = bytes(80) + struct.pack("<I", len(corners)) + faces
-    return {"shape": "mesh_file", "format": "stl", "data": base64.b64encode(content).decode()}
 
 
 def _pose(outer: Any, inner: Any) -> Json:
@@ -175,12 +189,13 @@ def _pose(outer: Any, inner: Any) -> Json:
 
 
 def _numbers(pose: Any) -> tuple[Any, Any]:
-    """Position and unit quaternion (x, y, z, w) of a pose; the quaternion of a default is zero."""
+    """Position and unit quaternion (x, y, z, w) of a pose; None is no displacement."""
+    if pose is None:
+        return np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
     p, q = pose.position, pose.orientation
     quaternion = np.array([q.x, q.y, q.z, q.w])
     size = np.linalg.norm(quaternion)
-    unit = quaternion / size if size else np.array([0.0, 0.0, 0.0, 1.0])
-    return np.array([p.x, p.y, p.z]), unit
+    return np.array([p.x, p.y, p.z]), quaternion / size if size else quaternion
 
 
 def _times(first: Any, second: Any) -> Any:

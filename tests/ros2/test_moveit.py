@@ -204,20 +204,27 @@ def test_the_planning_scene(ur5e: System) -> None:
     send(ur5e, whole=True, names=[])
 
 
+CONE = {"primitives": [SolidPrimitive(type=4, dimensions=[0.1, 0.1])]}
+OPEN = {"meshes": [Mesh(vertices=[Point()], triangles=[MeshTriangle(vertex_indices=[0, 1, 2])])]}
+
+
 @pytest.mark.parametrize(
-    ("fields", "field"),
+    ("fields", "frame", "field"),
     [
-        ({"primitives": [SolidPrimitive(type=4, dimensions=[0.1, 0.1])]}, "primitives"),
-        ({"header": "camera"}, "frame_id"),
+        (CONE, "left_base_link", "primitives"),
+        (OPEN, "left_base_link", "meshes"),
+        ({"mesh_poses": [Pose()]}, "left_base_link", "cone"),
+        ({}, "camera", "frame_id"),
     ],
 )
-def test_a_scene_that_plans_could_not_avoid(ur5e: System, fields: Any, field: str) -> None:
+def test_a_scene_that_plans_could_not_avoid(
+    ur5e: System, fields: Any, frame: str, field: str
+) -> None:
     """No motion is planned until a whole scene arrives."""
-    cone = thing("cone", (5.0, 0.0, 0.0), primitives=fields.get("primitives", []))
-    cone.primitive_poses = [Pose()] * len(cone.primitives)
-    cone.header.frame_id = fields.get("header", "left_base_link")
+    own = thing("cone", (5.0, 0.0, 0.0), **fields)
+    own.header.frame_id = frame
     message = moveit.PlanningScene(is_diff=True)
-    message.world.collision_objects = [cone]
+    message.world.collision_objects = [own]
     summary = ur5e.ask(lambda: ur5e.scenes.publish(message))  # type: ignore[attr-defined]
     assert summary["problem"]["errors"][0]["loc"][-1] == field
     refused = asked(ur5e, goal_constraints=at_joints(GOAL))
