@@ -33,7 +33,7 @@ class SearchSettings:
     )
     """Reserve of torque that a proof has to spare, relative to the torque that gravity and friction
     leave, and the largest number of postures of the proof. With six joints the first attempt is
-    enough, with seven often only the third.
+    mostly enough, with seven often only the third.
     """
     samples: int = 2000
     """Random postures with which the limits are compared before a proof."""
@@ -192,14 +192,14 @@ def _limits(sets: Sequence[tuple[Arm, PostureSet]], scope: str) -> JointLimits:
     names = arms[0].robot.joint_names
     creeping = Rates(SEARCH.slowest * most.v_max, SEARCH.slowest**2 * most.a_max)
     needs = [case.measure(creeping) for case in cases]
-    torque, allowed = min(needs, key=lambda each: (each[1] - each[0]).min())
-    joint = int(np.argmin((allowed - torque) / allowed))
+    torque, allowed = max(needs, key=lambda each: (each[0] / each[1]).max())
+    joint = int(np.argmax(torque / allowed))
     refusal = NoJointLimits(names[joint], float(torque[joint]), float(allowed[joint]))
     if any((case.unit <= 0).any() for case in cases):
         raise refusal
     for spare, evaluations in SEARCH.attempts:
         rates = _proven(cases, most, spare, evaluations)
-        if rates is not None and (rates.v >= creeping.v).all():
+        if rates is not None and (rates.v >= creeping.v).all() and (rates.a >= creeping.a).all():
             down = 10.0**SEARCH.decimals
             v, a = (np.floor(each * down) / down for each in (rates.v, rates.a))
             heaviest = max(arms, key=lambda arm: arm.payload.mass)
