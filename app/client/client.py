@@ -182,12 +182,7 @@ class Client:
         return text
 
     def joint_limits(self, name: str, **query: Any) -> str:
-        """The `joint_limits.yaml` of a robot: `GET /robots/{name}/joint_limits`.
-
-        Args:
-            name: the robot.
-            query: `mass` [kg] and `distance` [m] of the payload, and `prefix` of the joints.
-        """
+        """The `joint_limits.yaml` of a robot: `GET /robots/{name}/joint_limits`."""
         text: str = self._send("GET", f"/robots/{name}/joint_limits", params=query).text
         return text
 
