@@ -32,6 +32,7 @@ from joulepath.app.api.pareto import route as pareto
 from joulepath.app.api.placement import route as placement
 from joulepath.app.api.replay import route as replay
 from joulepath.app.api.report import route as report
+from joulepath.app.api.robots import files as robot_files
 from joulepath.app.api.robots import route as robots
 from joulepath.app.api.studies import route as studies
 from joulepath.app.api.studies.iterations import route as iterations
@@ -77,6 +78,7 @@ ROUTES = (
     export,
     report,
     robots,
+    robot_files,
     tools,
     figures,
     health,

@@ -40,6 +40,7 @@ from .optimizer.excitation.errors import ExcitationInfeasible
 from .optimizer.export.errors import FormatUnsuitable
 from .optimizer.export.export import ExportedFile, export
 from .optimizer.export.franka import FrankaOptions
+from .optimizer.export.joint_limits_file import LimitsOptions
 from .optimizer.export.krl import KrlOptions
 from .optimizer.export.mcap_recording import McapOptions
 from .optimizer.export.program import Move, Program, Rest
@@ -63,6 +64,8 @@ from .optimizer.identify.logs.reading import LogReading, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
 from .optimizer.identify.results import Advice, IdentifiedParameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
+from .optimizer.joint_limits.errors import NoJointLimits
+from .optimizer.joint_limits.joint_limits import JointLimits, joint_limits
 from .optimizer.kinematics.errors import OrientationNotHeld
 from .optimizer.motion.spline import Spline
 from .optimizer.optimize import optimize
@@ -221,12 +224,14 @@ __all__ = [
     "InvalidTable",
     "Inverter",
     "JointEnergy",
+    "JointLimits",
     "JoulepathError",
     "KrlOptions",
     "LeastClearance",
     "LimitReport",
     "Limits",
     "LimitsInForce",
+    "LimitsOptions",
     "Line",
     "Log",
     "LogMove",
@@ -244,6 +249,7 @@ __all__ = [
     "MoveitOptions",
     "NoCollisionFreeTrajectory",
     "NoConfigurationFound",
+    "NoJointLimits",
     "NoPlacement",
     "NoPowerChannel",
     "NoSequence",
@@ -324,6 +330,7 @@ __all__ = [
     "export",
     "identify",
     "inverse_kinematics",
+    "joint_limits",
     "load_robot",
     "load_tool",
     "mjcf",

@@ -248,6 +248,11 @@ FILES: dict[str, tuple[str, str, typing.Any]] = {
     "csv": ("csv", "t,q1,", joulepath.TableOptions(period=0.1)),
     "json": ("json", "control_points", None),
     "npz": ("npz", "PK", None),
+    "joint_limits": (
+        "yaml",
+        "left_elbow_joint:",
+        joulepath.LimitsOptions(prefix="left_"),
+    ),
     "mcap": ("mcap", "MCAP", joulepath.McapOptions(period=0.1)),
 }
 

@@ -16,6 +16,8 @@ from joulepath.app.cli.table import table
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session
 
+    from joulepath.models.robot import Robot
+
 
 @click.group(
     invoke_without_command=True,
@@ -120,9 +122,52 @@ def mjcf(robot: str, output: Path | None) -> None:
     ROBOT is the name of a robot, or the path of a YAML file that describes one. The file has rotor
     inertias and friction, so that MuJoCo's torques are those of the answers.
     """
+    from joulepath.models.mjcf import mjcf as written
+
+    write(written(_robot(robot)).encode(), output)
+
+
+@robots.command(
+    "joint-limits",
+    epilog="""\b
+Examples:
+  joulepath robots joint-limits ur5e --output joint_limits.yaml
+  joulepath robots joint-limits ur5e --mass 3 --distance 0.1 --prefix left_""",
+)
+@click.argument("robot")
+@click.option(
+    "--mass", type=float, help="Largest mass of the payload [kg]. Default: the rated one."
+)
+@click.option(
+    "--distance",
+    type=float,
+    default=0.0,
+    help="Distance of its centre of mass from the flange, along the flange's z axis [m].",
+)
+@click.option("--prefix", default="", help="Prefix of all joint names.")
+@OUTPUT
+def joint_limits(
+    robot: str, mass: float | None, distance: float, prefix: str, output: Path | None
+) -> None:
+    """Writes the joint_limits.yaml that a robot's torques imply, for MoveIt and ros2_control.
+
+    ROBOT is as for `mjcf`. The limits are proven for every posture, all speeds and accelerations
+    within them, and every payload up to the mass.
+    """
+    from joulepath.app.api.robots.joint_limits import proven_limits
+    from joulepath.optimizer.exceptions import JoulepathError
+
+    try:
+        found = proven_limits(_robot(robot), mass, distance)
+    except JoulepathError as error:
+        raise refused(error) from None
+    write(found.to_yaml(prefix).encode(), output)
+
+
+def _robot(robot: str) -> Robot:
+    """The robot of a name or of a file. Raises Refused or click.FileError."""
     from joulepath.app.exceptions.base import ServiceError
     from joulepath.app.store import robots as stored
-    from joulepath.models.mjcf import mjcf as written
     from joulepath.models.own_arm.description import InvalidArm
     from joulepath.models.own_arm.robots import own_robot
     from joulepath.models.registry import DESCRIPTIONS, load_robot, robot_names
@@ -130,17 +175,15 @@ def mjcf(robot: str, output: Path | None) -> None:
 
     try:
         if robot in robot_names() or robot.endswith(DESCRIPTIONS):
-            found = load_robot(robot)
-        else:
-            row = in_store(lambda store: store.read(partial(stored.get, name=robot)))
-            found = own_robot(robot, row.figures)
+            return load_robot(robot)
+        row = in_store(lambda store: store.read(partial(stored.get, name=robot)))
+        return own_robot(robot, row.figures)
     except InvalidArm as error:
         raise refused(InvalidProblem(error.field, str(error))) from None
     except OSError as error:
         raise click.FileError(robot, error.strerror or str(error)) from None
     except (ServiceError, UnknownRobot) as error:
         raise refused(error) from None
-    write(written(found).encode(), output)
 
 
 def _table() -> str:

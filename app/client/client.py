@@ -181,6 +181,11 @@ class Client:
         text: str = self._send("GET", f"/robots/{name}/mjcf").text
         return text
 
+    def joint_limits(self, name: str, **query: Any) -> str:
+        """The `joint_limits.yaml` of a robot: `GET /robots/{name}/joint_limits`."""
+        text: str = self._send("GET", f"/robots/{name}/joint_limits", params=query).text
+        return text
+
     def robot_names(self) -> tuple[str, ...]:
         """Names of all robots: `GET /robots`."""
         return tuple(each["name"] for each in self.get("/robots")["robots"])

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from importlib.util import find_spec
+from typing import Any, TypeVar
 
 import rclpy
-from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -19,7 +19,7 @@ from rclpy.task import Future as RosFuture
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 from joulepath.app.client.client import Client
 from joulepath.app.client.errors import ServiceUnreachable
@@ -28,10 +28,15 @@ from joulepath.app.http.problems import problem_of
 from joulepath.app.ros2.messages import JointNames, Json, pose_target, refusal, summary_of
 from joulepath.app.ros2.parameters import Parameters
 from joulepath.app.ros2.planner import LocalPlanner, Plan, Planner, RemotePlanner
+from joulepath.app.ros2.planning_scene import PlanningScene
+from joulepath.app.ros2.trajectory import trajectory_message
 from joulepath.optimizer.deadline import Stopped
 from joulepath.optimizer.exceptions import DeclaredError
 from joulepath.optimizer.optimize import warm_up
 
+T = TypeVar("T")
+Outcome = Plan | Exception | Stopped
+"""A plan, or why there is none."""
 UNREACHABLE = "service-unreachable"
 """Type of the problem that no service answers."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -43,12 +48,13 @@ class _Work:
     """A plan to a goal.
 
     Attributes:
-        goal: returns the goal as `POST /optimize` has it; raises InvalidRequest.
+        fields: returns the fields of `POST /optimize` that the message has: `goal`, and perhaps
+            `start` and others; raises InvalidRequest.
         stamp: stamp of the message with the goal.
         stopped: set once the plan is of no use any more.
     """
 
-    goal: Callable[[], Json]
+    fields: Callable[[], Json]
     stamp: Json
     stopped: threading.Event = field(default_factory=threading.Event)
 
@@ -78,6 +84,8 @@ class PlanningNode(Node):
         self.joint_state: JointState | None = None
         """The last message on `joint_states`; None before the first."""
         self._work: _Work | None = None
+        self.scene: PlanningScene | None = None
+        """Obstacles of a planning scene; None without the messages of MoveIt."""
         self._pool = ThreadPoolExecutor(1)
         self._trajectories = self.create_publisher(JointTrajectory, "~/trajectory", LATCHED)
         self._summaries = self.create_publisher(String, "~/summary", LATCHED)
@@ -88,11 +96,20 @@ class PlanningNode(Node):
         self.create_subscription(JointState, "~/goal_joints", self._on_joints, 10)
         self.create_service(Trigger, "~/cancel", self._on_cancel)
         self.create_service(Trigger, "~/plan", self._on_plan)
+        if find_spec("moveit_msgs") is not None:
+            from joulepath.app.ros2.moveit import MoveitInterface
+
+            self.scene = MoveitInterface(self, own).scene
         if planner is None and own.robot and not own.url:
             self._planner = LocalPlanner(own.robot, own.prefix)
             self._pool.submit(warm_up, own.robot)
         elif planner is None and not own.robot:
             self.create_subscription(String, "robot_description", self._on_description, LATCHED)
+
+    @property
+    def planner(self) -> Planner | None:
+        """What computes the plans; None while no robot is known."""
+        return self._planner
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -111,8 +128,7 @@ class PlanningNode(Node):
         try:
             self._planner = LocalPlanner.of_description(own.description(message.data), own.prefix)
         except DeclaredError as error:
-            self.get_logger().error(str(error))
-            self._tell(_refused(error))
+            self.refuse(error)
 
     def _on_state(self, message: JointState) -> None:
         self.joint_state = message
@@ -129,22 +145,32 @@ class PlanningNode(Node):
             own.prefix,
             own.base_frame,
         )
-        self._begin(_Work(goal, _stamp(message.header.stamp)))
+        self._begin(_Work(lambda: {"goal": goal()}, _stamp(message.header.stamp)), self._plan)
 
     def _on_joints(self, message: JointState) -> None:
-        def goal() -> Json:
-            return {"q": self._positions("goal_joints", message)}
+        def fields() -> Json:
+            return {"goal": {"q": self._positions("goal_joints", message)}}
 
-        self._begin(_Work(goal, _stamp(message.header.stamp)))
+        self._begin(_Work(fields, _stamp(message.header.stamp)), self._plan)
 
-    def _begin(self, work: _Work) -> RosFuture[Json]:
-        """Plan in the other thread; an earlier plan ends."""
+    def outcome(self, fields: Callable[[], Json]) -> RosFuture[Outcome]:
+        """A plan that is not published, or its error; an earlier plan ends.
+
+        Args:
+            fields: returns fields of `POST /optimize`, of which `goal` is one; raises
+                InvalidRequest.
+        """
+        return self._begin(_Work(fields, {}), self._outcome)
+
+    def _begin(self, work: _Work, compute: Callable[[_Work], T]) -> RosFuture[T]:
+        """Compute in the other thread; an earlier plan ends."""
         if self._work is not None:
             self._work.stopped.set()
-        self._work, done = work, RosFuture[Json]()
+        self._work = work
+        done: RosFuture[T] = RosFuture()
 
         def plan() -> None:
-            done.set_result(self._plan(work))
+            done.set_result(compute(work))
             # a callback that awaits the plan goes on with the next turn of the executor
             if self.executor is not None:
                 self.executor.wake()
@@ -160,7 +186,7 @@ class PlanningNode(Node):
             )
             summary = _refused(error)
         else:
-            summary = await self._begin(_Work(self._work.goal, self._work.stamp))
+            summary = await self._begin(_Work(self._work.fields, self._work.stamp), self._plan)
         response.success = summary["state"] == "planned"
         response.message = _text(summary)
         return response
@@ -173,21 +199,26 @@ class PlanningNode(Node):
 
     def _plan(self, work: _Work) -> Json:
         """Publish the trajectory and the summary of a plan; returns the summary."""
-        try:
-            plan = self._planned(work)
-        except Stopped:
+        plan = self._outcome(work)
+        if isinstance(plan, Stopped):
             summary: Json = {"state": "cancelled"}
-        except DeclaredError as error:
-            summary = _refused(error)
-        except Exception as error:
-            self.get_logger().error(f"A defect of joulepath: {error!r}")
-            summary = _refused(error)
+        elif isinstance(plan, Exception):
+            summary = _refused(plan)
         else:
-            self._trajectories.publish(_trajectory(plan.trajectory))
+            self._trajectories.publish(trajectory_message(plan.trajectory))
             summary = summary_of(plan.answer)
         summary["goal_stamp"] = work.stamp
         self._tell(summary)
         return summary
+
+    def _outcome(self, work: _Work) -> Outcome:
+        try:
+            return self._planned(work)
+        except (Stopped, DeclaredError) as error:
+            return error
+        except Exception as error:
+            self.get_logger().error(f"A defect of joulepath: {error!r}")
+            return error
 
     def _planned(self, work: _Work) -> Plan:
         if work.stopped.is_set():
@@ -204,16 +235,21 @@ class PlanningNode(Node):
                 "No robot is known yet: publish its URDF on robot_description, or set the "
                 "parameter `robot`.",
             )
+        fields = work.fields()
+        if "start" not in fields:
+            fields["start"] = {"q": self._current()}
+        body = own.request() | fields
+        if self.scene is not None:
+            body["scene"] = self.scene.added_to(body.get("scene"))
+        return self._planner.plan(body, work.stopped.is_set)
+
+    def _current(self) -> list[float]:
         if self.joint_state is None:
             raise refusal(
                 ("joint_states",),
                 "No joint state has arrived: publish it on joint_states, or remap this topic.",
             )
-        ends = {
-            "start": {"q": self._positions("joint_states", self.joint_state)},
-            "goal": work.goal(),
-        }
-        return self._planner.plan(own.request() | ends, work.stopped.is_set)
+        return self._positions("joint_states", self.joint_state)
 
     def _positions(self, topic: str, message: JointState) -> list[float]:
         """The positions [rad] of the robot's joints; raises InvalidRequest."""
@@ -223,19 +259,10 @@ class PlanningNode(Node):
     def _tell(self, summary: Json) -> None:
         self._summaries.publish(String(data=_text(summary)))
 
-
-def _trajectory(fields: Json) -> JointTrajectory:
-    """The message. The stamp of its header is zero: a controller begins at once."""
-    points = [
-        JointTrajectoryPoint(
-            positions=each["positions"],
-            velocities=each["velocities"],
-            accelerations=each["accelerations"],
-            time_from_start=Duration(**each["time_from_start"]),
-        )
-        for each in fields["points"]
-    ]
-    return JointTrajectory(joint_names=fields["joint_names"], points=points)
+    def refuse(self, error: DeclaredError) -> None:
+        """Publish a problem that belongs to no goal."""
+        self.get_logger().error(str(error))
+        self._tell(_refused(error))
 
 
 def _refused(error: Exception) -> Json:

@@ -35,7 +35,7 @@ class Parameters:
     request_file: str = _parameter(
         "", "YAML or JSON file with further fields of POST /optimize: payload, tool, scene, limits."
     )
-    tip_link: str = _parameter("tool0", "With robot_description: link at the end of the arm.")
+    tip_link: str = _parameter("tool0", "Link at the end of the arm.")
     rated_payload: float = _parameter(0.0, "With robot_description: greatest payload [kg].")
     acceleration: float = _parameter(
         0.0, "With robot_description: limit of all joints [rad/s²]; 0: those of the URDF."

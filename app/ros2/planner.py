@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
@@ -57,6 +57,11 @@ class Planner(Protocol):
         """Names of the robot's joints, from base to tip."""
         ...
 
+    @property
+    def limits(self) -> Mapping[str, list[float]]:
+        """Limits on `velocity` [rad/s] and `acceleration` [rad/s²] of the joints."""
+        ...
+
     def plan(self, body: Json, is_stopped: Callable[[], bool]) -> Plan:
         """The plan for a body of `POST /optimize`.
 
@@ -83,7 +88,12 @@ class LocalPlanner:
         """
         self._prefix, self._figures, self._name = prefix, figures, robot
         with self._known():
-            self.joints: tuple[str, ...] = tuple(robot_named(robot).joint_names)
+            found = robot_named(robot)
+        self.joints: tuple[str, ...] = tuple(found.joint_names)
+        self.limits = {
+            "velocity": found.limits.v_max.tolist(),
+            "acceleration": found.limits.a_max.tolist(),
+        }
 
     @classmethod
     def of_description(cls, arm: Description, prefix: str = "") -> LocalPlanner:
@@ -141,7 +151,11 @@ class RemotePlanner:
             ServiceUnreachable: no service answers.
         """
         self._client, self._robot, self._prefix = client, robot, prefix
-        self.joints: tuple[str, ...] = tuple(client.get(f"/robots/{robot}")["joints"])
+        found = client.get(f"/robots/{robot}")
+        self.joints: tuple[str, ...] = tuple(found["joints"])
+        self.limits = {
+            name: found["limits"][name]["value"] for name in ("velocity", "acceleration")
+        }
 
     def plan(self, body: Json, is_stopped: Callable[[], bool]) -> Plan:
         """The plan for a body of `POST /optimize`."""

@@ -167,12 +167,24 @@ class ChainDerivatives:
         Returns:
             ∂U/∂q_j (n, nq) [N·m] and ∂²U/∂q_j∂q_k (n, nq, nq) [N·m/rad].
         """
+        z, levers = self._levers(q)
+        across = cross(np.broadcast_to(self.gravity, z.shape), z)
+        return -levers @ self.gravity, _symmetric(-across @ levers.transpose(0, 2, 1))
+
+    def gravity_curvature(self, q: Array) -> Array:
+        """|g| |z_k × S_k| at configurations q (n, nq) [rad], shape (n, nq) [N·m].
+
+        Whatever the joints up to k are, ∂³U / ∂q_j² ∂q_l is at most this for k = max(j, l).
+        """
+        levers = self._levers(q)[1]
+        return np.asarray(np.linalg.norm(self.gravity) * np.linalg.norm(levers, axis=-1))
+
+    def _levers(self, q: Array) -> tuple[Array, Array]:
+        """Axes z_j, and z_j × S_j, at configurations q (n, nq) [rad], shape (n, nq, 3) each."""
         z, o, _, c = self._frames(q)
         outer = np.cumsum(self.mass[::-1])[::-1]
         moments = _outward_sums(self.mass[:, None] * c) - outer[:, None] * o
-        levers = cross(z, moments)
-        across = cross(np.broadcast_to(self.gravity, z.shape), z)
-        return -levers @ self.gravity, _symmetric(-across @ levers.transpose(0, 2, 1))
+        return z, cross(z, moments)
 
     def joint_inertia(self, q: Array) -> Array:
         """Joint-space inertia M at configurations q (n, nq) [rad], with rotors, (n, nq, nq)

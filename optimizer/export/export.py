@@ -18,6 +18,7 @@ from joulepath.optimizer.export.csv_table import to_csv
 from joulepath.optimizer.export.facts import NOT_RUN, WrittenFile
 from joulepath.optimizer.export.formats import FormatName
 from joulepath.optimizer.export.franka import FrankaOptions, to_franka
+from joulepath.optimizer.export.joint_limits_file import LimitsOptions, to_joint_limits
 from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.krl import KrlOptions, to_krl
 from joulepath.optimizer.export.mcap_recording import McapOptions, to_mcap
@@ -39,6 +40,7 @@ ExportOptions = (
     | KrlOptions
     | TableOptions
     | McapOptions
+    | LimitsOptions
 )
 
 
@@ -92,6 +94,12 @@ FORMATS: dict[FormatName, Format] = {
     "npz": Format("Arrays for NumPy: samples and splines.", to_npz, TableOptions),
     "mcap": Format(
         "A recording of ROS 2 for Foxglove, PlotJuggler and `ros2 bag play`.", to_mcap, McapOptions
+    ),
+    "joint_limits": Format(
+        "The `joint_limits.yaml` that the torque limits imply in the postures of the motion, for "
+        "MoveIt and ros2_control.",
+        to_joint_limits,
+        LimitsOptions,
     ),
 }
 """The formats by name."""

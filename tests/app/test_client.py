@@ -47,6 +47,9 @@ def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
     robot = joulepath.load_robot("ur10e")
     assert service.load_robot("ur10e")["joints"] == list(robot.joint_names)
     assert service.mjcf("ur10e") == joulepath.mjcf(robot)
+    light = joulepath.Arm(robot=robot, payload=joulepath.Payload(mass=1.0))
+    limits = service.joint_limits("ur10e", mass=1.0, prefix="left_")
+    assert limits == joulepath.joint_limits(light).to_yaml("left_")
     tool = service.load_tool(joulepath.tool_names()[0])
     assert tool["name"] == joulepath.tool_names()[0]
 

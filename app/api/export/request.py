@@ -70,10 +70,9 @@ class UrscriptOptions(Request):
     )
 
 
-class MoveitOptions(Request):
-    """Options of `moveit`."""
+class LimitsOptions(Request):
+    """Options of `joint_limits`."""
 
-    encoding: Encoding | None = described(ENCODING, None, "json", default=None)
     prefix: str = described(
         "Prefix of all joint names, as in the robot's description in ROS.",
         None,
@@ -82,6 +81,12 @@ class MoveitOptions(Request):
         max_length=64,
         pattern=PREFIX,
     )
+
+
+class MoveitOptions(LimitsOptions):
+    """Options of `moveit`."""
+
+    encoding: Encoding | None = described(ENCODING, None, "json", default=None)
 
 
 class Ros2Options(MoveitOptions):
@@ -211,6 +216,9 @@ class ExportRequest(AnswerRequest):
         "Options of `krl`.", None, {"tolerance": 0.002}, default=None
     )
     mcap: McapOptions | None = described("Options of `mcap`.", None, {"period": 0.02}, default=None)
+    limits: LimitsOptions | None = described(
+        "Options of `joint_limits`.", None, {"prefix": "left_"}, default=None
+    )
 
 
 def option_field(format: FormatName) -> str | None:

@@ -20,6 +20,7 @@ from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.export import FORMATS
 from joulepath.optimizer.export.formats import FormatName
+from joulepath.optimizer.joint_limits.errors import NoJointLimits
 
 router = APIRouter(tags=["results"], route_class=LargeBodyRoute)
 
@@ -74,6 +75,7 @@ _FILE: dict[int | str, dict[str, Any]] = {
             UnknownAnswer,
             NotCertified,
             FormatUnsuitable,
+            NoJointLimits,
         ),
     },
 )

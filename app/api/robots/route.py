@@ -12,7 +12,7 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from joulepath.app.access.client import Client
-from joulepath.app.api.robots.mjcf import MjcfTask
+from joulepath.app.api.robots.files import Name
 from joulepath.app.api.robots.models import (
     Friction,
     FrictionLaw,
@@ -20,11 +20,9 @@ from joulepath.app.api.robots.models import (
     RobotList,
     RobotSummary,
 )
-from joulepath.app.api.robots.pictures import MEDIA_TYPE, PictureTask, digest, kept
 from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName
 from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
     ServiceClient,
     ServiceClientEngine,
     ServiceSettings,
@@ -34,11 +32,8 @@ from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import ADDING_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
-from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
-from joulepath.app.exceptions.stored import NoMeshes, RobotExists, StoreUnavailable
+from joulepath.app.exceptions.stored import RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.entity_tag import is_known
-from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
@@ -47,12 +42,10 @@ from joulepath.models.pictures import picture_sources
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import FrictionLaw as Law
 from joulepath.models.trust import TRUST, energy_trust
-from joulepath.models.urdf import urdf_of
-from joulepath.optimizer.exceptions import DeadlineExceeded, UnknownRobot
+from joulepath.optimizer.exceptions import UnknownRobot
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute)
 
-Name = Annotated[str, Path(description="Name of the robot, from `GET /robots`.", examples=["ur5e"])]
 NewName = Annotated[OwnName, Path(description="Name of the robot.", examples=["my_arm"])]
 
 _SECTIONS = (
@@ -135,98 +128,6 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     if name in robot_names():
         return _detail(name, load_robot(name).figures, added=False, owner=None, warnings=[])
     return _of_user(await store.read(partial(robots.get, name=name)))
-
-
-@router.get(
-    "/{name}/urdf",
-    summary="The URDF of a robot",
-    response_class=Response,
-    responses={
-        200: {
-            "content": {"application/xml": {"schema": {"type": "string"}}},
-            "description": "The URDF",
-        },
-        **problem_responses(UnknownRobot, StoreUnavailable),
-    },
-)
-async def urdf(name: Name, store: ServiceStore) -> Response:
-    """The chain of joints from `base` to `flange`, with masses, inertias and limits, without
-    meshes.
-    """
-    figures = load_robot(name).figures if name in robot_names() else None
-    if figures is None:
-        figures = (await store.read(partial(robots.get, name=name))).figures
-    return Response(urdf_of(name, figures), media_type="application/xml")
-
-
-@router.get(
-    "/{name}/mjcf",
-    summary="The MJCF of a robot, for MuJoCo",
-    response_class=Response,
-    responses={
-        200: {
-            "content": {"application/xml": {"schema": {"type": "string"}}},
-            "description": "The MJCF",
-        },
-        **problem_responses(
-            UnknownRobot, ShuttingDown, DeadlineExceeded, WorkerLost, StoreUnavailable
-        ),
-    },
-)
-async def mjcf(
-    request: Request, name: Name, settings: ServiceSettings, engine: ServiceArmEngine
-) -> Response:
-    """The chain of joints from `base` to `flange` with rotor inertias, friction, limits, torque
-    motors and the capsules of the links, for MuJoCo, whose torques are then those of the answers.
-    """
-    work = engine.run(MjcfTask(name, request.state.id), settings.max_deadline)
-    return result_response(await unless_disconnected(request, work))
-
-
-@router.get(
-    "/{name}/meshes.glb",
-    summary="The meshes of a robot",
-    response_class=Response,
-    responses={
-        200: {
-            "content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}},
-            "description": "The file",
-        },
-        304: {"description": "The client has it, by `If-None-Match`"},
-        **problem_responses(
-            UnknownRobot,
-            NoMeshes,
-            ShuttingDown,
-            DeadlineExceeded,
-            WorkerLost,
-            StoreUnavailable,
-        ),
-    },
-)
-async def meshes(
-    request: Request,
-    name: Name,
-    settings: ServiceSettings,
-    engine: ServiceClientEngine,
-    store: ServiceStore,
-) -> Response:
-    """The maker's meshes, simplified, as a glTF file with one node for each link, named as it and
-    in its frame. Where `has_meshes` of `GET /robots/{name}` is true."""
-    tag = await run_in_threadpool(digest, name) if name in robot_names() else None
-    if tag is None:
-        if name not in robot_names():
-            await store.read(partial(robots.get, name=name))
-        raise NoMeshes
-    headers = {"ETag": f'"{tag}"', "Cache-Control": "no-cache"}
-    if is_known(headers["ETag"], request):
-        return Response(status_code=304, headers=headers)
-    content = await run_in_threadpool(kept, name)
-    if content is None:
-        task = PictureTask(name, request.state.id)
-        content = (
-            await unless_disconnected(request, engine.run(task, settings.max_deadline))
-        ).document
-    return Response(content, headers=headers, media_type=MEDIA_TYPE)
 
 
 @router.put(

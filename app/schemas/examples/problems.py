@@ -34,6 +34,7 @@ from joulepath.optimizer.identify.errors import (
     PayloadUnknown,
 )
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.optimizer.joint_limits.errors import NoJointLimits
 from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
 from joulepath.optimizer.result.candidates import (
@@ -110,6 +111,7 @@ _EXAMPLES: dict[type[DeclaredError], DeclaredError] = {
             f"The stops/pick pose{_OUT_OF_REACH.removeprefix('The goal pose')}",
         ),
         NotCertified(0, "its velocity is at 1.31 of the limit", {"velocity": 1.31}),
+        NoJointLimits("shoulder_lift_joint", 758.0, 692.9),
         FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),
         LogTooLarge(1_000_000, "rows"),
         EffortNotUsable(

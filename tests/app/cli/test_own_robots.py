@@ -30,6 +30,10 @@ def test_a_robot_is_added_used_and_removed(here: Here, tmp_path: Path) -> None:
     written = here.run("robots", "mjcf", "cell_arm")[1]
     assert b'<mujoco model="cell_arm">' in written
     assert here.run("robots", "mjcf", str(file))[1] == written
+    limits = here.run("robots", "joint-limits", "cell_arm", "--mass", "0.5")[1]
+    assert b"up to 0.5 kg" in limits and b"max_acceleration" in limits
+    code, problem = here.problem("robots", "joint-limits", "cell_arm", "--mass", "-1")
+    assert (code, problem["type"]) == (2, "/problems/invalid-request")
     answer = run("optimize", "-", stdin=json.dumps(MOVE))
     assert answer.returncode == 0, answer.stderr
     assert json.loads(answer.stdout)["robot"] == "cell_arm"

@@ -24,6 +24,7 @@ const TITLES: Record<string, [title: string, about: string]> = {
   csv: ["Table, CSV", "Time, joints, speeds: for a spreadsheet."],
   json: ["Splines, JSON", "The curves themselves, for own code."],
   npz: ["Arrays, NPZ", "The samples for numpy."],
+  joint_limits: ["Joint limits", "A joint_limits.yaml that this path and payload can hold."],
   mcap: ["Recording, MCAP", "For Foxglove, PlotJuggler and ros2 bag play."],
 };
 const MAKERS: Record<string, [RegExp, string]> = {

@@ -1,0 +1,34 @@
+"""`joint_limits`: limits on speed and acceleration that the postures of a motion can hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from joulepath.optimizer.export.facts import WrittenFile
+from joulepath.optimizer.export.program import Program
+from joulepath.optimizer.joint_limits.joint_limits import joint_limits_along
+
+
+@dataclass(frozen=True)
+class LimitsOptions:
+    """Options of `joint_limits`."""
+
+    prefix: str = ""
+    """Prefix of all joint names."""
+
+
+def to_joint_limits(program: Program, options: LimitsOptions | None = None) -> WrittenFile:
+    """Write the joint limits of a program for planners that time its path anew.
+
+    Args:
+        program: the motion.
+        options: prefix; None for the defaults.
+
+    Raises:
+        NoJointLimits: gravity leaves too little torque in some posture.
+        DeadlinePassed: the watched deadline passed.
+    """
+    found = joint_limits_along([(move.spline, move.arm) for move in program.moves])
+    notes = ("the limits hold on this path alone, at other speeds and accelerations, too",)
+    text = found.to_yaml((options or LimitsOptions()).prefix)
+    return WrittenFile.of_text(text, "application/yaml", "yaml", notes)

@@ -1,0 +1,1 @@
+"""Limits on speed and acceleration that the torque limits imply."""

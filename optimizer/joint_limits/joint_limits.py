@@ -1,0 +1,234 @@
+"""Limits on speed and acceleration that keep all torque limits in every posture of a set."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import yaml
+
+from joulepath.models.robot import Array, Limits
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.joint_limits.errors import NoJointLimits
+from joulepath.optimizer.joint_limits.posture_set import PostureSet
+from joulepath.optimizer.joint_limits.posture_terms import PostureTerms
+from joulepath.optimizer.joint_limits.torque_cover import TorqueCover
+from joulepath.optimizer.joint_limits.torque_load import Rates, TorqueLoad, greatest_torques
+from joulepath.optimizer.joint_limits.widest_rates import widest_rates
+from joulepath.optimizer.linear_algebra import one_thread
+from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.problem.arm import Arm
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Settings of the search for limits."""
+
+    attempts: tuple[tuple[float, int], ...] = (
+        (0.1, 250_000),
+        (0.35, 150_000),
+        (0.65, 600_000),
+        (0.85, 600_000),
+    )
+    """Reserve of torque that a proof has to spare, relative to the torque that gravity and friction
+    leave, and the largest number of postures of the proof. With six joints the first attempt is
+    mostly enough, with seven often only the third.
+    """
+    samples: int = 2000
+    """Random postures with which the limits are compared before a proof."""
+    rounds: int = 100
+    """Largest number of proofs, and comparisons, of an attempt that end with a posture."""
+    slowest: float = 0.01
+    """Least factor on the speeds; motions that are slower are of no use."""
+    decimals: int = 4
+    """Decimals to which limits are rounded down."""
+
+
+SEARCH = SearchSettings()
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of joints, of which none lets a torque exceed its limit.
+
+    Attributes:
+        arm: the arm, with the payload for which they hold.
+        scope: the postures for which they hold, in words.
+        v: limits on speeds, shape (nq,) [rad/s].
+        a: limits on accelerations, shape (nq,) [rad/s²].
+        j: limits on jerks, those of the robot, shape (nq,) [rad/s³]; infinite without one.
+        spare: share of the torque that gravity and friction leave which the proof has to spare.
+    """
+
+    arm: Arm
+    scope: str
+    v: Array
+    a: Array
+    j: Array
+    spare: float
+
+    def to_yaml(self, prefix: str = "") -> str:
+        """The limits as `joint_limits.yaml` of MoveIt, which ros2_control has, too.
+
+        Args:
+            prefix: prefix of all joint names.
+
+        Returns:
+            The text of the file. A comment at its head says for what the limits hold.
+        """
+        limits = {}
+        for k, joint in enumerate(self.arm.robot.joint_names):
+            own = limits[prefix + joint] = dict[str, bool | float]()
+            for kind, most in (("velocity", self.v), ("acceleration", self.a), ("jerk", self.j)):
+                own[f"has_{kind}_limits"] = known = bool(np.isfinite(most[k]))
+                if known:
+                    own[f"max_{kind}"] = float(most[k])
+        payload = self.arm.payload
+        com = ", ".join(f"{x:.4g}" for x in payload.com)
+        head = (
+            f"joint_limits.yaml of {self.arm.robot.name}, for MoveIt and ros2_control",
+            "No torque exceeds its limit. Proven for all speeds and accelerations within these "
+            "limits at once,",
+            f"for {self.scope},",
+            f"and for payloads of up to {payload.mass:.4g} kg with the centre of mass ({com}) m in "
+            "the flange frame.",
+            f"The proof has {self.spare:.0%} of the torque to spare that gravity and friction "
+            "leave. Jerks are the robot's own limits.",
+        )
+        comment = "".join(f"# {line}\n" for line in head)
+        return comment + yaml.safe_dump({"joint_limits": limits}, sort_keys=False)
+
+
+def joint_limits(arm: Arm) -> JointLimits:
+    """Limits on speed and acceleration that keep the torque limits in every posture of an arm.
+
+    They are proven for all postures within the joint ranges, all speeds and accelerations within
+    the limits at once, and all payloads of the arm's centre of mass and radii of gyration up to its
+    mass. Speeds share one factor c of the robot's, and accelerations c², as of motions that take
+    1 / c times as long, unless a joint's limits can be raised further.
+
+    Args:
+        arm: the arm with its payload, mounting, friction and limits.
+
+    Returns:
+        The limits, none above that of the arm.
+
+    Raises:
+        NoJointLimits: gravity leaves too little torque in some posture.
+        DeadlinePassed: the watched deadline passed.
+    """
+    return _limits([(arm, PostureSet.of_ranges(arm))], "all postures within the joint ranges")
+
+
+def joint_limits_along(moves: Sequence[tuple[Spline, Arm]]) -> JointLimits:
+    """Limits on speed and acceleration that keep the torque limits in the postures of motions.
+
+    Args:
+        moves: motions of one robot, within the speed limits, each with its arm.
+
+    Returns:
+        The limits, as of `joint_limits`, but for the postures of the motions.
+
+    Raises:
+        NoJointLimits: gravity leaves too little torque in some posture.
+        DeadlinePassed: the watched deadline passed.
+    """
+    sets = [(arm, PostureSet.along(spline, arm)) for spline, arm in moves]
+    return _limits(sets, "the postures of the motion alone")
+
+
+class _Case:
+    """The postures of an arm with one payload."""
+
+    def __init__(self, load: TorqueLoad, chain: ChainDerivatives, postures: PostureSet) -> None:
+        self._load, self._chain, self._postures = load, chain, postures
+        self._q = postures.draw(SEARCH.samples)
+        self._samples = PostureTerms.of(chain, self._q)
+        self._binding = np.zeros((0, chain.nq))
+        self._bind(np.zeros((0, chain.nq)))
+        self.unit = np.ones(chain.nq)
+
+    def measure(self, creeping: Rates) -> tuple[Array, Array]:
+        """Torques (nq,) [N·m] that slow motions need at most, and those that are allowed."""
+        needed = greatest_torques(self._samples, creeping)
+        self._bind(self._q[np.unique(needed.argmax(axis=0))])
+        allowed = self._load.allowed(creeping)
+        self.unit = allowed - needed.max(axis=0)
+        return needed.max(axis=0), allowed
+
+    def spares(self, rates: Rates, spare: float) -> bool:
+        """Whether the binding postures have torque to spare, relative to the unit."""
+        return bool((self._excess(self._terms, rates) <= -spare).all())
+
+    def is_proven(self, rates: Rates, spare: float, evaluations: int) -> bool | None:
+        """Whether all postures hold the limits; None if one has less to spare, which then binds."""
+        excess = self._excess(self._samples, rates)
+        if excess.max() > -spare:
+            self._bind(self._q[np.unique(excess.argmax(axis=0))])
+            return None
+        allowed = self._load.allowed(rates)
+        cover = TorqueCover(
+            self._chain, rates, allowed, self.unit, self._postures, -spare, evaluations
+        )
+        proven = cover.holds()
+        self._bind(cover.violations)
+        return None if len(cover.violations) else proven
+
+    def _bind(self, q: Array) -> None:
+        self._binding = np.concatenate([self._binding, q])
+        self._terms = PostureTerms.of(self._chain, self._binding)
+
+    def _excess(self, terms: PostureTerms, rates: Rates) -> Array:
+        return (greatest_torques(terms, rates) - self._load.allowed(rates)) / self.unit
+
+
+@one_thread()
+def _limits(sets: Sequence[tuple[Arm, PostureSet]], scope: str) -> JointLimits:
+    arms = [arm for arm, _ in sets]
+    most = _common_limits(arms)
+    loads = [(TorqueLoad(arm), postures) for arm, postures in sets]
+    cases = [_Case(load, chain, postures) for load, postures in loads for chain in load.chains]
+    names = arms[0].robot.joint_names
+    creeping = Rates(SEARCH.slowest * most.v_max, SEARCH.slowest**2 * most.a_max)
+    needs = [case.measure(creeping) for case in cases]
+    torque, allowed = max(needs, key=lambda each: (each[0] / each[1]).max())
+    joint = int(np.argmax(torque / allowed))
+    refusal = NoJointLimits(names[joint], float(torque[joint]), float(allowed[joint]))
+    if any((case.unit <= 0).any() for case in cases):
+        raise refusal
+    for spare, evaluations in SEARCH.attempts:
+        rates = _proven(cases, most, spare, evaluations)
+        if rates is not None and (rates.v >= creeping.v).all() and (rates.a >= creeping.a).all():
+            down = 10.0**SEARCH.decimals
+            v, a = (np.floor(each * down) / down for each in (rates.v, rates.a))
+            heaviest = max(arms, key=lambda arm: arm.payload.mass)
+            return JointLimits(heaviest, scope, v, a, most.j_max, spare)
+    raise refusal
+
+
+def _proven(cases: Sequence[_Case], most: Limits, spare: float, evaluations: int) -> Rates | None:
+    """The widest limits with torque to spare at the binding postures that are proven for all; None
+    if no proof was found.
+    """
+    for _ in range(SEARCH.rounds):
+        rates = widest_rates(most, lambda each: all(case.spares(each, spare) for case in cases))
+        # postures that bind are found with some tolerance
+        found = [case.is_proven(rates, spare / 2, evaluations) for case in cases]
+        if all(found):
+            return rates
+        if False in found:
+            return None
+    return None
+
+
+def _common_limits(arms: Sequence[Arm]) -> Limits:
+    """The tightest limits on speed, acceleration and jerk of arms."""
+    first, *others = (arm.active_limits for arm in arms)
+    for each in others:
+        first = first.tightened(
+            v_max=np.minimum(first.v_max, each.v_max),
+            a_max=np.minimum(first.a_max, each.a_max),
+            j_max=np.minimum(first.j_max, each.j_max),
+        )
+    return first

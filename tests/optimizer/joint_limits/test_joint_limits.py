@@ -1,0 +1,154 @@
+"""Joint limits from torque, attacked with Pinocchio's inverse dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yaml
+
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.joint_limits.errors import NoJointLimits
+from joulepath.optimizer.joint_limits.joint_limits import (
+    JointLimits,
+    joint_limits,
+    joint_limits_along,
+)
+from joulepath.optimizer.joint_limits.posture_set import PostureSet
+from joulepath.optimizer.joint_limits.posture_terms import PostureTerms
+from joulepath.optimizer.joint_limits.torque_cover import TorqueCover
+from joulepath.optimizer.joint_limits.torque_load import Rates, TorqueLoad, greatest_torques
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.motion.spline import sample
+from joulepath.optimizer.motion.through_samples import spline_through
+from joulepath.optimizer.problem.arm import Arm, Payload
+from tests.optimizer.joint_limits.attack import torque_ratios, worst_ratio
+
+ROUNDING = 1e-9
+"""Rounding of torques [N·m], which are below 1e3 N·m."""
+HEAVY = {"gen3": 0.25, "ur20": 0.5, "xarm7": 0.25}
+"""Share of the rated payload that robots carry in all postures, if they cannot carry it all."""
+
+
+def loaded(name: str, share: float = 1.0, com: tuple[float, float, float] = (0, 0, 0)) -> Arm:
+    robot = load_robot(name)
+    mass = share * robot.rated_payload
+    return Arm(robot=robot, payload=Payload(mass, np.array(com), 0.01 * mass * np.eye(3)))
+
+
+@pytest.mark.parametrize("name", ["ur5e", "panda"])
+def test_the_terms_give_the_torques_of_pinocchio(name: str) -> None:
+    arm = loaded(name, com=(0.03, 0.02, 0.1))
+    model, random = rigid_body_model(arm), np.random.default_rng(0)
+    q, v, a = random.uniform(-3, 3, (3, 20, arm.robot.nq))
+    terms = PostureTerms.of(ChainDerivatives.of(arm), q)
+    bodies = (
+        np.einsum("nij,nj->ni", terms.inertia, a)
+        + np.einsum("nijk,nj,nk->ni", terms.velocity, v, v)
+        + terms.gravity
+    )
+    data = model.createData()
+    expected = np.array([pin.rnea(model, data, *each) for each in zip(q, v, a, strict=True)])
+    assert bodies + arm.drives.rotor_inertia * a == pytest.approx(expected, abs=ROUNDING)
+
+
+@pytest.mark.parametrize(("name", "half"), [("ur5e", 0.4), ("panda", 0.4), ("ur10e", 0.1)])
+def test_the_bound_of_a_box_holds_inside_it(name: str, half: float) -> None:
+    """And is near: a box is not refused without a reason."""
+    arm = loaded(name, com=(0.03, 0.02, 0.1))
+    limits = arm.active_limits
+    rates, nq = Rates(limits.v_max / 2, limits.a_max / 4), arm.robot.nq
+    random = np.random.default_rng(0)
+    boxes = PostureSet(random.uniform(-3, 3, (12, nq)), np.full((12, nq), half))
+    chain, unit = ChainDerivatives.of(arm), limits.tau_max
+    cover = TorqueCover(chain, rates, np.zeros(nq), unit, boxes, np.inf, 0)
+    bounds = -cover.first().value
+    for k in range(len(bounds)):
+        inside = PostureSet(boxes.centre[k : k + 1], boxes.half[k : k + 1]).draw(2000)
+        found = greatest_torques(PostureTerms.of(chain, inside), rates) / unit
+        assert found.max() <= bounds[k] <= 20 * found.max()
+
+
+def test_full_speed_is_refused_with_a_posture() -> None:
+    arm = loaded("ur5e")
+    most, load = arm.active_limits, TorqueLoad(arm)
+    rates, unit = Rates(most.v_max, most.a_max), most.tau_max
+    allowed = load.allowed(rates)
+    cover = TorqueCover(
+        load.chains[0], rates, allowed, unit, PostureSet.of_ranges(arm), 0.0, 100_000
+    )
+    assert not cover.holds()
+    found = greatest_torques(PostureTerms.of(load.chains[0], cover.violations), rates)
+    assert (found > allowed).any(axis=1).all()
+
+
+def attacked(arm: Arm, found: JointLimits) -> float:
+    limits = arm.active_limits
+    return worst_ratio(arm, Rates(found.v, found.a), limits.q_min, limits.q_max)
+
+
+def test_no_attack_exceeds_a_torque_limit() -> None:
+    """And one comes near it: the limits are not needlessly low."""
+    arm = loaded("ur5e", com=(0, 0, 0.1))
+    found = joint_limits(arm)
+    assert 0.9 < attacked(arm, found) <= 1
+    most = arm.active_limits
+    assert (found.v <= most.v_max).all() and (found.a <= most.a_max).all()
+    assert (found.v > 0.1 * most.v_max).all() and (found.a > 0.01 * most.a_max).all()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", robot_names())
+def test_no_attack_exceeds_a_torque_limit_of_any_robot(name: str) -> None:
+    arm = loaded(name, HEAVY.get(name, 1.0))
+    found = joint_limits(arm)
+    ratio = attacked(arm, found)
+    print(f"{name}: spare {found.spare:g}, v {found.v}, a {found.a}, worst ratio {ratio:.4f}")
+    assert ratio <= 1
+
+
+def test_narrower_ranges_leave_more() -> None:
+    arm = loaded("ur5e")
+    most = arm.active_limits
+    low, high = most.q_min.copy(), most.q_max.copy()
+    low[1:3], high[1:3] = (-2.0, 1.2), (-1.2, 2.4)
+    narrow = replace(arm, limits=most.tightened(q_min=low, q_max=high))
+    assert joint_limits(narrow).a[1] > 1.2 * joint_limits(arm).a[1]
+
+
+@pytest.mark.parametrize("name", HEAVY)
+def test_a_payload_that_gravity_makes_too_heavy(name: str) -> None:
+    with pytest.raises(NoJointLimits) as raised:
+        joint_limits(loaded(name))
+    assert raised.value.torque > raised.value.limit and raised.value.joint in str(raised.value)
+
+
+def test_the_postures_of_a_motion_hold_more() -> None:
+    arm = loaded("ur5e", com=(0, 0, 0.1))
+    start, goal = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.array([1, -1.2, 1.2, -1.6, -1.2, 0.5])
+    rest = np.zeros((2, 6))
+    spline = spline_through(np.array([0.0, 1.5]), np.stack([start, goal]), rest, rest)
+    here = joint_limits_along([(spline, arm)])
+    anywhere = joint_limits(arm)
+    assert (here.v >= anywhere.v).all() and here.a[1] > 1.5 * anywhere.a[1]
+    rates = Rates(here.v, here.a)
+    path = sample(spline, np.linspace(0, 1.5, 40))[0]
+    assert 0.8 < max(torque_ratios(arm, q, rates).max() for q in path) <= 1
+
+
+def test_the_file_of_moveit() -> None:
+    arm = loaded("ur5e", 0.5)
+    found = replace(joint_limits(arm), j=np.array([1.0, 1.0, np.inf, 1.0, 1.0, 1.0]))
+    limits = yaml.safe_load(found.to_yaml("left_"))["joint_limits"]
+    assert list(limits) == ["left_" + name for name in arm.robot.joint_names]
+    assert limits["left_elbow_joint"] == {
+        "has_velocity_limits": True,
+        "max_velocity": found.v[2],
+        "has_acceleration_limits": True,
+        "max_acceleration": found.a[2],
+        "has_jerk_limits": False,
+    }
+    assert "up to 2.5 kg" in found.to_yaml()
