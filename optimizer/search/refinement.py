@@ -11,6 +11,7 @@ from joulepath.optimizer.motion.spline import retimed, sampled
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sharpening import sharpen
+from joulepath.optimizer.search.sharper_cost import sharpen_cost
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import DURATION_TOLERANCE, SearchState
 from joulepath.optimizer.search.switch_knots import follow_switches
@@ -76,6 +77,7 @@ def refine(state: SearchState, candidate: Candidate) -> None:
     if method.may_grade(candidate.spline) and not deadline.passed:
         solve_from(state, candidate, sampled(candidate.spline), fine=True)
     start_from_fastest(state, candidate)
+    sharpen_cost(state, candidate)
     if not method.guess_baselines:
         return
     if state.uses_storage:
