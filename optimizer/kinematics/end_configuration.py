@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -38,7 +39,7 @@ class EndConfiguration:
     self_motion: SelfMotion | None = None
     """The curve that holds the target's pose, of which the configuration is a sample."""
 
-    @property
+    @cached_property
     def sampled(self) -> bool:
         """Whether infinitely many configurations reach the target, and this is a sample."""
         return self.tolerance is not None or self.self_motion is not None

@@ -47,7 +47,10 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.baseline import Baseline, BaselineName, Standing
-from joulepath.optimizer.result.energy import Energy, SavingInterval
+from joulepath.optimizer.result.energy import Energy, SavingInterval, Sensitivity
+
+NOT_IN_CYCLES: tuple[BaselineName, ...] = ("trapezoid", "quintic", "ruckig")
+"""Baselines of a motion with which no cycle is compared. Others may be, outside of a limit too."""
 
 Torques = Callable[[Array, Array, Array], Array]
 Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]
@@ -76,7 +79,8 @@ def baselines(
         broken_on_the_way: for samples q, v of motions, the limits along the path that each motion
             breaks, and its collisions.
     """
-    motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
+    q_goal = nearest(problem, q_start, q_goals)
+    motions = guesses(problem, q_start, q_goal, duration)
     # one call for all motions: a compiled kernel works through samples in blocks
     q, v, a = (
         np.concatenate([getattr(motion, name) for motion in motions.values()])
@@ -84,7 +88,7 @@ def baselines(
     )
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
     result = []
-    held = standing(problem.arm, nearest(problem, q_start, q_goals), torques)
+    held = standing(problem.arm, q_goal, torques)
     broken = broken_on_the_way(
         [motion.q for motion in motions.values()], [motion.v for motion in motions.values()]
     )
@@ -120,24 +124,36 @@ def compared(
     arm = problem.arm
     tau_friction = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
     energy = motion_energy(problem, motion, tau, potential, tau_friction)
-    spread = arm_spread(arm)
-    sensitivity = energy_sensitivity(
-        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, tau_friction
-    )
     if problem.dwell is not None:
         energy = energy.with_dwell(dwell_energy(problem.dwell, arm, held.power, motion.duration))
-        times = holding_times(problem.dwell, motion.duration)
-        sensitivity += waiting_sensitivity(arm, held.q, held.tau, *times, problem.dwell, spread)
+    reasons = [*broken_limits(problem, motion, tau, tau_friction), *broken]
+    sensitivity = None
+    if not reasons or name not in NOT_IN_CYCLES:
+        sensitivity = _sensitivity(problem, motion, tau, held, tau_friction)
     return Baseline(
         name=name,
         duration=motion.duration,
         electrical=energy.electrical.total,
         mechanical=energy.mechanical.total,
         saving=saving(ours, energy.of(problem.objective)),
-        reason="; ".join([*broken_limits(problem, motion, tau, tau_friction), *broken]) or None,
+        reason="; ".join(reasons) or None,
         sensitivity=sensitivity,
         at_goal=held,
     )
+
+
+def _sensitivity(
+    problem: Problem, motion: SampledMotion, tau: Array, held: Standing, tau_friction: Array
+) -> Sensitivity:
+    """Sensitivity of the energy of a motion and its dwell; arguments as of `compared`."""
+    arm, dwell, spread = problem.arm, problem.dwell, arm_spread(problem.arm)
+    moving = energy_sensitivity(
+        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, tau_friction
+    )
+    if dwell is None:
+        return moving
+    times = holding_times(dwell, motion.duration)
+    return moving + waiting_sensitivity(arm, held.q, held.tau, *times, dwell, spread)
 
 
 def standing(arm: Arm, q: Array, torques: Torques) -> Standing:
@@ -166,6 +182,7 @@ def with_savings(
     if problem.objective == "electrical":
         together = list[tuple[str, MotionEnergy]]()
         for each in usable:
+            assert each.sensitivity is not None
             theirs = MotionEnergy(each.electrical, each.sensitivity, each.duration)
             wait = 0.0 if problem.dwell is not None else each.duration - ours.duration
             if abs(wait) <= RATIO_TOLERANCE * ours.duration:
