@@ -29,7 +29,6 @@ from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, hold
 from joulepath.optimizer.dynamics.interval import (
     MotionEnergy,
     arm_spread,
-    saving_interval,
     saving_intervals,
 )
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
@@ -177,23 +176,19 @@ def with_savings(
         at_goal: the arm at its end.
     """
     usable = [each for each in table if each.within_limits]
-    savings: dict[str, SavingInterval | None] = dict.fromkeys(each.name for each in usable)
     values = {each.name: each.saving for each in usable}
+    savings = dict[BaselineName, SavingInterval]()
     if problem.objective == "electrical":
-        together = list[tuple[str, MotionEnergy]]()
+        longer, theirs = list[MotionEnergy](), list[MotionEnergy]()
         for each in usable:
             assert each.sensitivity is not None
-            theirs = MotionEnergy(each.electrical, each.sensitivity, each.duration)
+            known = MotionEnergy(each.electrical, each.sensitivity, each.duration)
             wait = 0.0 if problem.dwell is not None else each.duration - ours.duration
-            if abs(wait) <= RATIO_TOLERANCE * ours.duration:
-                together.append((each.name, theirs))
-                continue
-            longer = waited(ours, at_goal, wait, problem.arm) if wait > 0 else ours
-            theirs = waited(theirs, each.at_goal, -wait, problem.arm) if wait < 0 else theirs
-            values[each.name] = saving(longer.energy, theirs.energy)
-            savings[each.name] = saving_interval(longer, theirs, problem.arm)
-        intervals = saving_intervals(ours, [known for _, known in together], problem.arm)
-        savings |= {name: known for (name, _), known in zip(together, intervals, strict=True)}
+            wait = 0.0 if abs(wait) <= RATIO_TOLERANCE * ours.duration else wait
+            longer.append(waited(ours, at_goal, wait, problem.arm) if wait > 0 else ours)
+            theirs.append(waited(known, each.at_goal, -wait, problem.arm) if wait < 0 else known)
+            values[each.name] = saving(longer[-1].energy, theirs[-1].energy)
+        savings = dict(zip(values, saving_intervals(longer, theirs, problem.arm), strict=True))
     return [
         replace(each, saving=values.get(each.name), saving_interval=savings.get(each.name))
         for each in table
