@@ -52,7 +52,7 @@ NOT_IN_CYCLES: tuple[BaselineName, ...] = ("trapezoid", "quintic", "ruckig")
 """Baselines of a motion with which no cycle is compared. Others may be, outside of a limit too."""
 
 Torques = Callable[[Array, Array, Array], Array]
-Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]
+Broken = Callable[[Sequence[Array], Sequence[Array], Sequence[Array]], list[list[str]]]
 
 
 def baselines(
@@ -75,8 +75,8 @@ def baselines(
         ours: objective of our motion [J].
         torques: rigid-body and rotor torques (k, nq) from q, v, a (k, nq).
         potential: potential energy [J] of joint positions (nq,).
-        broken_on_the_way: for samples q, v of motions, the limits along the path that each motion
-            breaks, and its collisions.
+        broken_on_the_way: for samples q, v of motions and samples of their paths, the limits along
+            the path that each motion breaks, and its collisions.
     """
     q_goal = nearest(problem, q_start, q_goals)
     motions = guesses(problem, q_start, q_goal, duration)
@@ -88,8 +88,12 @@ def baselines(
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
     result = []
     held = standing(problem.arm, q_goal, torques)
+    # most take the straight line in joints, of which the same samples are checked for collisions
+    on_line = motions["straight"].q
     broken = broken_on_the_way(
-        [motion.q for motion in motions.values()], [motion.v for motion in motions.values()]
+        [motion.q for motion in motions.values()],
+        [motion.v for motion in motions.values()],
+        [motion.q if "ruckig" in name else on_line for name, motion in motions.items()],
     )
     for (name, motion), tau, words in zip(
         motions.items(), np.split(torques(q, v, a), ends), broken, strict=True

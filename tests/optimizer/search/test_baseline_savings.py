@@ -60,7 +60,7 @@ def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float
             [pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]
         ),
         lambda q: float(pin.computePotentialEnergy(model, data, q)),
-        lambda q, v: [[] for _ in q],
+        lambda q, v, paths: [[] for _ in q],
     )
 
 
