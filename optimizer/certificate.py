@@ -174,7 +174,7 @@ class _Replay:
         other quantities are polynomials, whose peaks exceed the samples by less than the tolerance
         of a ratio.
         """
-        samples = TorqueSamples(self.t[None], self.v[None], self.a[None], self.tau[None])
+        samples = TorqueSamples(*(x[None] for x in (self.t, self.v, self.a, self.tau, self._lost)))
         tau = torque_bounds(self.arm, self._spline.curve, self.torques, samples)[None]
         return limit_ratios(self.arm.active_limits, self.q, self.v, self.a, self.jerk, tau)
 

@@ -158,14 +158,17 @@ class PreparedProblem(Plant):
             goal=problem.goal if goal is None else goal,
         )
 
-    def broken_on_the_way(self, q: Sequence[Array], v: Sequence[Array]) -> list[list[str]]:
+    def broken_on_the_way(
+        self, q: Sequence[Array], v: Sequence[Array], paths: Sequence[Array]
+    ) -> list[list[str]]:
         """Violated path constraints and margins of several motions, in words.
 
         Args:
             q: positions of every motion, shape (k, nq) [rad].
             v: velocities of every motion, shape (k, nq) [rad/s].
+            paths: samples of its path that are checked for collisions, shape (m, nq) [rad].
         """
-        collisions = self.surroundings.worst_collisions(q)
+        collisions = self.surroundings.worst_collisions(paths)
         return [self._broken(*sampled) for sampled in zip(q, v, collisions, strict=True)]
 
     def _broken(self, q: Array, v: Array, collision: ClosestPair | None) -> list[str]:

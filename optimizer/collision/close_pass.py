@@ -39,6 +39,8 @@ def close_pass(arm: Arm, spline: Spline, clearance: Clearance | None) -> Clearan
     """
     if clearance is None or clearance.min_clearance >= CLOSE_PASS.distance:
         return None
+    if all(obstacle.margin == 0.0 for obstacle in arm.scene.obstacles):
+        return clearance
     without_margins = proven_clearance(model_without_margins(arm), spline)
     if without_margins is None or without_margins.min_clearance >= CLOSE_PASS.distance:
         return None

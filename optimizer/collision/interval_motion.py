@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -81,11 +82,16 @@ def _bernstein(powers: Array) -> Array:
 
     The values of a polynomial lie within the convex hull of its Bernstein coefficients.
     """
-    degree = len(powers) - 1
-    matrix = np.array(
+    degree, *others = powers.shape
+    return (_to_bernstein(degree - 1) @ powers.reshape(degree, -1)).reshape(degree, *others)
+
+
+@cache
+def _to_bernstein(degree: int) -> Array:
+    """Matrix (d + 1, d + 1) of the Bernstein coefficients of the powers from 0 to a degree d."""
+    return np.array(
         [
             [math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)]
             for i in range(degree + 1)
         ]
     )
-    return np.tensordot(matrix, powers, axes=1)

@@ -162,6 +162,7 @@ def controller_default(
         duration += move.duration
         held &= move.within_limits
         nodes.append(node)
+        assert move.sensitivity is not None
         sensitivities.append(move.sensitivity)
     duration += search.cycle.dwell_time
     if search.cycle.clamped_duration(duration) != duration:

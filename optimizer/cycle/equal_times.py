@@ -165,6 +165,7 @@ def _ways_of(cycle: Cycle, move: CycleMove, end: Deadline) -> dict[str, Baseline
 def _with_motion(energies: CycleEnergies, own: Solution, other: Baseline) -> CycleEnergies:
     """Energies of a cycle with one motion replaced."""
     known, gone = energies.electrical, own.sensitivity
+    assert other.sensitivity is not None
     return CycleEnergies(
         replace(
             known,

@@ -72,17 +72,17 @@ def saving_interval(ours: MotionEnergy, theirs: MotionEnergy, arm: Arm) -> Savin
     """Percentiles 5 and 95 and standard deviation of the saving 1 - ours / theirs, with errors
     common to both motions; the saving is 0 if theirs is 0.
     """
-    return saving_intervals(ours, [theirs], arm)[0]
+    return saving_intervals([ours], [theirs], arm)[0]
 
 
 def saving_intervals(
-    ours: MotionEnergy, theirs: Sequence[MotionEnergy], arm: Arm
+    ours: Sequence[MotionEnergy], theirs: Sequence[MotionEnergy], arm: Arm
 ) -> list[SavingInterval]:
-    """`saving_interval` for several energies."""
+    """`saving_interval` for several pairs of energies."""
     if not theirs:
         return []
     spread = arm_spread(arm)
-    first, second = _energy_draws(spread, [ours], 0), _energy_draws(spread, theirs, 1)
+    first, second = _energy_draws(spread, ours, 0), _energy_draws(spread, theirs, 1)
     size = np.abs(second)
     savings = np.divide(second - first, size, out=np.zeros_like(size), where=size > 0)
     statistics = np.append(_percentiles(savings), savings.std(axis=0)[None], axis=0)

@@ -114,6 +114,7 @@ class Plant:
         time: float = 0.0,
         regeneration: float | None = None,
         width: float = SMOOTHING.power_width,
+        friction_share: float = 1.0,
     ) -> Array:
         """Packed kernel parameters: the figures of the arm, and the weights of the cost.
 
@@ -125,6 +126,8 @@ class Plant:
                 supply takes back. It stands for an energy storage, since the cost of an instant
                 cannot depend on a charge.
             width: smoothing width of the corners of the cost [W].
+            friction_share: share of `SMOOTHING` over which the corners of friction are smoothed
+                [1].
         """
         payload, friction, drives, nq = (
             self.arm.payload,
@@ -143,7 +146,7 @@ class Plant:
             speed=friction.speed,
             viscous=friction.viscous,
             load=np.zeros(nq) if friction.load is None else friction.load,
-            bend=SMOOTHING.load_share * self.arm.robot.limits.tau_max,
+            bend=friction_share * SMOOTHING.load_share * self.arm.robot.limits.tau_max,
             torque_constant=drives.torque_constant,
             copper=drives.copper,
             inverter_constant=drives.inverter_constant,
@@ -157,7 +160,7 @@ class Plant:
             electrical=electrical,
             mechanical=mechanical,
             time=time,
-            knee=SMOOTHING.knee,
+            knee=friction_share * SMOOTHING.knee,
             width=width,
         ).pack()
 

@@ -71,6 +71,8 @@ class TorqueSamples:
     v: Array
     a: Array
     tau: Array
+    friction: Array | None = None
+    """Friction torques (m, p + 1, nq) [N·m] if they are known already."""
 
     @classmethod
     def of(cls, curve: BSpline, torques: Torques, t: Array) -> TorqueSamples:
@@ -100,7 +102,7 @@ def torque_bounds(
         settings: division of intervals.
     """
     limit = arm.active_limits.tau_max
-    smooth, friction = limited_parts(arm, samples.tau, samples.v, samples.a)
+    smooth, friction = limited_parts(arm, samples.tau, samples.v, samples.a, samples.friction)
     greatest_sum = np.abs(smooth).max(axis=(0, 1)) + np.abs(friction).max(axis=(0, 1))
     if (greatest_sum <= settings.far_below * limit).all():
         return np.asarray(np.abs(smooth + friction).max(axis=(0, 1)))
@@ -139,7 +141,7 @@ def _bounds(arm: Arm, samples: TorqueSamples, steady_change: float) -> tuple[Arr
     samples.
     """
     v, a = samples.v, samples.a
-    smooth, friction = limited_parts(arm, samples.tau, v, a)
+    smooth, friction = limited_parts(arm, samples.tau, v, a, samples.friction)
     total = smooth + friction
     size = np.abs(total)
     between = np.maximum(size[:, :-1], size[:, 1:]) + _chord_deviation(total)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -38,7 +39,7 @@ class EndConfiguration:
     self_motion: SelfMotion | None = None
     """The curve that holds the target's pose, of which the configuration is a sample."""
 
-    @property
+    @cached_property
     def sampled(self) -> bool:
         """Whether infinitely many configurations reach the target, and this is a sample."""
         return self.tolerance is not None or self.self_motion is not None
@@ -49,8 +50,9 @@ def joint_options(
 ) -> list[tuple[float, float]]:
     """Pairs of start and goal position of one joint, one pair for each displacement of interest.
 
-    A displacement beyond a full turn is left out unless it is the least one or an end is `fixed`:
-    without the full turn the same branches are nearer.
+    Displacements differ by full turns, whose number tells them apart. One beyond a full turn is
+    left out unless it is the least one or an end is `fixed`: without the full turn the same
+    branches are nearer.
 
     Args:
         starts: positions at the start that differ by full turns [rad].
@@ -69,9 +71,9 @@ def joint_options(
         return both[:1]
     if fixed:
         return both
-    kept: list[tuple[float, float]] = []
+    least = both[0][1] - both[0][0]
+    kept = {0: both[0]}
     for s, g in both:
-        is_new = all(abs((g - s) - (other[1] - other[0])) > EQUAL_DISPLACEMENT for other in kept)
-        if is_new and (not kept or abs(g - s) < FULL_TURN + EQUAL_DISPLACEMENT):
-            kept.append((s, g))
-    return kept
+        if abs(g - s) < FULL_TURN + EQUAL_DISPLACEMENT:
+            kept.setdefault(round((g - s - least) / FULL_TURN), (s, g))
+    return list(kept.values())

@@ -274,6 +274,7 @@ def graded(
     widest: float = 0.13,
     growth: float = np.inf,
     next_to_end: float = BASIS.end_margin,
+    least_nodes: int = BASIS.least_nodes,
 ) -> Basis:
     """Space with knots of multiplicity `repeat` at the switches (k,), and further knots between
     them.
@@ -287,6 +288,7 @@ def graded(
         widest: greatest length of a span.
         growth: greatest ratio of a span between two switches to the span before or after it.
         next_to_end: distance from an end of [0, 1] up to which a switch is left out.
+        least_nodes: least number of quadrature nodes.
     """
     edges = np.concatenate([[0.0], _inner(switches, next_to_end), [1.0]])
     spans = np.concatenate([[np.inf], np.diff(edges), [np.inf]])
@@ -294,7 +296,7 @@ def graded(
     for k, (a, b) in enumerate(pairwise(edges)):
         breaks += _between(a, b, spans[k], spans[k + 2], widest, growth)
         breaks += [b] * (repeat if b < 1.0 else 1)
-    return Basis.of(clamped(np.array(breaks)))
+    return Basis.of(clamped(np.array(breaks)), least_nodes)
 
 
 def _between(

@@ -67,8 +67,9 @@ class Baseline:
     the shorter motion also waits at its goal, held by the motors, until the longer one ends. Null
     if this motion is not within every limit, since it is then no valid comparison.
     """
-    sensitivity: Annotated[Sensitivity, Internal] = field(repr=False)
-    """Sensitivity of the electrical energy."""
+    sensitivity: Annotated[Sensitivity | None, Internal] = field(repr=False)
+    """Sensitivity of the electrical energy. None for a motion outside of a limit with which nothing
+    is compared."""
     at_goal: Annotated[Standing, Internal] = field(repr=False)
     """Arm at rest at the goal of this motion."""
     saving_interval: SavingInterval | None = None

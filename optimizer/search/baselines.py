@@ -29,7 +29,6 @@ from joulepath.optimizer.dynamics.dwell import holding_power, holding_times, wit
 from joulepath.optimizer.dynamics.interval import (
     MotionEnergy,
     arm_spread,
-    saving_interval,
     saving_intervals,
 )
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
@@ -47,10 +46,13 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.baseline import Baseline, BaselineName, Standing
-from joulepath.optimizer.result.energy import Energy, SavingInterval
+from joulepath.optimizer.result.energy import Energy, SavingInterval, Sensitivity
+
+NOT_IN_CYCLES: tuple[BaselineName, ...] = ("trapezoid", "quintic", "ruckig")
+"""Baselines of a motion with which no cycle is compared. Others may be, outside of a limit too."""
 
 Torques = Callable[[Array, Array, Array], Array]
-Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]
+Broken = Callable[[Sequence[Array], Sequence[Array], Sequence[Array]], list[list[str]]]
 
 
 def baselines(
@@ -73,10 +75,11 @@ def baselines(
         ours: objective of our motion [J].
         torques: rigid-body and rotor torques (k, nq) from q, v, a (k, nq).
         potential: potential energy [J] of joint positions (nq,).
-        broken_on_the_way: for samples q, v of motions, the limits along the path that each motion
-            breaks, and its collisions.
+        broken_on_the_way: for samples q, v of motions and samples of their paths, the limits along
+            the path that each motion breaks, and its collisions.
     """
-    motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
+    q_goal = nearest(problem, q_start, q_goals)
+    motions = guesses(problem, q_start, q_goal, duration)
     # one call for all motions: a compiled kernel works through samples in blocks
     q, v, a = (
         np.concatenate([getattr(motion, name) for motion in motions.values()])
@@ -84,9 +87,13 @@ def baselines(
     )
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
     result = []
-    held = standing(problem.arm, nearest(problem, q_start, q_goals), torques)
+    held = standing(problem.arm, q_goal, torques)
+    # most take the straight line in joints, of which the same samples are checked for collisions
+    on_line = motions["straight"].q
     broken = broken_on_the_way(
-        [motion.q for motion in motions.values()], [motion.v for motion in motions.values()]
+        [motion.q for motion in motions.values()],
+        [motion.v for motion in motions.values()],
+        [motion.q if "ruckig" in name else on_line for name, motion in motions.items()],
     )
     for (name, motion), tau, words in zip(
         motions.items(), np.split(torques(q, v, a), ends), broken, strict=True
@@ -120,24 +127,36 @@ def compared(
     arm = problem.arm
     tau_friction = friction_torque(arm.friction_law, arm.drives, tau, motion.v, motion.a)
     energy = motion_energy(problem, motion, tau, potential, tau_friction)
-    spread = arm_spread(arm)
-    sensitivity = energy_sensitivity(
-        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, tau_friction
-    )
     if problem.dwell is not None:
         energy = with_dwell(energy, problem.dwell, arm, held.power, motion.duration)
-        times = holding_times(problem.dwell, motion.duration)
-        sensitivity += waiting_sensitivity(arm, held.q, held.tau, *times, problem.dwell, spread)
+    reasons = [*broken_limits(problem, motion, tau, tau_friction), *broken]
+    sensitivity = None
+    if not reasons or name not in NOT_IN_CYCLES:
+        sensitivity = _sensitivity(problem, motion, tau, held, tau_friction)
     return Baseline(
         name=name,
         duration=motion.duration,
         electrical=energy.electrical.total,
         mechanical=energy.mechanical.total,
         saving=saving(ours, energy.of(problem.objective)),
-        reason="; ".join([*broken_limits(problem, motion, tau, tau_friction), *broken]) or None,
+        reason="; ".join(reasons) or None,
         sensitivity=sensitivity,
         at_goal=held,
     )
+
+
+def _sensitivity(
+    problem: Problem, motion: SampledMotion, tau: Array, held: Standing, tau_friction: Array
+) -> Sensitivity:
+    """Sensitivity of the energy of a motion and its dwell; arguments as of `compared`."""
+    arm, dwell, spread = problem.arm, problem.dwell, arm_spread(problem.arm)
+    moving = energy_sensitivity(
+        motion.weights, motion.q, motion.v, motion.a, tau, arm, spread, tau_friction
+    )
+    if dwell is None:
+        return moving
+    times = holding_times(dwell, motion.duration)
+    return moving + waiting_sensitivity(arm, held.q, held.tau, *times, dwell, spread)
 
 
 def standing(arm: Arm, q: Array, torques: Torques) -> Standing:
@@ -161,22 +180,19 @@ def with_savings(
         at_goal: the arm at its end.
     """
     usable = [each for each in table if each.within_limits]
-    savings: dict[str, SavingInterval | None] = dict.fromkeys(each.name for each in usable)
     values = {each.name: each.saving for each in usable}
+    savings = dict[BaselineName, SavingInterval]()
     if problem.objective == "electrical":
-        together = list[tuple[str, MotionEnergy]]()
+        longer, theirs = list[MotionEnergy](), list[MotionEnergy]()
         for each in usable:
-            theirs = MotionEnergy(each.electrical, each.sensitivity, each.duration)
+            assert each.sensitivity is not None
+            known = MotionEnergy(each.electrical, each.sensitivity, each.duration)
             wait = 0.0 if problem.dwell is not None else each.duration - ours.duration
-            if abs(wait) <= RATIO_TOLERANCE * ours.duration:
-                together.append((each.name, theirs))
-                continue
-            longer = waited(ours, at_goal, wait, problem.arm) if wait > 0 else ours
-            theirs = waited(theirs, each.at_goal, -wait, problem.arm) if wait < 0 else theirs
-            values[each.name] = saving(longer.energy, theirs.energy)
-            savings[each.name] = saving_interval(longer, theirs, problem.arm)
-        intervals = saving_intervals(ours, [known for _, known in together], problem.arm)
-        savings |= {name: known for (name, _), known in zip(together, intervals, strict=True)}
+            wait = 0.0 if abs(wait) <= RATIO_TOLERANCE * ours.duration else wait
+            longer.append(waited(ours, at_goal, wait, problem.arm) if wait > 0 else ours)
+            theirs.append(waited(known, each.at_goal, -wait, problem.arm) if wait < 0 else known)
+            values[each.name] = saving(longer[-1].energy, theirs[-1].energy)
+        savings = dict(zip(values, saving_intervals(longer, theirs, problem.arm), strict=True))
     return [
         replace(each, saving=values.get(each.name), saving_interval=savings.get(each.name))
         for each in table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -40,7 +41,7 @@ def explore(
         key=lambda each: each.energy or 0.0,
         default=None,
     )
-    queue = sorted(candidates, key=lambda each: (each.lower_bound, each.shortest))
+    queue = sorted(candidates, key=attrgetter("lower_bound", "shortest"))
     while queue:
         candidate = queue.pop(0)
         if candidate.status is not CandidateStatus.UNVISITED or candidate.deferred:

@@ -71,6 +71,6 @@ def _activate(state: SearchState) -> bool:
 
 def _activate_samples(state: SearchState, candidates: list[Candidate]) -> bool:
     """Activate some of the given candidates; false if none is deferred."""
-    if any(slides(state.prepared, each) for each in candidates):
+    if any(slides(state.prepared, each) for each in candidates if each.sampled):
         return activate_seeds(state.prepared, candidates)
     return activate_deferred(candidates)

@@ -14,6 +14,7 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.refinement import refine
+from joulepath.optimizer.search.sharper_cost import sharpen_cost
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
@@ -84,3 +85,4 @@ def _take(state: SearchState, best: Candidate, twin: Candidate, duration: float)
         and state.prepared.cost_of(motion) < FREED_DURATION.energy_ratio * before
     ):
         solve_from(state, best, sampled(motion), fine=True)
+        sharpen_cost(state, best)

@@ -52,6 +52,7 @@ def _joined(problem: Problem, parts: list[Baseline], ours: float) -> Baseline:
         sum(each.electrical for each in parts),
         sum(each.mechanical for each in parts),
     )
+    known = [each.sensitivity for each in parts if each.sensitivity is not None]
     return replace(
         parts[-1],
         duration=sum(each.duration for each in parts),
@@ -59,5 +60,5 @@ def _joined(problem: Problem, parts: list[Baseline], ours: float) -> Baseline:
         mechanical=mechanical,
         saving=saving(ours, electrical if problem.objective == "electrical" else mechanical),
         reason="; ".join(dict.fromkeys(each.reason for each in parts if each.reason)) or None,
-        sensitivity=reduce(add, [each.sensitivity for each in parts]),
+        sensitivity=reduce(add, known) if len(known) == len(parts) else None,
     )

@@ -25,7 +25,7 @@ def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
     motion = along(path, even_speed(best.duration))
     tau = prepared.torques(motion.q, motion.v, motion.a)
     held = standing(problem.arm, best.q_goal, prepared.torques)
-    (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
+    (broken,) = prepared.broken_on_the_way([motion.q], [motion.v], [motion.q])
     return [
         compared(problem, "trapezoid", motion, tau, held, best.energy, prepared.potential, broken)
     ]

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from joulepath.optimizer.dynamics.plant import has_corners
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import retimed, sampled
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sharpening import sharpen
+from joulepath.optimizer.search.sharper_cost import sharpen_cost
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import DURATION_TOLERANCE, SearchState
 from joulepath.optimizer.search.switch_knots import follow_switches
@@ -58,9 +61,18 @@ class FastestStartSettings:
 FASTEST_START = FastestStartSettings()
 
 
-def refine(state: SearchState, candidate: Candidate) -> None:
-    """Improve the motion of a solved candidate as far as the method and the deadline allow."""
-    method, problem, deadline = state.method, state.problem, state.deadline
+def refine(state: SearchState, candidate: Candidate, graded_below: float = np.inf) -> float | None:
+    """Improve the motion of a solved candidate as far as the method and the deadline allow.
+
+    Args:
+        state: state of the search.
+        candidate: the solved candidate.
+        graded_below: energy [J] below which the finest space is tried as well.
+
+    Returns:
+        The energy [J] saved by the finest space; None if it was not tried.
+    """
+    method, deadline = state.method, state.deadline
     candidate.refined = True
     sharpen(state, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
@@ -73,11 +85,20 @@ def refine(state: SearchState, candidate: Candidate) -> None:
             improve(state, candidate, lambda solver: solver.refined(coarse, fine=exact))
         if exact and candidate.spline is coarse and not state.deadline.passed:
             improve(state, candidate, lambda solver: solver.refined(coarse, fine=False))
-    if method.may_grade(candidate.spline) and not deadline.passed:
+    saved, energy = None, candidate.energy or 0.0
+    if method.may_grade(candidate.spline) and energy < graded_below and not deadline.passed:
         solve_from(state, candidate, sampled(candidate.spline), fine=True)
+        saved = energy - (candidate.energy or 0.0)
     start_from_fastest(state, candidate)
-    if not method.guess_baselines:
-        return
+    sharpen_cost(state, candidate)
+    if method.guess_baselines:
+        _start_otherwise(state, candidate)
+    return saved
+
+
+def _start_otherwise(state: SearchState, candidate: Candidate) -> None:
+    """Improve a candidate by solves with other values of the surplus or the longest duration."""
+    problem, deadline = state.problem, state.deadline
     if state.uses_storage:
         supply = problem.arm.regeneration
         for share in REFINEMENT.surplus_shares:
@@ -168,7 +189,11 @@ RIVALS = RivalSettings()
 
 
 def refine_rivals(
-    state: SearchState, best: Candidate, coarse: float, settings: RivalSettings = RIVALS
+    state: SearchState,
+    best: Candidate,
+    coarse: float,
+    saved: float | None,
+    settings: RivalSettings = RIVALS,
 ) -> None:
     """Refine other candidates that may come below the best one.
 
@@ -179,15 +204,16 @@ def refine_rivals(
         state: state of the search.
         best: the best candidate, refined.
         coarse: its energy before it was refined [J].
+        saved: energy that the finest space saved in it [J]; None if it was not tried.
         settings: settings of the choice.
     """
     problem = state.problem
     if has_corners(problem.objective, problem.arm) or best.energy is None:
         return
     in_time = problem.duration_max is not None and problem.duration_min == problem.duration_max
-    most = best.energy + (settings.gain_in_time if in_time else settings.gain) * (
-        coarse - best.energy
-    )
+    gain = settings.gain_in_time if in_time else settings.gain
+    most = best.energy + gain * (coarse - best.energy)
+    graded_below = np.inf if saved is None else best.energy + gain * saved
     for rival in state.candidates:
         is_open = (
             rival.energy is not None
@@ -200,7 +226,7 @@ def refine_rivals(
             and not (rival.start.sampled or rival.goal.sampled)
             and not state.deadline.passed
         ):
-            refine(state, rival)
+            refine(state, rival, graded_below)
 
 
 def lasts_below(ratio: float, state: SearchState, candidate: Candidate) -> bool:

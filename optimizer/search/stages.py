@@ -103,8 +103,8 @@ def refine_best(state: SearchState) -> None:
         return
     best = start_beside(state, best)
     coarse = best.energy or 0.0
-    refine(state, best)
-    refine_rivals(state, best, coarse)
+    saved = refine(state, best)
+    refine_rivals(state, best, coarse, saved)
     start_from_free_duration(state, state.best() or best)
 
 

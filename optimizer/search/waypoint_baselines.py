@@ -142,7 +142,7 @@ def along_waypoints(
     for name, given in motions.items():
         motion = _slowed(prepared, given, least)
         tau = prepared.torques(motion.q, motion.v, motion.a)
-        (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
+        (broken,) = prepared.broken_on_the_way([motion.q], [motion.v], [motion.q])
         found.append(
             compared(prepared.problem, name, motion, tau, held, ours, prepared.potential, broken)
         )

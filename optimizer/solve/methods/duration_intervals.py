@@ -10,10 +10,12 @@ at a constant `surplus_value`, and motions are compared by their exact energy.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.dwell import LinearDwell, holding_times, linear_dwells
 from joulepath.optimizer.dynamics.plant import SMOOTHING
+from joulepath.optimizer.motion.bspline import BASIS
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import DURATIONS
@@ -45,12 +47,16 @@ class DurationInterval:
     goal_holding: GoalHolding | None = None
     """Energy of waiting at another goal in a dwell; None without a dwell."""
 
+    least_nodes: int = BASIS.least_nodes
+    """Least number of quadrature nodes of the cost with knots at the switches of jerk."""
+
 
 def duration_intervals(
     prepared: PreparedProblem,
     q_goal: Array,
     surplus_value: float | None = None,
     width: float = SMOOTHING.power_width,
+    friction_share: float = 1.0,
 ) -> list[DurationInterval]:
     """Intervals of a problem, in order of duration.
 
@@ -60,27 +66,25 @@ def duration_intervals(
         surplus_value: value of a joule of net surplus with energy storage [1]; None for the highest
             possible value.
         width: width over which corners of the cost are smoothed [W].
+        friction_share: as in `Plant.parameters`.
     """
     problem = prepared.problem
     t_min = DURATIONS.least if problem.duration_min is None else problem.duration_min
     t_max = DURATIONS.longest if problem.duration_max is None else problem.duration_max
     if surplus_value is None and problem.arm.bus.mode == "storage":
         surplus_value = max(problem.arm.bus.efficiency, problem.arm.regeneration)
+    parameters = partial(
+        prepared.parameters,
+        regeneration=surplus_value,
+        width=width,
+        friction_share=friction_share,
+    )
     if problem.dwell is None or problem.objective == "mechanical":
-        weights = {problem.objective: 1.0}
-        return [
-            DurationInterval(
-                prepared.parameters(**weights, regeneration=surplus_value, width=width),
-                t_min,
-                t_max,
-            )
-        ]
+        return [DurationInterval(parameters(**{problem.objective: 1.0}), t_min, t_max)]
     hold = prepared.holding_power(q_goal)
     return [
         DurationInterval(
-            prepared.parameters(
-                electrical=1.0, time=-float(piece.power), regeneration=surplus_value, width=width
-            ),
+            parameters(electrical=1.0, time=-float(piece.power)),
             max(t_min, piece.t_min),
             min(t_max, piece.t_max),
             float(piece.constant),

@@ -51,7 +51,7 @@ class SplineMethod(SqpMethod):
     @cached_property
     def spaces(self) -> SplineSpaces:
         """Spline spaces of the candidate."""
-        return SplineSpaces(self.prepared, self.coordinates)
+        return SplineSpaces(self.prepared, self.coordinates, self.interval.least_nodes)
 
     @property
     def _progress(self) -> float:

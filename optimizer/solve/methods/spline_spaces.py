@@ -9,7 +9,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline, seven_segment
-from joulepath.optimizer.motion.bspline import Basis
+from joulepath.optimizer.motion.bspline import BASIS, Basis
 from joulepath.optimizer.motion.ramp_knots import RampKnots
 from joulepath.optimizer.motion.ruckig_motion import time_optimal, time_optimal_positions
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -46,6 +46,8 @@ class SplineSpaces:
 
     prepared: PreparedProblem
     coordinates: Coordinates
+    least_nodes: int = BASIS.least_nodes
+    """Least number of quadrature nodes of a space with knots at the switches of jerk."""
 
     @cached_property
     def shortest(self) -> float:
@@ -114,7 +116,7 @@ class SplineSpaces:
         switches = self.switches(duration)
         if self.is_slow(duration):
             return RAMPS.space(switches, multiplicity, SPLINE_SPACES.coarse_points)
-        return bspline.graded(switches, multiplicity)
+        return bspline.graded(switches, multiplicity, least_nodes=self.least_nodes)
 
     def of_first_solve(self, count: int, duration: float) -> Basis:
         """Space of a first solve: evenly spaced knots, and more of them at ramps.

@@ -17,10 +17,11 @@ def test_several_savings_are_each_one_by_itself() -> None:
     known = [
         MotionEnergy(e, Sensitivity(rng.normal(size=count(6)), 0.1), 1.5) for e in (50.0, 60.0, 0.0)
     ]
-    alone = [saving_interval(known[0], each, arm) for each in known]
-    for one, other in zip(saving_intervals(known[0], known, arm), alone, strict=True):
+    others = [known[1], known[0], known[0]]
+    alone = [saving_interval(*each, arm) for each in zip(others, known, strict=True)]
+    for one, other in zip(saving_intervals(others, known, arm), alone, strict=True):
         # means over the draws, summed in another order
         assert [one.p5, one.p95, one.sd] == pytest.approx(
             [other.p5, other.p95, other.sd], rel=1e-12, abs=1e-12
         )
-    assert saving_intervals(known[0], [], arm) == []
+    assert saving_intervals([], [], arm) == []
