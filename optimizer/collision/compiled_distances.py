@@ -108,7 +108,8 @@ class CompiledDistances:
         """Signed distance of the cores (k,) [m], normal and point (k, 3), as of
         `PairGeometry.witness_points`.
 
-        The distance is NaN if Coal or a cloud has to compute it.
+        The distance is NaN if Coal or a cloud has to compute it: that of overlapping cores without
+        a closed form, and that of clouds.
         """
         k = len(pair)
         distance, normal, point = np.empty(k), np.empty((k, 3)), np.empty((k, 3))

@@ -1,4 +1,4 @@
-"""Signed distances and witness points of pairs of bodies, in closed form or by Coal.
+"""Signed distances and witness points of pairs of bodies, by the C library or by Coal.
 
 One call computes many pairs at many configurations. Index arrays (k,) select the computed cases:
 `configuration` is a row of `frames` (n, nq + 1, 4, 4), the T_base_link [m] of every link, and
@@ -90,7 +90,7 @@ class PairGeometry:
         exceeds `within` [m], or of `part` (k,) if that is not negative.
         """
         result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair))
-        remaining = np.flatnonzero(~self.is_closed_form[pair])
+        remaining = np.flatnonzero(np.isnan(result.distance))
         of_cloud = self.is_cloud[pair[remaining]]
         for chosen, is_cloud in ((remaining[~of_cloud], False), (remaining[of_cloud], True)):
             if not chosen.size:

@@ -10,7 +10,7 @@
 #define BEADS 4
 
 /* the order of PairKind */
-enum { SEGMENT_SEGMENT, BOX_SEGMENT, SEGMENT_BOX, HALF_SPACE };
+enum { SEGMENT_SEGMENT, BOX_SEGMENT, SEGMENT_BOX, HALF_SPACE, CONVEX };
 
 /* Cores nearer than this [m] touch: the direction from one to the other is only rounding. Segments whose squared sine is
    below PARALLEL count as parallel: if they nearly touch, the nearest points may then be off by a ten-millionth of their
@@ -281,6 +281,8 @@ static double half_space(const Shapes *shapes, const double *frames, long config
   return least - radius * sine;
 }
 
+#include "convex.c"
+
 /* Signed distances (k), normals and points (k, 3) of pairs (k) at configurations (k). NAN where Coal or a cloud computes
    them. */
 void witness_points(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
@@ -303,6 +305,9 @@ void witness_points(const Shapes *shapes, const double *frames, long k, const lo
         break;
       case HALF_SPACE:
         found = half_space(shapes, frames, c, first, second, normal, point);
+        break;
+      case CONVEX:
+        found = convex_convex(shapes, frames, c, first, second, normal, point);
     }
     distance[j] = found;
   }

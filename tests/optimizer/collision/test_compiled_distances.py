@@ -21,6 +21,7 @@ from tests.optimizer.collision.test_closed_forms import COUNT, KINDS, NEARLY_PAR
 
 SAME = 1e-13  # m; both round
 ON_DISC = 1e-8  # m; the root of the rounding of a squared cosine
+SEARCHED = 5e-9  # m; Coal's iterations, and those of the library
 # normals of bodies nearer than this [m] are rounding, and of overlapping ones a choice among
 # several
 APART = 1e-6
@@ -105,7 +106,8 @@ def test_random_cells(seed: int) -> None:
     found, expected = (
         each.witness_points(frames, configuration, pair) for each in (model.geometry, by_numpy)
     )
-    assert np.abs(found.distance - expected.distance).max() < SAME
+    closed = model.geometry.is_closed_form[pair]
+    assert np.abs(found.distance - expected.distance)[closed].max() < SAME
     gradients = [
         each.gradients(frames, configuration, pair, expected) for each in (model.geometry, by_numpy)
     ]
@@ -157,5 +159,5 @@ def test_a_configuration_that_is_no_number_is_never_clear(within: float) -> None
         )
         distances.append(model.pair_distances(lost, within=within).distance)
         assert np.isnan(distances[-1][1]).any()
-        np.testing.assert_allclose(distances[-1][[0, 2]], found[[0, 2]], rtol=0, atol=SAME)
+        np.testing.assert_allclose(distances[-1][[0, 2]], found[[0, 2]], rtol=0, atol=SEARCHED)
     np.testing.assert_array_equal(np.isnan(distances[0]), np.isnan(distances[1]))
