@@ -49,12 +49,12 @@ class Coupling:
 
     @cached_property
     def leaders(self) -> list[int]:
-        """Number of the joint of the arm that turns each joint of the chain, shape (n,)."""
+        """Number of the joint of the arm that turns a joint of the chain, shape (n,)."""
         return [self.own.index(leader) for leader, _, _ in self.rows]
 
     @cached_property
     def matrix(self) -> Array:
-        """Derivatives (n, nq) of the positions of the chain's joints by those of the arm's."""
+        """Derivatives (n, nq) of the chain's positions by positions of the arm's joints."""
         matrix = np.zeros((len(self.rows), len(self.own)))
         matrix[range(len(self.rows)), self.leaders] = [multiplier for _, multiplier, _ in self.rows]
         return matrix
@@ -69,11 +69,11 @@ class Coupling:
         return np.asarray(q @ self.matrix.T + self.offset) if self.rows else q
 
     def rates(self, v: Array) -> Array:
-        """Rates (..., n) of the chain's joints, of any order, from those of the arm's (..., nq)."""
+        """Rates (..., n) of the chain's joints, of any order, from rates (..., nq) of the arm's."""
         return np.asarray(v @ self.matrix.T) if self.rows else v
 
     def on_arm(self, x: Array) -> Array:
-        """Torques or derivatives (..., nq) of the arm's joints from those of the chain's (..., n).
+        """Torques or derivatives (..., nq) of the arm's joints from (..., n) of the chain's joints.
 
         By virtual work, the torque of a follower acts on its leader, times the multiplier, and so
         does a derivative, by the chain rule.
@@ -81,7 +81,7 @@ class Coupling:
         return np.asarray(x @ self.matrix) if self.rows else x
 
     def reaches(self, half: Array) -> Array:
-        """Greatest moves (..., n) of the chain's joints from those of the arm's (..., nq)."""
+        """Greatest moves (..., n) of the chain's joints from moves (..., nq) of the arm's."""
         return np.asarray(half @ np.abs(self.matrix).T) if self.rows else half
 
     def most_on_arm(self, x: Array) -> Array:
@@ -91,11 +91,11 @@ class Coupling:
         return np.asarray(x @ np.abs(self.matrix)) if self.rows else x
 
     def of_links(self, x: Array) -> Array:
-        """Values (n,) of the links of the chain from those of the arm's joints (nq,)."""
+        """Values (n,) of the links of the chain from values (nq,) of the arm's joints."""
         return np.asarray(x[self.leaders]) if self.rows else x
 
     def of_motors(self, x: Array) -> Array:
-        """Values (n,) of the chain's joints from those of the arm's (nq,), zero for followers."""
+        """Values (n,) of the chain's joints from values (nq,) of the arm's, zero for followers."""
         if not self.rows:
             return x
         result = np.zeros(len(self.rows))

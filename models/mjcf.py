@@ -1,4 +1,4 @@
-"""The MJCF of a robot: its URDF's chain with what a URDF lacks, for simulations in MuJoCo.
+"""The MJCF of a robot: its URDF's chain with rotor inertias and friction, for MuJoCo.
 
 Rotor inertias are `armature`, Coulomb friction is `frictionloss`, and viscous friction `damping`.
 The torque of MuJoCo's inverse dynamics, without constraints, is therefore that of the links and
@@ -27,7 +27,7 @@ from joulepath.models.urdf import FLANGE
 
 @dataclass(frozen=True)
 class MjcfSettings:
-    """Settings of the simulation that the file describes."""
+    """Settings of the simulation in the file."""
 
     timestep: float = 1e-3
     """Time step [s]; the controllers of arms have 1 to 8 ms."""
@@ -55,7 +55,7 @@ def mjcf(robot: Robot) -> str:
         The text of the file; `mujoco.MjModel.from_xml_string` reads it.
 
     Raises:
-        ValueError: a link has no mass, which MuJoCo would refuse.
+        ValueError: a link has no mass; MuJoCo would refuse it.
     """
     for name, body in zip(robot.link_names[1:], list(robot.model.inertias)[1:], strict=True):
         if not body.mass > 0:
@@ -100,7 +100,7 @@ def mjcf(robot: Robot) -> str:
 
 
 def _followers(root: Element, robot: Robot) -> None:
-    """Binds the joints that follow others to these."""
+    """Binds followers to their leaders."""
     if not robot.coupling.follows:
         return
     equality, names = SubElement(root, "equality"), list(robot.model.names)[1:]
@@ -147,7 +147,7 @@ def _geom(link: Element, capsule: LinkCapsule) -> None:
 
 
 def _contacts(root: Element, robot: Robot) -> None:
-    """Excludes the pairs of links that never meet, or are next to each other."""
+    """Excludes pairs of links if they never meet or are neighbours."""
     contact, names = SubElement(root, "contact"), robot.link_names
     neighbours = {(k, k + 1) for k in range(robot.last_link)}
     for first, second in sorted(neighbours | robot.never_in_collision):

@@ -1,4 +1,4 @@
-"""How a file of a log is read: which columns hold what, in which units."""
+"""How a file of a log is read: its columns and their units."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ SHAPES = ("collision", "visual")
 
 @dataclass(frozen=True)
 class Estimate:
-    """Links whose masses and inertias are estimated, and those whose inertias were mended."""
+    """Links with estimated masses and inertias, and links with mended inertias."""
 
     links: tuple[str, ...] = ()
     mass: float = 0.0
@@ -32,7 +32,7 @@ class Estimate:
     mended: tuple[str, ...] = ()
 
     def warnings(self) -> list[str]:
-        """What was estimated, in sentences."""
+        """The estimates, in sentences."""
         found = list[str]()
         if self.links:
             found.append(
@@ -51,11 +51,11 @@ class Estimate:
 def add_inertials(
     root: Element, moving: Sequence[str], description: Description, checkpoint: Checkpoint
 ) -> Estimate:
-    """Adds an <inertial> to every moving link without one that has a shape, and replaces masses.
+    """Adds an <inertial> to every moving link with a shape but without one, and replaces masses.
 
     Args:
-        root: the URDF, which is changed.
-        moving: names of the links that move.
+        root: the URDF; it is changed.
+        moving: names of the moving links.
         description: `masses` and `density`; nothing is estimated without them.
         checkpoint: ends the computation by an exception.
 
@@ -96,7 +96,7 @@ def add_inertials(
 
 
 def _refuse_without_effect(description: Description, known: float) -> None:
-    """Refuses a total mass or a density where no mass is estimated, `known` [kg] being all."""
+    """Refuses a total mass or a density if no mass is estimated, `known` [kg] being all."""
     if not known > 0:
         raise InvalidArm(
             "meshes",
@@ -137,7 +137,7 @@ def _replaced(inertial: Element, mass: float | None, name: str) -> float:
 
 
 def _body(link: Element, meshes: Mapping[str, bytes], checkpoint: Checkpoint) -> pin.Inertia | None:
-    """Body of density one that fills the shapes of a link; None without a readable shape."""
+    """Body of density one in the shapes of a link; None without a readable shape."""
     for kind in SHAPES:
         parts = [
             part
@@ -152,7 +152,7 @@ def _body(link: Element, meshes: Mapping[str, bytes], checkpoint: Checkpoint) ->
 def _filled(
     shape: Element, link: str, meshes: Mapping[str, bytes], checkpoint: Checkpoint
 ) -> pin.Inertia | None:
-    """Body of density one that fills a shape, in the frame of the link."""
+    """Body of density one in a shape, in the frame of the link."""
     import trimesh  # only estimates need it
 
     geometry, where = shape.find("geometry"), f"A shape of link {link!r} has"

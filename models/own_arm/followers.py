@@ -1,4 +1,4 @@
-"""Joints of a URDF with a <mimic>: they follow joints that are held, or that move."""
+"""Joints of a URDF with a <mimic>: they follow held or moving joints."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Mimic:
 
 
 def with_followers(tree: UrdfTree, held: Mapping[str, float], given: set[str]) -> dict[str, float]:
-    """Positions [rad] or [m] of held joints, and of those that follow them. The positions of joints
+    """Positions [rad] or [m] of held joints and their followers. The positions of joints
     `given` by name stay.
     """
     positions, follows = dict(held), True
@@ -61,7 +61,7 @@ def with_followers(tree: UrdfTree, held: Mapping[str, float], given: set[str]) -
 
 
 def left_behind(tree: UrdfTree, names: Iterable[str], moving: Iterable[str]) -> list[str]:
-    """Those of the held joints `names` that follow moving ones by the URDF: of rods beside the
+    """The held joints among `names` with a moving leader in the URDF: of rods beside the
     chain, for example.
     """
     found, movers = list[str](), set(moving)

@@ -1,4 +1,4 @@
-"""Torques that an arm's own weight and acceleration take, and torque limits compared with them.
+"""Torques for an arm's own weight and acceleration, compared with the torque limits.
 
 Many URDFs have placeholders for the efforts: 1, 100 or 1000 for all joints. Friction and rotor
 inertia follow from the torque limits by `rules`, so a placeholder would invent joules.
@@ -36,7 +36,7 @@ SETTINGS = TorqueSettings()
 
 @dataclass(frozen=True)
 class HoldingTorques:
-    """Torques of each joint at its worst configuration, shape (nq,) [N·m].
+    """Torques of the joints, every joint at its worst configuration, shape (nq,) [N·m].
 
     `holding` is that of gravity without a payload, `needed` that of gravity and the acceleration
     limit with the rated payload at the tip.
@@ -47,7 +47,7 @@ class HoldingTorques:
 
     @staticmethod
     def of(chain: Chain, acceleration: Array, payload: float) -> HoldingTorques:
-        """Torques of a chain whose root link is upright.
+        """Torques of a chain with an upright root link.
 
         Args:
             chain: the chain.
@@ -81,7 +81,7 @@ class HoldingTorques:
         return np.where(self._are_placeholders(tau_max), usual, tau_max)
 
     def warnings(self, joints: tuple[str, ...], tau_max: Array) -> list[str]:
-        """Warnings of torque limits (nq,) [N·m] that the arm's own torques contradict."""
+        """Warnings of torque limits (nq,) [N·m] below or far above the arm's own torques."""
         weak = [
             f"Joint {joint!r} cannot hold the arm's own links everywhere: gravity takes up to "
             f"{torque:.3g} N·m, and its torque limit is {limit:.4g} N·m. If the URDF's `effort` is "

@@ -1,4 +1,4 @@
-"""What the joints of a URDF say beside their axes: friction, damping, acceleration and jerk."""
+"""Figures of the joints of a URDF beside their axes: friction, damping, acceleration and jerk."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class JointFacts:
-    """Figures of moving joints, shape (nq,) each; 0 where the URDF has none.
+    """Figures of moving joints, arrays of shape (nq,); 0 if the URDF has none.
 
     `acceleration` [rad/s²] and `jerk` [rad/s³] are limits of URDF 1.2, the lesser of `acceleration`
     and `deceleration`. `coulomb` [N·m] and `viscous` [N·m·s/rad] are `friction` and `damping` of
@@ -64,7 +64,7 @@ class JointFacts:
         """Warnings of implausible friction, and of elements without effect.
 
         Args:
-            given: figures of the drives that replace those of the URDF.
+            given: figures of the drives; they replace the figures of the URDF.
             joints: names of the joints.
             ruling: torques (nq,) [N·m] from which missing friction is ruled.
         """
@@ -101,7 +101,7 @@ def _has_ends_without_effect(joint: Element) -> bool:
 
 
 def _column(joints: list[Element], part: str, attribute: str) -> Array:
-    """An attribute (nq,) of all joints, 0 where it is missing or not above 0."""
+    """An attribute (nq,) of all joints, 0 if it is missing or not above 0."""
     values = [
         number(joint.find(part), attribute, f"Joint {name_of(joint)!r} has a <{part}>", "0")
         for joint in joints

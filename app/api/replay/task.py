@@ -1,4 +1,4 @@
-"""What `POST /replay` takes and answers, and its work in a worker."""
+"""Request, answer and work of `POST /replay`."""
 
 from __future__ import annotations
 
@@ -135,8 +135,7 @@ class ReplayTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /replay`, within about `deadline` seconds.
 
-        Raises PartsNeeded with the answers that must be kept at hand first, and what its parts
-        raise.
+        Raises PartsNeeded with the answers to be kept at hand first, and the errors of its parts.
         """
         simulator, end = f"MuJoCo {mujoco().__version__}", Deadline.after(deadline)
         began = end.clock()
@@ -164,7 +163,7 @@ class ReplayTask:
         return TaskResult.of_json(answer)
 
     def _planned(self) -> list[tuple[int | None, PlannedMotion]]:
-        """The motions of the answer, and of a cycle the index of each in `legs`."""
+        """The motions of the answer, with their indices in `legs` of a cycle."""
         given = self.asked.answer
         answer = kept_answers([given])[0] if isinstance(given, str) else given
         paths = paths_of_moves(answer)
@@ -207,7 +206,7 @@ class ReplayTask:
 
 
 def _perturbation(perturb: Perturb | None) -> dict[Quantity, float]:
-    """The fraction by which each quantity is changed."""
+    """The fractions by which the quantities are changed."""
     given: dict[Quantity, float | None] = (
         {} if perturb is None else {"payload": perturb.payload, "friction": perturb.friction}
     )

@@ -78,8 +78,9 @@ def _is_number(value: Any) -> bool:
 
 
 def rivals_of(rows: Sequence[Json]) -> dict[str, tuple[int, float, float]]:
-    """Of each baseline that keeps every limit in some rows: their number, and its energy and that
-    of the answers in them [J]. `nearest` is the one of each row against which least is saved.
+    """Of every baseline within every limit in some rows: their number, and the energies [J] of the
+    baseline and of the answers in them. `nearest` is the one of each row against which least is
+    saved.
     """
     found = dict[str, tuple[int, float, float]]()
     for row in answered(rows):

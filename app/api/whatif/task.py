@@ -1,4 +1,4 @@
-"""What `POST /whatif` takes, and its work in a worker: the base, then each change to it."""
+"""Request and work of `POST /whatif`: the base, then its changes one by one."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ class WhatifTask:
 
 
 class _Work:
-    """State and rows that both kinds of base share."""
+    """State and rows of both kinds of base."""
 
     def __init__(self, request: WhatifRequest, request_id: str, deadline: Deadline) -> None:
         self.request, self.request_id = request, request_id

@@ -1,5 +1,5 @@
-"""What an iteration of a study computes: the request that it gives, with the study's robot, figures
-and objective.
+"""The computation of an iteration of a study: its request, with the study's robot, figures and
+objective.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class StudyStep:
 
 @dataclass(frozen=True)
 class StudyStepTask:
-    """The body of an iteration that is too large to be looked at in the service's process."""
+    """The body of an iteration, too large to be looked at in the service's process."""
 
     body: IterationBody | HeldBody
     robot: str
@@ -54,7 +54,7 @@ class StudyStepTask:
 
 
 def study_step(body: IterationBody, robot: str, figures: str | None, objective: str) -> StudyStep:
-    """The step that a body gives. Raises InvalidProblem if it names another robot or objective than
+    """The step of a body. Raises InvalidProblem if it names another robot or objective than
     its study, or other figures."""
     step = body.root
     if isinstance(step, OptimizeStep):
@@ -70,7 +70,7 @@ def study_step(body: IterationBody, robot: str, figures: str | None, objective: 
 
 
 def large_step(result: TaskResult) -> StudyStep:
-    """The step that a StudyStepTask has made."""
+    """The step made by a StudyStepTask."""
     kind, sent, held, evaluate = pickle.loads(result.document)
     optimize: Any = None if held is None else HeldBody(*held)
     return StudyStep(kind, sent, optimize, evaluate)
