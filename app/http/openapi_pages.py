@@ -53,7 +53,15 @@ _ARM = {
     "Source": "source trust",
 }
 """Groups of the fields of an arm of a user's own."""
-_LONG = 20
+_FIGURES = {
+    "Arm": "robot title",
+    "Identified": "friction_laws drives electronics mains inertials",
+    "How well": "covariance session_sd move_sd",
+    "As the robot's own": "kinematics limits collision default_motion friction_table",
+    "Kept": "id created owner parameters",
+}
+"""Groups of the fields of a document of figures."""
+_LONG = 19
 """Least number of fields of a schema whose fields are grouped."""
 
 
@@ -73,7 +81,7 @@ def add_groups(schemas: dict[str, Any]) -> None:
     """Order the fields of long requests by their groups, whose names are in `x-group`."""
     for schema in schemas.values():
         fields = schema.get("properties", {})
-        for groups in (_MOTION, _ARM):
+        for groups in (_MOTION, _ARM, _FIGURES):
             places = {name: own for own, names in groups.items() for name in names.split()}
             if len(fields) >= _LONG and fields.keys() <= places.keys():
                 schema["properties"] = {

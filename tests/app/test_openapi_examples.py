@@ -207,7 +207,8 @@ def test_query_is_answered(operation: Operation, client: TestClient, study: str,
     step = {"evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5}}
     assert client.post(f"/studies/{study}/iterations", json=step).status_code == 201
     made = job if operation.path.startswith("/jobs") else study
-    answer = client.get(operation.path.format(id=made), params=operation.parameters("query"))
+    path = operation.path.format(**operation.parameters("path") | {"id": made})
+    answer = client.get(path, params=operation.parameters("query"))
     assert answer.status_code == 200, answer.text
     operation.check(answer)
 
