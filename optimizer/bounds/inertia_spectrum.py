@@ -96,5 +96,7 @@ class InertiaSpectrum:
 
 def _grid(values: Array, joints: int) -> Array:
     """Every combination of values of joints, shape (n, joints)."""
+    if not joints:
+        return np.zeros((1, 0))
     axes = np.meshgrid(*(values for _ in range(joints)), indexing="ij")
     return np.stack(axes, axis=-1).reshape(-1, joints)

@@ -10,8 +10,8 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class NoJointLimits(JoulepathError):
-    """In some posture, a joint needs nearly all of its torque, or more, to move its load slowly: no
-    limits on speed and acceleration are proven to keep the torque limits.
+    """No limits on speed and acceleration are proven to keep the torque limits in all postures. In
+    some posture, gravity takes nearly all torque of a joint, or more.
     """
 
     title = "No joint limits"
@@ -26,7 +26,8 @@ class NoJointLimits(JoulepathError):
 
     def __str__(self) -> str:
         return (
-            f"No limits on speed and acceleration are proven for all postures: gravity alone takes "
-            f"{self.torque:.4g} of the {self.limit:.4g} N·m that {self.joint} has after friction. "
-            "Give a lighter payload, or an arm with narrower joint ranges."
+            "No limits on speed and acceleration are proven for all postures. Joint "
+            f"{self.joint} has the least to spare: gravity takes up to {self.torque:.4g} of the "
+            f"{self.limit:.4g} N·m that friction leaves. Give a lighter payload, or an arm with "
+            "narrower joint ranges."
         )

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
-from joulepath.models.robot import Array, Limits
+from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.joint_limits.errors import NoJointLimits
 from joulepath.optimizer.joint_limits.posture_set import PostureSet
 from joulepath.optimizer.joint_limits.posture_terms import PostureTerms
@@ -18,7 +19,9 @@ from joulepath.optimizer.joint_limits.torque_load import Rates, TorqueLoad, grea
 from joulepath.optimizer.joint_limits.widest_rates import widest_rates
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.presentation.equality import same
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,8 @@ class SearchSettings:
     """Random postures with which the limits are compared before a proof."""
     rounds: int = 100
     """Largest number of proofs, and comparisons, of an attempt that end with a posture."""
+    most_joints: int = 7
+    """Largest number of joints: boxes of more have too many corners."""
     slowest: float = 0.01
     """Least factor on the speeds; motions that are slower are of no use."""
     decimals: int = 4
@@ -53,16 +58,16 @@ class JointLimits:
     """Limits of joints, of which none lets a torque exceed its limit.
 
     Attributes:
-        arm: the arm, with the payload for which they hold.
-        scope: the postures for which they hold, in words.
+        robot: the robot.
+        scope: the postures, mounting and payloads for which they hold, a line each.
         v: limits on speeds, shape (nq,) [rad/s].
         a: limits on accelerations, shape (nq,) [rad/s²].
         j: limits on jerks, those of the robot, shape (nq,) [rad/s³]; infinite without one.
         spare: share of the torque that gravity and friction leave which the proof has to spare.
     """
 
-    arm: Arm
-    scope: str
+    robot: Robot
+    scope: tuple[str, ...]
     v: Array
     a: Array
     j: Array
@@ -78,21 +83,17 @@ class JointLimits:
             The text of the file. A comment at its head says for what the limits hold.
         """
         limits = {}
-        for k, joint in enumerate(self.arm.robot.joint_names):
+        for k, joint in enumerate(self.robot.joint_names):
             own = limits[prefix + joint] = dict[str, bool | float]()
             for kind, most in (("velocity", self.v), ("acceleration", self.a), ("jerk", self.j)):
                 own[f"has_{kind}_limits"] = known = bool(np.isfinite(most[k]))
                 if known:
                     own[f"max_{kind}"] = float(most[k])
-        payload = self.arm.payload
-        com = ", ".join(f"{x:.4g}" for x in payload.com)
         head = (
-            f"joint_limits.yaml of {self.arm.robot.name}, for MoveIt and ros2_control",
+            f"joint_limits.yaml of {self.robot.name}, for MoveIt and ros2_control",
             "No torque exceeds its limit. Proven for all speeds and accelerations within these "
-            "limits at once,",
-            f"for {self.scope},",
-            f"and for payloads of up to {payload.mass:.4g} kg with the centre of mass ({com}) m in "
-            "the flange frame.",
+            "limits at once, for",
+            *(f"- {line}" for line in self.scope),
             f"The proof has {self.spare:.0%} of the torque to spare that gravity and friction "
             "leave. Jerks are the robot's own limits.",
         )
@@ -115,6 +116,7 @@ def joint_limits(arm: Arm) -> JointLimits:
         The limits, none above that of the arm.
 
     Raises:
+        InvalidProblem: the arm has more than seven joints, or joints that follow others.
         NoJointLimits: gravity leaves too little torque in some posture.
         DeadlinePassed: the watched deadline passed.
     """
@@ -131,11 +133,26 @@ def joint_limits_along(moves: Sequence[tuple[Spline, Arm]]) -> JointLimits:
         The limits, as of `joint_limits`, but for the postures of the motions.
 
     Raises:
+        InvalidProblem: the robot has more than seven joints, or joints that follow others.
         NoJointLimits: gravity leaves too little torque in some posture.
         DeadlinePassed: the watched deadline passed.
     """
     sets = [(arm, PostureSet.along(spline, arm)) for spline, arm in moves]
     return _limits(sets, "the postures of the motion alone")
+
+
+def _payloads(arms: Sequence[Arm]) -> str:
+    """The payloads for which the limits of arms hold, in words."""
+    first, *others = (arm.payload for arm in arms)
+    if any(not same(first, each) for each in others):
+        return "payloads of each move up to its own, with the same centre of mass"
+    com = ", ".join(f"{x:.4g}" for x in first.com)
+    moments = ", ".join(f"{x:.4g}" for x in np.linalg.eigvalsh(first.inertia))
+    size = f"principal moments of inertia ({moments}) kg·m² at this mass"
+    return (
+        f"payloads of up to {first.mass:.4g} kg with the centre of mass ({com}) m in the flange "
+        f"frame, {size if first.inertia.any() else 'as points'}"
+    )
 
 
 class _Case:
@@ -186,24 +203,34 @@ class _Case:
 @one_thread()
 def _limits(sets: Sequence[tuple[Arm, PostureSet]], scope: str) -> JointLimits:
     arms = [arm for arm, _ in sets]
+    robot = arms[0].robot
+    check_uncoupled(robot, "robot", "Joint limits are not proven")
+    if robot.nq > SEARCH.most_joints:
+        raise InvalidProblem(
+            "robot",
+            f"{robot.name} has {robot.nq} joints: joint limits are proven for at most "
+            f"{SEARCH.most_joints}.",
+        )
     most = _common_limits(arms)
     loads = [(TorqueLoad(arm), postures) for arm, postures in sets]
     cases = [_Case(load, chain, postures) for load, postures in loads for chain in load.chains]
-    names = arms[0].robot.joint_names
     creeping = Rates(SEARCH.slowest * most.v_max, SEARCH.slowest**2 * most.a_max)
     needs = [case.measure(creeping) for case in cases]
     torque, allowed = max(needs, key=lambda each: (each[0] / each[1]).max())
     joint = int(np.argmax(torque / allowed))
-    refusal = NoJointLimits(names[joint], float(torque[joint]), float(allowed[joint]))
+    refusal = NoJointLimits(robot.joint_names[joint], float(torque[joint]), float(allowed[joint]))
     if any((case.unit <= 0).any() for case in cases):
         raise refusal
     for spare, evaluations in SEARCH.attempts:
         rates = _proven(cases, most, spare, evaluations)
-        if rates is not None and (rates.v >= creeping.v).all() and (rates.a >= creeping.a).all():
-            down = 10.0**SEARCH.decimals
-            v, a = (np.floor(each * down) / down for each in (rates.v, rates.a))
-            heaviest = max(arms, key=lambda arm: arm.payload.mass)
-            return JointLimits(heaviest, scope, v, a, most.j_max, spare)
+        if rates is None:
+            continue
+        down = 10.0**SEARCH.decimals
+        v, a = (np.floor(each * down) / down for each in (rates.v, rates.a))
+        if (v >= creeping.v).all() and (a > 0).all() and (rates.a >= creeping.a).all():
+            gravity = ", ".join(f"{x:.4g}" for x in arms[0].gravity)
+            mounting = f"gravity ({gravity}) m/s² in the base frame"
+            return JointLimits(robot, (scope, mounting, _payloads(arms)), v, a, most.j_max, spare)
     raise refusal
 
 

@@ -9,8 +9,10 @@ import pinocchio as pin
 import pytest
 import yaml
 
+from joulepath.models.own_arm.description import Description
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.joint_limits.errors import NoJointLimits
 from joulepath.optimizer.joint_limits.joint_limits import (
     JointLimits,
@@ -25,8 +27,18 @@ from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm, Payload
+from tests.models.own_arm.arms import robot
+from tests.models.own_arm.palletiser import ACROSS, UP, joint, link
+from tests.models.own_arm.palletiser import description as palletiser
 from tests.optimizer.joint_limits.attack import torque_ratios, worst_ratio
 
+HOME, REST = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.zeros((2, 6))
+PENDULUM = (
+    '<robot name="pendulum"><link name="base"/>'
+    + link("bar", 8.0, "0.2 0 0.1")
+    + joint("turn", "base bar", "0 0 0.3", ACROSS, "-2.9 2.9")
+    + "</robot>"
+)
 ROUNDING = 1e-9
 """Rounding of torques [N·m], which are below 1e3 N·m."""
 HEAVY = {"gen3": 0.25, "ur20": 0.5, "xarm7": 0.25}
@@ -129,8 +141,7 @@ def test_a_payload_that_gravity_makes_too_heavy(name: str) -> None:
 def test_the_postures_of_a_motion_hold_more() -> None:
     arm = loaded("ur5e", com=(0, 0, 0.1))
     start, goal = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.array([1, -1.2, 1.2, -1.6, -1.2, 0.5])
-    rest = np.zeros((2, 6))
-    spline = spline_through(np.array([0.0, 1.5]), np.stack([start, goal]), rest, rest)
+    spline = spline_through(np.array([0.0, 1.5]), np.stack([start, goal]), REST, REST)
     here = joint_limits_along([(spline, arm)])
     anywhere = joint_limits(arm)
     assert (here.v >= anywhere.v).all() and here.a[1] > 1.5 * anywhere.a[1]
@@ -151,4 +162,40 @@ def test_the_file_of_moveit() -> None:
         "max_acceleration": found.a[2],
         "has_jerk_limits": False,
     }
-    assert "up to 2.5 kg" in found.to_yaml()
+    head = found.to_yaml().partition("joint_limits:\n")[0]
+    assert "up to 2.5 kg" in head and "moments of inertia (0.025, 0.025, 0.025)" in head
+    assert "gravity (0, 0, -9.81) m/s²" in head
+
+
+def test_the_file_of_several_moves_claims_no_payload_for_all() -> None:
+    spline = spline_through(np.array([0.0, 1.5]), np.array([HOME, HOME + 0.3]), REST, REST)
+    moves = [(spline, loaded("ur5e", share)) for share in (1.0, 0.0)]
+    head = joint_limits_along(moves).to_yaml()
+    assert "payloads of each move up to its own" in head and "5 kg" not in head
+
+
+def test_a_single_joint_is_limited_by_the_torque_of_a_pendulum() -> None:
+    """In all postures of a horizontal axis: I a + m g r, without friction and at any speed."""
+    bar = robot(Description(urdf=PENDULUM, tip="bar", acceleration=500.0, payload=1.0))
+    arm = Arm(robot=bar)
+    found = joint_limits(arm)
+    (a,), (ratio,) = found.a, torque_ratios(arm, np.array([0.0]), Rates(found.v, found.a))
+    assert 0 < a < 500.0 and 0.8 < ratio <= 1
+
+
+def test_an_arm_of_eight_joints_is_refused() -> None:
+    links = "".join(
+        link(f"l{k}", 2.0, "0.02 0 0.1")
+        + joint(f"j{k}", f"l{k - 1} l{k}", "0 0 0.2", UP if k % 2 else ACROSS, "-2.5 2.5")
+        for k in range(1, 9)
+    )
+    urdf = f'<robot name="snake"><link name="l0"/>{links}</robot>'
+    snake = robot(Description(urdf=urdf, tip="l8", acceleration=8.0, payload=1.0))
+    with pytest.raises(InvalidProblem, match="8 joints"):
+        joint_limits(Arm(robot=snake))
+
+
+def test_an_arm_with_followers_is_refused() -> None:
+    with pytest.raises(InvalidProblem, match="follow others") as raised:
+        joint_limits(Arm(robot=robot(palletiser())))
+    assert raised.value.field == "robot"
