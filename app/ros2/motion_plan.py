@@ -56,7 +56,7 @@ def error_code(error: BaseException) -> int:
 def request_of(
     request: Any, names: JointNames, limits: Mapping[str, Any], frame: str, link: str
 ) -> Json:
-    """The fields of `POST /optimize` that a moveit_msgs/msg/MotionPlanRequest has.
+    """A moveit_msgs/msg/MotionPlanRequest as fields of `POST /optimize`.
 
     Args:
         request: the message.
@@ -64,10 +64,10 @@ def request_of(
         limits: `limits` of `POST /optimize`, of which its factors scale `velocity` [rad/s] and
             `acceleration` [rad/s²].
         frame: frame of the robot's base.
-        link: link whose pose a goal may constrain, which has the TCP.
+        link: the link with the TCP; a goal may constrain its pose.
 
     Raises:
-        InvalidRequest: the request asks for what plans do not have; the error names the field.
+        InvalidRequest: no plan can fulfil a field of the request; the error names it.
     """
     for field in ("path_constraints", "trajectory_constraints"):
         asked = getattr(request, field)

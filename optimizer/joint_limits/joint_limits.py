@@ -55,15 +55,15 @@ SEARCH = SearchSettings()
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of joints, of which none lets a torque exceed its limit.
+    """Limits of joints within which no torque exceeds its limit.
 
     Attributes:
         robot: the robot.
         scope: the postures, mounting and payloads for which they hold, a line each.
         v: limits on speeds, shape (nq,) [rad/s].
         a: limits on accelerations, shape (nq,) [rad/s²].
-        j: limits on jerks, those of the robot, shape (nq,) [rad/s³]; infinite without one.
-        spare: share of the torque that gravity and friction leave which the proof has to spare.
+        j: the robot's own limits on jerks, shape (nq,) [rad/s³]; infinite without one.
+        spare: torque to spare in the proof, as a share of the torque left by gravity and friction.
     """
 
     robot: Robot
@@ -74,13 +74,13 @@ class JointLimits:
     spare: float
 
     def to_yaml(self, prefix: str = "") -> str:
-        """The limits as `joint_limits.yaml` of MoveIt, which ros2_control has, too.
+        """The limits as a `joint_limits.yaml` for MoveIt and ros2_control.
 
         Args:
             prefix: prefix of all joint names.
 
         Returns:
-            The text of the file. A comment at its head says for what the limits hold.
+            The text of the file. A comment at its head states the scope of the limits.
         """
         limits = {}
         for k, joint in enumerate(self.robot.joint_names):
@@ -94,8 +94,8 @@ class JointLimits:
             "No torque exceeds its limit. Proven for all speeds and accelerations within these "
             "limits at once, for",
             *(f"- {line}" for line in self.scope),
-            f"The proof has {self.spare:.0%} of the torque to spare that gravity and friction "
-            "leave. Jerks are the robot's own limits.",
+            f"Of the torque left by gravity and friction, the proof has {self.spare:.0%} to spare. "
+            "Jerks are the robot's own limits.",
         )
         comment = "".join(f"# {line}\n" for line in head)
         return comment + yaml.safe_dump({"joint_limits": limits}, sort_keys=False)
@@ -167,7 +167,7 @@ class _Case:
         self.unit = np.ones(chain.nq)
 
     def measure(self, creeping: Rates) -> tuple[Array, Array]:
-        """Torques (nq,) [N·m] that slow motions need at most, and those that are allowed."""
+        """Greatest torques (nq,) [N·m] of slow motions, and the torques allowed."""
         needed = greatest_torques(self._samples, creeping)
         self._bind(self._q[np.unique(needed.argmax(axis=0))])
         allowed = self._load.allowed(creeping)
@@ -235,7 +235,7 @@ def _limits(sets: Sequence[tuple[Arm, PostureSet]], scope: str) -> JointLimits:
 
 
 def _proven(cases: Sequence[_Case], most: Limits, spare: float, evaluations: int) -> Rates | None:
-    """The widest limits with torque to spare at the binding postures that are proven for all; None
+    """The widest limits with torque to spare at the binding postures, proven for all postures; None
     if no proof was found.
     """
     for _ in range(SEARCH.rounds):

@@ -7,10 +7,10 @@ an interpolated term is a mean of those at the corners. Hence the greatest |τ_i
 that at its corners plus this deviation.
 
 Bounds on the second derivatives of inertia and velocity terms hold for all postures
-(`chain_derivatives`). That of gravity by joint k is at most |g| |z_m × S_m| with the larger m of k
-and i, which is small where the joint turns what lies beyond it about its own centre of mass. S_m
-depends on the joints beyond m, so that by the same rule |z_m × S_m| is at most its value at the
-corners plus Σ_{l>m} h_l² / 2 · |z_l × S_l|.
+(`chain_derivatives`). The second derivative of gravity torque i by joint k is at most
+|g| |z_m × S_m| with the larger m of k and i. This is small if joint m turns the links beyond it
+about their centre of mass. S_m depends on the joints beyond m: by the same rule, |z_m × S_m| is at
+most its value at the corners plus Σ_{l>m} h_l² / 2 · |z_l × S_l|.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The widest limits on speeds and accelerations at which a condition holds.
+"""The widest limits on speeds and accelerations under a condition.
 
-All limits have one factor c in common at first: c times the largest speeds, c² times the largest
-accelerations, as of motions that take 1 / c times as long. Then those that the condition does not
-stop are raised further, by one factor again, and so on.
+At first, one factor c is common to all limits: c times the largest speeds and c² times the largest
+accelerations, like motions slowed down to 1 / c times their duration. Limits without effect on the
+condition are then raised further, again by a common factor, until none is left.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ class WideningSettings:
     """Settings of the widening."""
 
     bisections: int = 12
-    """Bisections of a factor, which leave 1 / 4096 of its range."""
+    """Bisections of a factor; 1 / 4096 of its range is left."""
     step: float = 1.02
-    """Factor by which each limit is raised alone, to see whether the condition stops it."""
+    """Factor on a single limit, to see whether the condition stops it."""
 
 
 WIDENING = WideningSettings()
 
 
 def widest_rates(most: Limits, holds: Callable[[Rates], bool]) -> Rates:
-    """Limits of which the least factor is as large as possible, then the second least, and so on.
+    """Limits with the greatest possible least factor, then the greatest second least, and so on.
 
     Args:
         most: the largest limits.
-        holds: the condition, which holds for all limits below those for which it holds.
+        holds: the condition; if it holds for some limits, it holds for all lower limits.
     """
 
     def rates(factors: Array) -> Rates:

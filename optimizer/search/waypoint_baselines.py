@@ -150,7 +150,7 @@ def along_waypoints(
 
 
 def in_a_row(legs: Sequence[SampledMotion]) -> SampledMotion:
-    """One motion of several, each of which begins where and when the one before ends."""
+    """One motion of several in a row; each begins at the end of the motion before."""
     begins = np.cumsum([0.0, *(leg.duration for leg in legs)])
     joined = {
         name: np.concatenate([getattr(leg, name) for leg in legs])
