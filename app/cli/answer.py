@@ -118,10 +118,10 @@ def compile_kernel_of(robot_name: str) -> None:
     from joulepath.optimizer.exceptions import UnknownRobot
     from joulepath.optimizer.native.library_cache import CACHE, CompilerHangs
 
+    settings = replace(CACHE, compiler_timeout=CACHE.command_timeout)
     try:
-        compile_kernel(
-            robot_named(robot_name), settings=replace(CACHE, compiler_timeout=CACHE.command_timeout)
-        )
+        with terminal.progress("Equations of motion (compiled once per robot)"):
+            compile_kernel(robot_named(robot_name), settings=settings)
     except (UnknownRobot, StoreUnavailable):
         return  # the answer says so
     except CompilerHangs as error:

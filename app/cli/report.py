@@ -118,8 +118,7 @@ def report(
     whole = _whole(body, orjson.dumps(beside)[1:])
     request = validated(ReportRequest, whole, request_id)
     if request.robot is not None:
-        with terminal.progress("Loading the compiled kernel of the robot"):
-            compile_kernel_of(request.robot)
+        compile_kernel_of(request.robot)
     task: Task = ReportTask(request, request_id)
     if is_log:
         fields = settings_in(settings) if settings is not None else {}

@@ -69,8 +69,7 @@ def search(
     request_id = new_id()
     request: Any = validated(model, body, request_id)
     timed: _Timed = request
-    with terminal.progress("Loading the compiled kernel of the robot"):
-        compile_kernel_of(robot_in(request))
+    compile_kernel_of(robot_in(request))
     with terminal.steps(f"Optimising for at most {timed.deadline:g} s"):
         result = result_of(task(request, request_id), timed.deadline, request_id)
     if result.kept_as is not None:

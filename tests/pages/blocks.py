@@ -2,7 +2,7 @@
 
 Blocks with a title are files. Blocks in `bash` and `python` run in their order, in one folder, all
 Python of a page in one process; a `text` block behind them is what they print. Blocks marked
-`no-run` need what a test does not have, such as root: their syntax is checked.
+`{data-run="no"}` need what a test does not have, such as root: their syntax is checked.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Block:
 
     @property
     def is_left_out(self) -> bool:
-        return "no-run" in self.words.split(" ")
+        return '{data-run="no"}' in self.words
 
 
 def blocks_of(page: Path) -> list[Block]:

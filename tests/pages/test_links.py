@@ -58,17 +58,20 @@ def _leaves(node: Any) -> Iterator[str]:
 
 
 class _Page(HTMLParser):
-    """The links and the anchors of a built page."""
+    """The links, the anchors and the text of a built page."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        self.links, self.anchors = set[str](), set[str]()
+        self.links, self.anchors, self.text = set[str](), set[str](), ""
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
         given = dict(attributes)
         self.anchors |= {value for name in ("id", "name") if (value := given.get(name))}
         self.links |= {value for name in ("href", "src") if (value := given.get(name))}
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +101,10 @@ def test_every_link_of_the_site_leads_somewhere(built: dict[str, _Page]) -> None
             if not found:
                 broken.append((path, link))
     assert len(built) > 60 and broken == []
+
+
+def test_every_fenced_block_of_the_site_is_code(built: dict[str, _Page]) -> None:
+    assert [path for path, page in built.items() if "```" in page.text] == []
 
 
 def test_the_site_loads_nothing_from_other_hosts() -> None:
