@@ -54,6 +54,7 @@ NOTHING = Payload()
 NEAR, FAR, HEIGHTS, AROUND, ABOVE = 0.5, 0.7, (0.05, 0.35), 0.4, 0.2
 # half angle of each side [rad], tool above a table [m], step of the exhaustive grid [m]
 SIDE, CLEARANCE, GRID = 0.5, 0.06, 0.05
+AMPLE = 1e6  # so long that no computation on the exhaustive grid ends early [s]
 TOOL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.12], [0, 0, 0, 1]])
 
 
@@ -132,7 +133,7 @@ def exhaustive(placement: Placement) -> list[float]:
     Places whose proven bounds are not below the least energy cannot change it, and are left out.
     """
     space, energies = Space.of(replace(placement, resolution=GRID)), [np.inf]
-    rounds, ample = Rounds(space, time.process_time), Deadline.after(np.inf, time.process_time)
+    rounds, ample = Rounds(space, time.process_time), Deadline.after(AMPLE, time.process_time)
     reached = [rounds.checked(each, ample) for each in space.map()[0]]
     reached = [each for each in reached if each.reason is None]
     for each in sorted(reached, key=lambda each: each.bound or 0.0):
