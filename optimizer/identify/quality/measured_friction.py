@@ -34,7 +34,7 @@ class MeasuredFriction:
     def factor(self, use: Mask) -> Array:
         """Measured over fitted friction (nq,) of some rows (n,); NaN of joints that are slow."""
         product, square = self.product[use].sum(axis=0), self.square[use].sum(axis=0)
-        return np.divide(product, square, out=np.full_like(product, np.nan), where=square > 0)
+        return np.asarray(product / np.where(square > 0, square, np.nan))
 
     def mean_factor(self, use: Mask) -> float:
         """Measured over fitted friction of all joints together."""
