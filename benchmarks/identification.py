@@ -303,8 +303,8 @@ def speed(_: Path | None, __: int) -> list[Gate]:
         start = process_time()
         identify(robot, [read_log(file, robot).log])
         times.append(process_time() - start)
-    what = f"{recording.time[-1]:.0f} s of log at {RATE:g} Hz, read and identified: time of the processor [s]"
-    return [Gate(what, min(times), 0.0, 1.0)]
+    what = f"{recording.time[-1]:.0f} s of log at {RATE:g} Hz, read and identified"
+    return [Gate(f"{what}: time of the processor [s]", min(times), 0.0, 1.0)]
 
 
 PARTS: dict[str, Callable[[Path | None, int], list[Gate]]] = {
