@@ -16,6 +16,9 @@
 - `standins`: simulated logs in place of real logs that are not public: another motion of the same
   day and other days of a UR10e, a payload from two logs of different days, halves of a log of a
   Panda.
+- `speed`: time of the processor to read a log of 41 s and to identify from it.
+- `outsider`: torques of held-out motions of a real UR10e and two Pandas, over those of an ordinary
+  least-squares fit without knowledge of the links.
 - `sessions`, `ur10e_sessions`: how often energies of other days lie between P5 and P95, by the
   number of logs of the fit, of simulated arms whose friction drifts and of a real UR10e.
 
@@ -28,26 +31,29 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.gate import Gate, sampling_margin
 from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_reference, ur3e
+from benchmarks.identification_outsider import outsider
 from benchmarks.identification_sessions import MOVE_EFFECT, cycles, sessions, ur10e_sessions
-from benchmarks.identification_standins import TORQUE_SENSOR, behind_the_gears, day_of, log_of
+from benchmarks.identification_standins import RATE, TORQUE_SENSOR, behind_the_gears, day_of, log_of
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.fits.block import moving_rows
 from joulepath.optimizer.identify.fits.fitting import fit_rows
 from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.validation import torque_errors
 from joulepath.optimizer.identify.results import TorqueErrors
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Payload
-from tests.identification_logs import Truth, off_the_model, recorded, truth_of
+from tests.identification_logs import Truth, csv_of, off_the_model, recorded, truth_of
 
 # of simulated arms, days of each, the first that of the fit, and the standard deviation of their
 # friction
@@ -56,6 +62,8 @@ DRAWS = 100
 MOVES_OF_A_DRAW = 5
 # share of the runs in which a figure is told, for its own share to count
 OFTEN = 0.2
+# how often a short log is identified
+REPEATS = 3
 TX40_OPTIONS = IdentificationOptions(
     terms=("coulomb", "viscous", "offset"),
     couplings=(WRIST,),
@@ -286,16 +294,31 @@ def _halves() -> list[Gate]:
     ]
 
 
+def speed(_: Path | None, __: int) -> list[Gate]:
+    """Time of the processor that a log of 41 s with all channels takes."""
+    robot, times = load_robot("ur10e"), list[float]()
+    recording = recorded(robot, truth_of(robot), moves=14, rate=RATE)
+    file = csv_of(recording, "own")
+    while len(times) < REPEATS:
+        start = process_time()
+        identify(robot, [read_log(file, robot).log])
+        times.append(process_time() - start)
+    what = f"{recording.time[-1]:.0f} s of log at {RATE:g} Hz, read and identified"
+    return [Gate(f"{what}: time of the processor [s]", min(times), 0.0, 1.0)]
+
+
 PARTS: dict[str, Callable[[Path | None, int], list[Gate]]] = {
     "ur3e": ur3e_power,
     "tx40": tx40_torque,
     "synthetic": synthetic,
     "cycles": cycles,
     "standins": standins,
+    "speed": speed,
+    "outsider": outsider,
     "sessions": sessions,
     "ur10e_sessions": ur10e_sessions,
 }
-OF_LOGS = ("ur3e", "tx40", "ur10e_sessions")
+OF_LOGS = ("ur3e", "tx40", "outsider", "ur10e_sessions")
 
 
 def main() -> int:

@@ -22,8 +22,9 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import off_the_model, recorded, truth_of
 
 NUMBERS = (1, 2, 6)
-# simulated arms, days of each, those of the fits first, and moves of a day
-UNITS, DAYS, MOVES = 6, 10, 8
+# simulated arms, of which fewer have a standard error like the width of the gate; days of each,
+# those of the fits first, and moves of a day
+UNITS, DAYS, MOVES = 24, 10, 8
 # of the friction of each joint, by itself
 DAY_SD = 0.025
 # draws of the logs of a fit among the real ones
@@ -96,7 +97,9 @@ def _coverage(robot: Robot, fitted: list[Log], others: list[Log]) -> tuple[float
 def _gate(title: str, covered: list[tuple[float, int]]) -> Gate:
     shares, moves = zip(*covered, strict=True)
     share = float(np.average(shares, weights=moves))
-    return Gate(f"{title}: moves of other days between P5 and P95", share, LEAST, MOST)
+    error = float(np.std(shares, ddof=1)) / np.sqrt(len(shares))
+    what = f"{title}: moves of other days between P5 and P95, standard error {error:.2g}"
+    return Gate(what, share, LEAST, MOST)
 
 
 def cycles(_: Path | None, runs: int) -> list[Gate]:

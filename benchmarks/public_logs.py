@@ -52,9 +52,19 @@ def ur10e_days(
     }
 
 
-def ur10e_log(robot: Robot, file: Path) -> Log:
-    """One of these logs: columns without header, time, q, v and current of each joint first."""
-    rows = np.loadtxt(file, delimiter=",", usecols=range(1 + 3 * robot.nq))
+def ur10e_split(place: Path) -> tuple[Robot, Log, Log]:
+    """The log that the authors of the dataset fit, and the one that they predict."""
+    files, robot = place / "dynamic_calibration" / "dataset_ur10e", load_robot("ur10e")
+    fitted = files / "identification_data" / "ur-20_02_10-30sec_12harm.csv"
+    other = files / "validation_data" / "ur-20_01_17-ptp_10_points.csv"
+    rows = slice(634, 3510), slice(699, 4200)
+    return robot, ur10e_log(robot, fitted, rows[0]), ur10e_log(robot, other, rows[1])
+
+
+def ur10e_log(robot: Robot, file: Path, chosen: slice = slice(None)) -> Log:
+    """Some rows of one of these logs: columns without header, time, q, v and current of each joint
+    first."""
+    rows = np.loadtxt(file, delimiter=",", usecols=range(1 + 3 * robot.nq))[chosen]
     q, v = np.abs(rows[:, 1:7]).max(axis=1), np.abs(rows[:, 7:13]).max(axis=1)
     garbled = np.flatnonzero((q > POSSIBLE_Q) | (v > POSSIBLE_V))
     rows = rows[garbled.max(initial=-1) + 1 :]

@@ -244,7 +244,7 @@ def _identified(
         robot=robot,
         options=options,
         fitted=fitted,
-        spread=spread_of(fitted, rows),
+        spread=spread_of(fitted, rows, threshold),
         parameters=parameters,
         structure=structure_of(robot, rows, options),
         physical=None if options.reduced else physical_of(robot, fitted.arm),
@@ -307,7 +307,9 @@ def _fold(
     payload = _payload(robot, seen, options, last)
     seen = seen if payload is None else with_payload(seen, payload)
     fitted = fit_by_method(robot, seen, options)
-    spread = replace(spread_of(fitted, seen), session_sd=np.zeros(robot.nq))
+    spread = replace(
+        spread_of(fitted, seen, options.velocity_threshold), session_sd=np.zeros(robot.nq)
+    )
     del seen  # rows are large
     unseen = rows.take(held_out)
     return Fold(fitted, spread, unseen if payload is None else with_payload(unseen, payload))

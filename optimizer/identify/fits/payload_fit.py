@@ -64,9 +64,10 @@ class PayloadFitSettings:
     """Prior standard deviation of a term of friction over the torque limit [SI unit per N·m]."""
     min_curve_speed: float = 0.05
     """Smallest speed of the curved friction term [rad/s]."""
+    min_sd_ratio: float = 1.05
     max_sd_ratio: float = 5.0
-    """Standard deviation of the mass without a joint over that with all joints, up to which the
-    joints are compared [1]."""
+    """Standard deviation of the mass without a joint over that with all joints, from which on and
+    up to which the joint is compared with the others [1]."""
     max_sd: float = 0.05
     """Standard deviation of a mass over the rated payload, up to which a mass near 0 is known
     [1]."""
@@ -170,8 +171,7 @@ def fit_payload(
     inverse = np.linalg.inv(gram)
     first = slice(links, links + MOMENTS)
     spread = jackknife(replicates[:, first]) + (inverse @ prior @ inverse)[first, first]
-    spread += _disagreement(gram, moment, parts, variance)[first, first]
-    return _payload_of_body(robot, log, body, spread)
+    return _payload_of_body(robot, log, body, _disagreement(gram, moment, parts, variance) * spread)
 
 
 def _disagreement(
@@ -179,12 +179,13 @@ def _disagreement(
     moment: Array,
     parts: Sequence[tuple[list[int], Array, Array, IntArray]],
     variance: Array,
-) -> Array:
-    """Covariance (p, p) due to what is wrong with single joints, such as their torque constants or
-    the centres of their links.
+) -> float:
+    """Factor, at least 1, by which the joints disagree more about the mass than their rows say.
 
-    It is the jackknife over the joints. A joint is left out only if the others determine the mass
-    nearly as well as all joints together.
+    Errors of single joints, such as those of their torque constants or of the centres of their
+    links, make them disagree. Each joint is left out once: the square of the change of the mass
+    over its variance is 1 in the mean if the rows say the truth (Birge 1932). Joints that tell
+    nearly nothing of the mass, or nearly all, are not compared.
 
     Args:
         gram: normal matrix (p, p) of all joints and the prior.
@@ -193,16 +194,17 @@ def _disagreement(
         variance: variance (nq,) of the rows of each joint.
     """
     mass, found = PARAMETERS_PER_BODY * len(parts), np.linalg.solve(gram, moment)
-    sd = float(np.sqrt(np.linalg.inv(gram)[mass, mass]))
-    total, count = np.zeros_like(gram), len(parts)
+    least, most = PAYLOAD_FIT.min_sd_ratio**2, PAYLOAD_FIT.max_sd_ratio**2
+    of_all, ratios = float(np.linalg.inv(gram)[mass, mass]), list[float]()
     for joint, (at, left, right, _) in enumerate(parts):
         others, rest = gram.copy(), moment.copy()
         others[np.ix_(at, at)] -= left.T @ left / variance[joint]
         rest[at] -= left.T @ right / variance[joint]
-        if np.linalg.inv(others)[mass, mass] <= (PAYLOAD_FIT.max_sd_ratio * sd) ** 2:
-            change = np.linalg.solve(others, rest) - found
-            total += (count - 1) / count * np.outer(change, change)
-    return total
+        of_others = float(np.linalg.inv(others)[mass, mass])
+        if least * of_all <= of_others <= most * of_all:
+            change = float((np.linalg.solve(others, rest) - found)[mass])
+            ratios.append(change**2 / (of_others - of_all))
+    return max(1.0, float(np.mean(ratios))) if ratios else 1.0
 
 
 def _equations(

@@ -291,6 +291,14 @@ def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
                 "not those of all joints.",
             )
         found[group] = tuple(NOT_LOGGED if each is None else _index(names, each) for each in wanted)
+    used = [k for indices in found.values() for k in _logged(indices)]
+    twice = next((k for k in used if used.count(k) > 1), None)
+    if twice is not None:
+        raise InvalidProblem(
+            "columns",
+            f"columns must name every column once, and names {names[twice]}, number {twice + 1}, "
+            "more often.",
+        )
     time = (*found.pop("time"), *found.pop("nanoseconds", ()))
     groups: dict[ChannelName, tuple[int, ...]] = found  # type: ignore[assignment]
     _check_counts(

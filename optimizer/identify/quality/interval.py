@@ -16,9 +16,10 @@ from scipy.special import stdtrit
 from joulepath.models.robot import Array
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
-from joulepath.optimizer.identify.arm.logged_torque import measured_power, motor_torque
+from joulepath.optimizer.identify.arm.logged_torque import measured_power
 from joulepath.optimizer.identify.estimates.grouped import jackknife
 from joulepath.optimizer.identify.fits.fitting import FitResult
+from joulepath.optimizer.identify.quality.measured_friction import MeasuredFriction
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
@@ -61,15 +62,15 @@ def energy_sd(fitted: FitResult, spread: Spread, rows: Rows) -> tuple[float, flo
     time = np.bincount(rows.group, rows.weight)
     variance = figures_variance(fitted, rows) + float(time @ time) * spread.move_sd**2
     for joint in np.flatnonzero(spread.session_sd).tolist():
-        lost = energy - without_friction(fitted.arm, joint).energy(rows)
+        others = (np.arange(len(spread.session_sd)) != joint).astype(float)
+        lost = energy - with_friction(fitted.arm, others).energy(rows)
         variance += (float(spread.session_sd[joint]) * lost) ** 2
     return energy, float(np.sqrt(variance))
 
 
-def without_friction(arm: FittedArm, joint: int) -> FittedArm:
-    """The arm without the friction of one joint."""
-    others = np.arange(len(arm.coulomb)) != joint
-    parts = {name: getattr(arm, name) * others for name in ("coulomb", "viscous", "load", "curved")}
+def with_friction(arm: FittedArm, factor: Array) -> FittedArm:
+    """The arm with so many times the friction of each joint (nq,)."""
+    parts = {name: getattr(arm, name) * factor for name in ("coulomb", "viscous", "load", "curved")}
     return replace(arm, **parts)
 
 
@@ -88,26 +89,39 @@ def figures_variance(fitted: FitResult, rows: Rows) -> float:
     )
 
 
-def spread_of(fitted: FitResult, rows: Rows) -> Spread:
-    """Spread of the moves and sessions of the fitted rows."""
-    return Spread(_move_sd(fitted, rows), session_sd(joint_factors(fitted, rows)))
+def spread_of(fitted: FitResult, rows: Rows, threshold: float) -> Spread:
+    """Spread of the moves and sessions of the fitted rows.
+
+    Args:
+        fitted: the fit.
+        rows: rows of the fit.
+        threshold: speed above which a joint tells its friction [rad/s].
+    """
+    friction = MeasuredFriction.of(fitted.arm, rows, threshold)
+    factors = np.array([friction.factor(rows.log == log) for log in np.unique(rows.log)])
+    return Spread(_move_sd(fitted, rows, friction), session_sd(factors))
 
 
-def _move_sd(fitted: FitResult, rows: Rows) -> float:
-    """Standard deviation [W] of the mean error of a move beyond the errors of the figures.
+def _move_sd(fitted: FitResult, rows: Rows, friction: MeasuredFriction) -> float:
+    """Standard deviation [W] of the mean error of a move beyond the errors of figures and days.
 
-    Each move is predicted by the arm fitted without its cluster.
+    Each move is predicted by the arm fitted without its cluster. Of several logs, it has the
+    friction of the rest of its own log: that of another day is no error of the move.
     """
     measured = measured_power(fitted.arm, rows)
     use = np.isfinite(measured) & ~rows.rest
+    days = len(np.unique(rows.log)) > 1
     squares, explained = list[float](), list[float]()
     for cluster in np.unique(fitted.clusters.of_row[use]):
-        in_cluster = use & (fitted.clusters.of_row == cluster)
-        for move in np.unique(rows.move[in_cluster]):
-            chosen = in_cluster & (rows.move == move)
-            part = rows.take(chosen)
+        in_cluster = fitted.clusters.of_row == cluster
+        for move in np.unique(rows.move[use & in_cluster]):
+            chosen = use & in_cluster & (rows.move == move)
+            part, arm = rows.take(chosen), fitted.arms_without_cluster[cluster]
+            if days:
+                factor = friction.factor((rows.log == part.log[0]) & ~in_cluster)
+                arm = with_friction(arm, np.where(np.isfinite(factor), factor, 1.0))
             time = float(part.weight.sum())
-            predicted, slope = fitted.arms_without_cluster[cluster].power(part)
+            predicted, slope = arm.power(part)
             gradient = part.weight @ slope
             increase = float(gradient @ fitted.covariance_increase[cluster] @ gradient)
             squares.append((float(part.weight @ (measured[chosen] - predicted)) / time) ** 2)
@@ -137,34 +151,6 @@ def own_variance(squares: Array, explained: Array) -> float:
     if least <= 0 or excess(least) <= 0:
         return least
     return float(brentq(excess, least, float(squares.sum())))
-
-
-def session_factors(fitted: FitResult, rows: Rows) -> tuple[float, ...]:
-    """Friction of each log over the fitted friction, from torques of the motors; empty without
-    these."""
-    product, square = _friction_products(fitted, rows)
-    total = square.sum(axis=1)
-    return tuple((product.sum(axis=1)[total > 0] / total[total > 0]).tolist())
-
-
-def joint_factors(fitted: FitResult, rows: Rows) -> Array:
-    """Friction of each log and joint (logs, nq) over the fitted friction; NaN where a joint does
-    not move, or no torques of motors were logged."""
-    product, square = _friction_products(fitted, rows)
-    return np.divide(product, square, out=np.full_like(product, np.nan), where=square > 0)
-
-
-def _friction_products(fitted: FitResult, rows: Rows) -> tuple[Array, Array]:
-    """Product of measured and fitted friction, and square of the latter, of each log and joint
-    (logs, nq) [N²·m²]."""
-    torque, arm = motor_torque(fitted.arm, rows), fitted.arm
-    friction = arm.friction_torque(rows) - arm.offset
-    rest = torque - arm.link_torque(rows) - arm.offset
-    known = np.isfinite(torque)
-    logs = [(rows.log == log)[:, None] & known for log in np.unique(rows.log)]
-    product = [np.where(use, friction * rest, 0.0).sum(axis=0) for use in logs]
-    square = [np.where(use, friction**2, 0.0).sum(axis=0) for use in logs]
-    return np.array(product), np.array(square)
 
 
 def session_sd(factors: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from joulepath.optimizer.identify.arm.logged_torque import logged_torque
 from joulepath.optimizer.identify.estimates.grouped import lag_one_correlation
 from joulepath.optimizer.identify.fits.fitting import FitResult
-from joulepath.optimizer.identify.quality.interval import session_factors
+from joulepath.optimizer.identify.quality.measured_friction import MeasuredFriction
 from joulepath.optimizer.identify.results import Residuals
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -44,11 +44,13 @@ def residuals_of(fitted: FitResult, rows: Rows, threshold: float) -> Residuals:
     if with_power.any():
         part = rows.take(with_power)
         of_power = lag_one_correlation(part.power - fitted.arm.power(part)[0], part.move)
+    friction = MeasuredFriction.of(fitted.arm, rows, threshold)
+    sessions = [friction.mean_factor(rows.log == log) for log in np.unique(rows.log)]
     known = np.append(of_torque, of_power)
     known = known[np.isfinite(known)]
     return Residuals(
         torque_lag_one=of_torque,
         power_lag_one=of_power,
         white=bool((known < RESIDUALS.max_white_correlation).all()),
-        sessions=session_factors(fitted, rows),
+        sessions=tuple(each for each in sessions if np.isfinite(each)),
     )

@@ -132,6 +132,22 @@ def test_moves_left_out_tell_what_the_model_lacks_where_only_currents_are_logged
     assert odd.validation.coverage >= 0.6
 
 
+def test_friction_of_another_day_is_no_error_of_the_moves() -> None:
+    """It is part of the interval once, as that of the day."""
+    robot = load_robot("ur10e")
+    truth, found = truth_of(robot, 2), list[float]()
+    for change in (0.0, 0.1):
+        days = [replace(truth, coulomb=truth.coulomb * (1 + change * each)) for each in (0, 1, 2)]
+        logs = [
+            replace(recorded(robot, day, moves=8, seed=seed).log(), power=None)
+            for seed, day in enumerate(days)
+        ]
+        spread = identify(robot, logs, IdentificationOptions(held_out=0.0)).spread
+        found.append(spread.move_sd)
+    assert (spread.session_sd > 0.05).all()
+    assert found[1] < 1.5 * found[0]
+
+
 def test_a_document_may_have_the_friction_of_other_days_joint_by_joint() -> None:
     robot = load_robot("ur10e")
     log = replace(recorded(robot, truth_of(robot), moves=8).log(), power=None)

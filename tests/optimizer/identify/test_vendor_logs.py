@@ -59,6 +59,8 @@ def test_columns_by_number_of_a_file_without_header(ur: Recording) -> None:
             read_log(body, UR, LogOptions(columns=SIX | {"power": wrong}))
     with pytest.raises(InvalidProblem, match="time"):
         read_log(body, UR, LogOptions(columns={"q": SIX["q"]}))
+    with pytest.raises(InvalidProblem, match="number 2, more often"):
+        read_log(body, UR, LogOptions(columns=SIX | {"q": [2, 2, 4, 5, 6, 7]}))
 
 
 def test_lines_that_end_with_carriage_returns_alone(ur: Recording) -> None:
