@@ -125,14 +125,12 @@ class MultiStart:
         T_reached, jacobian = self._chain.flange_and_jacobian(rows)
         residual = np.abs(T_reached - T).max(axis=(1, 2))
         near = residual < MULTI_START.near
-        if not near.any() or residual[near].max() > MULTI_START.solved:
+        off = residual[near]
+        if not len(off) or off.max() > MULTI_START.solved or np.abs(rows).max() > np.pi:
             return None
         # EAIK has a row far from the pose where a wrist is aligned
-        smallest = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
-        if smallest.min() < MULTI_START.regular:
-            return None
-        q = np.clip(wrapped(rows[near]), -np.pi, np.pi)
-        return np.asarray(q[distinct(q, residual[near])])
+        smallest = np.linalg.svd(jacobian, compute_uv=False)[:, -1].min()
+        return rows[near] if smallest > MULTI_START.regular else None
 
     def self_motions(self, T: Array, limits: Limits | None = None) -> list[SelfMotion]:
         """Always empty: no self-motion is known."""
@@ -206,10 +204,10 @@ class MultiStart:
         slow = np.flatnonzero((residual >= MULTI_START.solved) & (residual < REACH.near))
         if len(slow):
             q[slow], residual[slow] = solved(self._chain, q[slow], T)
-        done = self._is_reached(residual, self._smallest(q))
-        q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
-        smallest = self._smallest(q)
-        return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), residual[done]), smallest)])
+        q = np.vstack([found, np.clip(wrapped(q), -np.pi, np.pi)])
+        residual, smallest = np.append(np.zeros(len(found)), residual), self._smallest(q)
+        done = np.flatnonzero(self._is_reached(residual, smallest))
+        return np.asarray(q[done[distinct(q[done], residual[done], smallest[done])]])
 
     def _is_reached(self, residual: Array, smallest: Array) -> Mask:
         """Which configurations (n,) reach the pose, by their pose errors (n,) [m, rad] and smallest
