@@ -27,7 +27,7 @@ def chain_warnings(chain: Chain, upright: UprightChain) -> list[str]:
     if chain.rounded > CHAIN.rounded_angle:
         warnings.append(
             "Angles of joint origins written with few decimals, such as 1.571, are read as the "
-            f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
+            f"multiples of 15° that they stand for: by up to {chain.rounded:.2g} rad."
         )
     if passive := _with_friction_of_their_own(chain):
         warnings.append(

@@ -59,8 +59,8 @@ class Chain:
     position [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of
     the URDF links fixed to the base and to every moving link. `facts` are further figures of the
     joints, `estimate` the estimated masses. `rounded` [rad] is the largest change of a rounded
-    angle to the quarter turn that it stands for, `coarse` has the names of the joints with angles
-    rounded too far for this. `idle` are the held joints that follow moving ones by the URDF.
+    angle to the multiple of 15° that it stands for, `coarse` has the names of the joints with
+    angles rounded too far for this. `idle` are the held joints that follow moving ones by the URDF.
     """
 
     model: pin.Model

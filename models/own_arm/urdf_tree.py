@@ -37,7 +37,7 @@ class ChainSettings:
     listed_names: int = 12
     """Most names listed in a message."""
     rounded_angle: float = 5e-6
-    """Deviation from a quarter turn [rad] due to rounding, however many digits an angle has."""
+    """Deviation from a multiple of 15° [rad] due to rounding, however many digits it has."""
     least_decimals: int = 3
     """Decimals from which on one unit of the last one is a deviation due to rounding."""
     rounded_length: float = 1e-9
@@ -181,7 +181,7 @@ def restore_rounded(joint: Element) -> float:
     """Restore rounded figures: a quarter turn written as 1.571 or 1.5708, a zero as 2e-11.
 
     Otherwise rounded axes would not have the geometry required by closed-form inverse kinematics.
-    An angle stands for a quarter turn within one unit of its last decimal, of at least three.
+    An angle stands for a multiple of 15° within one unit of its last decimal, of at least three.
 
     Returns:
         The largest change of an angle [rad].
@@ -218,13 +218,13 @@ def is_coarse(joint: Element) -> bool:
 
 
 def _exact_angle(text: str) -> float:
-    """The quarter turn that a rounded figure stands for, or its value [rad]."""
+    """The multiple of 15° that a rounded figure stands for, or its value [rad]."""
     value = float(text)
-    quarter = round(value / (math.pi / 2)) * (math.pi / 2)
+    multiple = round(value / (math.pi / 12)) * (math.pi / 12)
     exponent = Decimal(text).as_tuple().exponent
     decimals = -exponent if isinstance(exponent, int) else 0
     unit = 10.0**-decimals if decimals >= CHAIN.least_decimals else 0.0
-    return quarter if abs(quarter - value) < max(unit, CHAIN.rounded_angle) else value
+    return multiple if abs(multiple - value) < max(unit, CHAIN.rounded_angle) else value
 
 
 def joint_range(joint: Element) -> tuple[float, float, float, float]:
