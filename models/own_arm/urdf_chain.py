@@ -216,7 +216,10 @@ def _check_moving(joint: Element) -> None:
         )
     lower, upper, *_ = joint_range(joint)
     if not lower < upper:
-        refuse("urdf", f"Joint {name!r} cannot move: its soft limits are beyond its <limit>.")
+        refuse(
+            "urdf",
+            f"Joint {name!r} cannot move: its soft limits are exchanged, or beyond its <limit>.",
+        )
 
 
 def _check_rest(tree: UrdfTree, moving: list[Element], locked: Mapping[str, float]) -> None:

@@ -19,8 +19,23 @@ from joulepath.models.uploads.limits import Checkpoint
 DEFINITIONS = ("xacro:property", "xacro:arg", "xacro:macro")
 """Elements of xacro that add nothing to an arm that does not use them."""
 
-READ = ("link", "joint", "material")
-"""Elements of a URDF that are read; a material has no physical meaning."""
+READ = {
+    "link": ("inertial", "visual", "collision"),
+    "joint": (
+        "parent",
+        "child",
+        "origin",
+        "axis",
+        "limit",
+        "mimic",
+        "dynamics",
+        "safety_controller",
+    ),
+    "material": (),
+}
+"""Elements of a URDF that are read, with those inside; a material has no physical meaning."""
+REPEATED = ("visual", "collision")
+"""Elements that a link may have several times; of others, the first one is read."""
 
 CONTINUOUS = 2 * math.pi
 """Range of a continuous joint to either side [rad]: one turn."""
@@ -241,18 +256,18 @@ def joint_range(joint: Element) -> tuple[float, float, float, float]:
 
 
 def soft_range(joint: Element) -> tuple[float, float] | None:
-    """Soft position limits [rad] of a revolute joint's <safety_controller>; None without both."""
+    """Soft position limits [rad] of a revolute joint's <safety_controller>, infinite where one is
+    missing; None without a range.
+    """
     soft = joint.find("safety_controller")
-    names = ("soft_lower_limit", "soft_upper_limit")
-    if (
-        soft is None
-        or joint.get("type") != "revolute"
-        or not all(each in soft.attrib for each in names)
-    ):
+    if soft is None or joint.get("type") != "revolute":
         return None
     where = f"Joint {name_of(joint)!r} has a <safety_controller>"
-    lower, upper = (number(soft, each, where) for each in names)
-    return (lower, upper) if lower < upper else None
+    lower, upper = (
+        number(soft, name, where) if name in soft.attrib else missing
+        for name, missing in (("soft_lower_limit", -math.inf), ("soft_upper_limit", math.inf))
+    )
+    return None if lower == upper else (lower, upper)
 
 
 def joint_axis(joint: Element) -> Array:

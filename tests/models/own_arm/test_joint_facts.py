@@ -47,7 +47,15 @@ def test_a_safety_controller_without_a_range_limits_nothing(part: str) -> None:
 
 
 def test_soft_limits_beyond_the_range_are_refused() -> None:
-    refused("urdf", "'shoulder' cannot move: its soft limits", with_parts(soft(2.5, 3.0), ""))
+    for lower, upper in ((2.5, 3.0), (1.0, -1.0)):
+        refused("urdf", "'shoulder' cannot move: its soft", with_parts(soft(lower, upper), ""))
+
+
+def test_one_soft_limit_alone_holds() -> None:
+    limits = robot(
+        with_parts('<safety_controller soft_upper_limit="1" k_velocity="1"/>', "")
+    ).limits
+    assert limits.q_min.tolist() == [-2.0, -2.5] and limits.q_max.tolist() == [1.0, 2.5]
 
 
 def test_friction_of_all_joints_is_taken_with_the_letter_of_the_urdf() -> None:
@@ -126,4 +134,9 @@ def test_elements_without_effect_are_named() -> None:
     assert (
         "Elements of the URDF without effect: gazebo, transmission."
         in own_figures("mine", replace(PLAIN, urdf=urdf))[1]
+    )
+    inside = with_parts('<calibration rising="0"/>', '<limit lower="0" upper="1"/>')
+    assert (
+        "Elements of the URDF without effect: calibration, second limit of elbow."
+        in own_figures("mine", inside)[1]
     )
