@@ -23,7 +23,7 @@ from joulepath.models.own_arm.description import Collision, Description, Invalid
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.mesh_files import in_folder
 from joulepath.models.own_arm.rules import RULES
-from joulepath.models.own_arm.urdf_tree import UrdfTree, joint_end, parsed_urdf
+from joulepath.models.own_arm.urdf_tree import TURNING, UrdfTree, joint_end, parsed_urdf
 from joulepath.models.own_arm.xacro_file import SUFFIX, expanded, package_folders
 from joulepath.models.robot import Array, Robot
 from joulepath.models.uploads.limits import unwatched
@@ -43,7 +43,6 @@ TIPS = (
     "gripper_frame_link",
     "link_eef",
 )
-TURNING = ("revolute", "continuous")
 FULL_POSE = 6
 
 

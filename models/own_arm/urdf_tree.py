@@ -37,6 +37,7 @@ READ = {
 REPEATED = ("visual", "collision")
 """Elements that a link may have several times; of others, the first one is read."""
 
+TURNING = ("revolute", "continuous")
 CONTINUOUS = 2 * math.pi
 """Range of a continuous joint to either side [rad]: one turn."""
 
@@ -115,6 +116,11 @@ class UrdfTree:
             found.append(self.above[link])
             link = joint_end(found[-1], "parent")
         return found[::-1]
+
+    def beneath(self, base: str, held: Mapping[str, float]) -> tuple[str, ...]:
+        """Names of the turning joints between the root and the base that are not held."""
+        below = [joint for joint in self.path(self.root, base) if joint.get("type") in TURNING]
+        return tuple(name_of(joint) for joint in below if name_of(joint) not in held)
 
     def carrier(self, link: str, moving: Mapping[str, int]) -> int:
         """Number of the moving joint carrying a link, 0 for the base."""

@@ -122,6 +122,20 @@ def test_gravity_of_a_tilted_base_is_that_of_the_upright_root() -> None:
     assert (Arm(robot=made, gravity=given).gravity == given).all()
 
 
+def test_a_joint_beneath_the_base_turns_gravity_and_is_named() -> None:
+    table = (
+        '<link name="floor"/><joint name="table" type="revolute"><parent link="floor"/>'
+        '<child link="base"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="9" '
+        'velocity="1"/></joint></robot>'
+    )
+    given = replace(PLAIN, urdf=PLAIN.urdf.replace("</robot>", table), base="base")
+    assert any("turn, and gravity with them: table." in each for each in own_figures("m", given)[1])
+    held = replace(given, locked={"table": 0.5})
+    assert not any("with them" in each for each in own_figures("m", held)[1])
+    tilted = 9.81 * np.array([0.0, -np.sin(0.5), -np.cos(0.5)])
+    assert robot(held).gravity == pytest.approx(tilted)
+
+
 def test_gravity_of_an_upright_base_is_no_figure() -> None:
     figures, warnings = own_figures("mine", PLAIN)
     assert "gravity" not in figures["kinematics"]
