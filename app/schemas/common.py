@@ -161,6 +161,8 @@ def _as_ros(value: Any) -> Any:
         value = value | {"position": [position[part] for part in "xyz"]}
     if "quaternion" in value or not isinstance(orientation, dict):
         return value
+    if orientation and orientation.keys() < {*"xyzw"}:
+        raise PydanticCustomError("orientation", "A ROS orientation has each of x, y, z and w")
     if orientation.keys() == {*"xyzw"}:
         value = value | {"quaternion": [orientation[part] for part in "xyzw"]}
         del value["orientation"]
@@ -173,9 +175,7 @@ AS_IN_ROS = BeforeValidator(_as_ros)
 
 def number_or_object(number: str, error: str, message: str) -> Discriminator:
     """Discriminator of a union of a number, with the tag `number`, and an object, with the tag
-    `range`.
-
-    Anything else is an error of type `error`.
+    `range`; anything else is an error of type `error`.
     """
 
     def kind(value: Any) -> str | None:

@@ -24,10 +24,15 @@ def chain_warnings(chain: Chain, upright: UprightChain) -> list[str]:
             f"gravity in its frame is {gravity.round(4).tolist()} m/s² unless a request gives "
             "another."
         )
+    if chain.beneath:
+        warnings.append(
+            f"Joints beneath the base turn, and gravity with them: {listed(chain.beneath)}. They "
+            "are taken to be at zero, unless `locked` has their positions."
+        )
     if chain.rounded > CHAIN.rounded_angle:
         warnings.append(
             "Angles of joint origins written with few decimals, such as 1.571, are read as the "
-            f"quarter turns that they stand for: by up to {chain.rounded:.2g} rad."
+            f"multiples of 15° that they stand for: by up to {chain.rounded:.2g} rad."
         )
     if passive := _with_friction_of_their_own(chain):
         warnings.append(

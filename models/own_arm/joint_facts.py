@@ -13,6 +13,7 @@ from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import (
     CONTINUOUS,
     READ,
+    REPEATED,
     joint_limit,
     listed,
     name_of,
@@ -56,7 +57,7 @@ class JointFacts:
             _column(moving, "dynamics", "friction"),
             _column(moving, "dynamics", "damping"),
             tuple(name_of(joint) for joint in moving if _is_softly_limited(joint)),
-            tuple(sorted({each.tag for each in root if each.tag not in READ})),
+            tuple(sorted(_without_effect(root))),
             tuple(name_of(joint) for joint in moving if _has_ends_without_effect(joint)),
         )
 
@@ -85,6 +86,20 @@ class JointFacts:
         if self.ignored:
             found.append(f"Elements of the URDF without effect: {listed(self.ignored)}.")
         return found
+
+
+def _without_effect(root: Element) -> set[str]:
+    """Elements that are not read, such as `gazebo`, `calibration` or `second limit of elbow`."""
+    found = {part.tag for part in root if part.tag not in READ}
+    for part in root:
+        read, seen = READ.get(part.tag, ()), set[str]()
+        for tag in (each.tag for each in part) if read else ():
+            if tag not in read:
+                found.add(tag)
+            elif tag in seen and tag not in REPEATED:
+                found.add(f"second {tag} of {name_of(part)}")
+            seen.add(tag)
+    return found
 
 
 def _is_softly_limited(joint: Element) -> bool:

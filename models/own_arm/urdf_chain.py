@@ -25,6 +25,7 @@ from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
+    TURNING,
     UrdfTree,
     is_coarse,
     joint_axis,
@@ -42,7 +43,6 @@ from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 ROS_BASE = "base_link"
-TURNING = ("revolute", "continuous")
 FIXED = "fixed"
 
 
@@ -59,8 +59,9 @@ class Chain:
     position [rad], speed [rad/s] and torque [N·m]; 0 if the URDF has none. `rigid` has the names of
     the URDF links fixed to the base and to every moving link. `facts` are further figures of the
     joints, `estimate` the estimated masses. `rounded` [rad] is the largest change of a rounded
-    angle to the quarter turn that it stands for, `coarse` has the names of the joints with angles
-    rounded too far for this. `idle` are the held joints that follow moving ones by the URDF.
+    angle to the multiple of 15° that it stands for, `coarse` has the names of the joints with
+    angles rounded too far for this. `idle` are the held joints that follow moving ones by the URDF,
+    `beneath` the turning joints between root and base that are not held.
     """
 
     model: pin.Model
@@ -83,6 +84,7 @@ class Chain:
     rounded: float
     coarse: tuple[str, ...]
     idle: tuple[str, ...] = ()
+    beneath: tuple[str, ...] = ()
 
     @property
     def nq(self) -> int:
@@ -138,8 +140,8 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
     estimate = add_inertials(root, [*map(name_of, carried)], description, checkpoint)
     chain = _merged(root, tree, moving, held, base, description.tip, coupling)
     idle = left_behind(tree, set(others) - set(given), chain.turning)
-    mended = _mended(chain) if description.mend_inertias else ()
-    return replace(chain, estimate=replace(estimate, mended=mended), idle=tuple(idle))
+    estimate = replace(estimate, mended=_mended(chain) if description.mend_inertias else ())
+    return replace(chain, estimate=estimate, idle=tuple(idle), beneath=tree.beneath(base, held))
 
 
 def _mended(chain: Chain) -> tuple[str, ...]:
@@ -216,7 +218,10 @@ def _check_moving(joint: Element) -> None:
         )
     lower, upper, *_ = joint_range(joint)
     if not lower < upper:
-        refuse("urdf", f"Joint {name!r} cannot move: its soft limits are beyond its <limit>.")
+        refuse(
+            "urdf",
+            f"Joint {name!r} cannot move: its soft limits are exchanged, or beyond its <limit>.",
+        )
 
 
 def _check_rest(tree: UrdfTree, moving: list[Element], locked: Mapping[str, float]) -> None:
@@ -277,9 +282,8 @@ def _merged(
             raise ValueError(f"of {len(moving)} joints it finds {model.nq}")
     except (RuntimeError, ValueError, IndexError) as error:
         refuse("urdf", f"Pinocchio does not read the URDF: {error}.")
-    q_min, q_max, v_max, tau_max = ranges.T
     joints = tuple(list(names)[k] for k in coupling.own) or tuple(names)
-    axes = np.array([joint_axis(joint) for joint in moving])
+    q_min, q_max, v_max, tau_max = ranges.T
     return Chain(
         model,
         tuple(names),
@@ -287,7 +291,7 @@ def _merged(
         coupling,
         tuple(joint_end(joint, "child") for joint in moving),
         _rigid(tree, names),
-        axes,
+        np.array([joint_axis(joint) for joint in moving]),
         T_base.homogeneous,
         T_tip.homogeneous,
         None if base_link == base else T_base.actInv(T_base_link).homogeneous,

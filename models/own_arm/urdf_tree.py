@@ -19,9 +19,25 @@ from joulepath.models.uploads.limits import Checkpoint
 DEFINITIONS = ("xacro:property", "xacro:arg", "xacro:macro")
 """Elements of xacro that add nothing to an arm that does not use them."""
 
-READ = ("link", "joint", "material")
-"""Elements of a URDF that are read; a material has no physical meaning."""
+READ = {
+    "link": ("inertial", "visual", "collision"),
+    "joint": (
+        "parent",
+        "child",
+        "origin",
+        "axis",
+        "limit",
+        "mimic",
+        "dynamics",
+        "safety_controller",
+    ),
+    "material": (),
+}
+"""Elements of a URDF that are read, with those inside; a material has no physical meaning."""
+REPEATED = ("visual", "collision")
+"""Elements that a link may have several times; of others, the first one is read."""
 
+TURNING = ("revolute", "continuous")
 CONTINUOUS = 2 * math.pi
 """Range of a continuous joint to either side [rad]: one turn."""
 
@@ -37,7 +53,7 @@ class ChainSettings:
     listed_names: int = 12
     """Most names listed in a message."""
     rounded_angle: float = 5e-6
-    """Deviation from a quarter turn [rad] due to rounding, however many digits an angle has."""
+    """Deviation from a multiple of 15° [rad] due to rounding, however many digits it has."""
     least_decimals: int = 3
     """Decimals from which on one unit of the last one is a deviation due to rounding."""
     rounded_length: float = 1e-9
@@ -100,6 +116,11 @@ class UrdfTree:
             found.append(self.above[link])
             link = joint_end(found[-1], "parent")
         return found[::-1]
+
+    def beneath(self, base: str, held: Mapping[str, float]) -> tuple[str, ...]:
+        """Names of the turning joints between the root and the base that are not held."""
+        below = [joint for joint in self.path(self.root, base) if joint.get("type") in TURNING]
+        return tuple(name_of(joint) for joint in below if name_of(joint) not in held)
 
     def carrier(self, link: str, moving: Mapping[str, int]) -> int:
         """Number of the moving joint carrying a link, 0 for the base."""
@@ -181,7 +202,7 @@ def restore_rounded(joint: Element) -> float:
     """Restore rounded figures: a quarter turn written as 1.571 or 1.5708, a zero as 2e-11.
 
     Otherwise rounded axes would not have the geometry required by closed-form inverse kinematics.
-    An angle stands for a quarter turn within one unit of its last decimal, of at least three.
+    An angle stands for a multiple of 15° within one unit of its last decimal, of at least three.
 
     Returns:
         The largest change of an angle [rad].
@@ -218,13 +239,13 @@ def is_coarse(joint: Element) -> bool:
 
 
 def _exact_angle(text: str) -> float:
-    """The quarter turn that a rounded figure stands for, or its value [rad]."""
+    """The multiple of 15° that a rounded figure stands for, or its value [rad]."""
     value = float(text)
-    quarter = round(value / (math.pi / 2)) * (math.pi / 2)
+    multiple = round(value / (math.pi / 12)) * (math.pi / 12)
     exponent = Decimal(text).as_tuple().exponent
     decimals = -exponent if isinstance(exponent, int) else 0
     unit = 10.0**-decimals if decimals >= CHAIN.least_decimals else 0.0
-    return quarter if abs(quarter - value) < max(unit, CHAIN.rounded_angle) else value
+    return multiple if abs(multiple - value) < max(unit, CHAIN.rounded_angle) else value
 
 
 def joint_range(joint: Element) -> tuple[float, float, float, float]:
@@ -241,18 +262,18 @@ def joint_range(joint: Element) -> tuple[float, float, float, float]:
 
 
 def soft_range(joint: Element) -> tuple[float, float] | None:
-    """Soft position limits [rad] of a revolute joint's <safety_controller>; None without both."""
+    """Soft position limits [rad] of a revolute joint's <safety_controller>, infinite where one is
+    missing; None without a range.
+    """
     soft = joint.find("safety_controller")
-    names = ("soft_lower_limit", "soft_upper_limit")
-    if (
-        soft is None
-        or joint.get("type") != "revolute"
-        or not all(each in soft.attrib for each in names)
-    ):
+    if soft is None or joint.get("type") != "revolute":
         return None
     where = f"Joint {name_of(joint)!r} has a <safety_controller>"
-    lower, upper = (number(soft, each, where) for each in names)
-    return (lower, upper) if lower < upper else None
+    lower, upper = (
+        number(soft, name, where) if name in soft.attrib else missing
+        for name, missing in (("soft_lower_limit", -math.inf), ("soft_upper_limit", math.inf))
+    )
+    return None if lower == upper else (lower, upper)
 
 
 def joint_axis(joint: Element) -> Array:

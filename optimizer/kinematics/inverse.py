@@ -7,8 +7,9 @@ those of the second kind are members of a self-motion, a curve of solutions.
 `InverseKinematics` is the interface; `inverse_kinematics_for` selects the implementation for a
 robot. Six joints use, in this order: the closed form of arms of Universal Robots' form in any
 convention (`ur_closed_form`), the closed form of arms with a spherical wrist, or nearly of
-Universal Robots' form (`decomposition`), and the eigenvalues of the closed loop with Newton's
-method (`loop_closure`, `multi_start`), which may miss branches near singularities.
+Universal Robots' form (`decomposition`), EAIK far from singularities (`multi_start`), and the
+eigenvalues of the closed loop with Newton's method (`loop_closure`), which may miss branches near
+singularities.
 Seven joints hold every pose on self-motions and use the closed form of arms with a spherical
 shoulder (`redundant_arm`), or self-motions traced point by point (`traced_arm`), some of which may
 be missed. Fewer joints are searched for the poses that they can hold (`few_joints`); poses of

@@ -270,8 +270,8 @@ class NoCollisionFreeTrajectory(NoTrajectory):
     title = "No collision-free trajectory found"
     remedy = (
         "`pair` names the two bodies that collide: move the obstacle among them, move the start or "
-        "the goal, leave "
-        "`branch` out, or split the motion in two."
+        "the goal, leave `branch` out, or split the motion in two. For two links of an arm of your "
+        "own that cannot touch, give `collision.never_meet` in its description."
     )
 
     pair: tuple[str, str]
@@ -297,8 +297,4 @@ class NoCollisionFreeTrajectory(NoTrajectory):
             if self.cut_short
             else ""
         )
-        return (
-            f"No collision-free motion was found{before}. `pair` names the two bodies that "
-            "collide: move the obstacle "
-            "among them, move the start or the goal, or leave `branch` out."
-        )
+        return f"No collision-free motion was found{before}. {self.remedy}"

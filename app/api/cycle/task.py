@@ -13,6 +13,7 @@ from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.table import to_cycle_csv
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.known_motions import to_kept, to_known_motions
+from joulepath.app.convert.unlikely_units import unlikely_units
 from joulepath.app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
@@ -58,7 +59,7 @@ class CycleAnswer(SolvedCycle, Answer):
             request=request_id,
             robot=request.robot,
             method=request.method,
-            warnings=_warnings(found),
+            warnings=[*unlikely_units(request), *_warnings(found)],
             **cycle,
         )
 

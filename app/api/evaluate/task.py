@@ -24,6 +24,7 @@ from joulepath.app.convert.given_motion import own_times, to_motion, to_waypoint
 from joulepath.app.convert.json_text import parsed_json
 from joulepath.app.convert.query import query_values
 from joulepath.app.convert.recorded import as_logged, read_csv, reading_of, told_by
+from joulepath.app.convert.unlikely_units import unlikely_units
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import sampled_warnings
 from joulepath.app.engine.listening import listener
@@ -128,8 +129,9 @@ class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
     warnings: list[str]
     """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
     mm, one names them, their distance without margins, and the time. Others report possibly missed
-    arm configurations, omitted baselines, or contacts of a tool or payload without a shape. A log
-    also has the remarks of `POST /logs`."""
+    arm configurations, omitted baselines, contacts of a tool or payload without a shape, or
+    figures of the request that are likely in another unit. A log also has the remarks of `POST
+    /logs`."""
 
     @classmethod
     def of(cls, request_id: str, found: Evaluated) -> Self:
@@ -144,7 +146,7 @@ class EvaluateAnswer(EvaluatedMotion, MotionAnswer):
             request=request_id,
             robot=asked.robot,
             arm=arm_fields(asked),
-            warnings=[*found.remarks, *sampled_warnings(result)],
+            warnings=[*unlikely_units(asked), *found.remarks, *sampled_warnings(result)],
             **motion,
         )
 

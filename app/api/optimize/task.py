@@ -9,6 +9,7 @@ from joulepath.app.answers.envelope import AnswerFigures, MotionAnswer
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.candidates import chosen
 from joulepath.app.convert.request import to_problem
+from joulepath.app.convert.unlikely_units import unlikely_units
 from joulepath.app.convert.warnings import certified_warnings
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
@@ -42,8 +43,8 @@ class OptimizeAnswer(SolvedMotion, MotionAnswer):
     warnings: list[str]
     """Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2
     mm, one names them, their distance without margins, and the time. Others say that arm
-    configurations may have been missed, that a baseline is left out, or what a tool or payload
-    without a shape would touch."""
+    configurations may have been missed, that a baseline is left out, what a tool or payload
+    without a shape would touch, or which figures of the request are likely in another unit."""
     answer: str | None = None
     """Path under which this answer is kept: `GET` returns it again. Null if it is not kept: the
     database cannot be written, the answer is larger than all that the service may keep, or it is a
@@ -62,7 +63,7 @@ class OptimizeAnswer(SolvedMotion, MotionAnswer):
             robot=request.robot,
             arm=arm,
             method=request.method,
-            warnings=certified_warnings(solution),
+            warnings=[*unlikely_units(request), *certified_warnings(solution)],
             **motion,
         )
 

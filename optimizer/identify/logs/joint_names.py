@@ -47,7 +47,10 @@ def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None
         )
     }
     time = time_of(names)
-    if "q" not in found or not time:
+    if not found and len(names) == len(joints) + len(time):
+        # a table of positions alone, whose columns are named after the joints
+        found = {"q": _of_word(names, "", joints, False)}
+    if not found.get("q") or not time:
         return None
     return Columns(NAMED, names, time, found)
 
@@ -90,7 +93,8 @@ def _numbered(names: Sequence[str], word: str, count: int) -> tuple[int, ...]:
 
 def _matching(names: Sequence[str], word: str, joint: str) -> Iterator[int]:
     named = re.escape(joint)
-    pattern = f"(?:.*[^a-z0-9])?(?:{named}{_DELIMITER}(?:{word})|(?:{word}){_DELIMITER}{named})"
+    either = f"{named}{_DELIMITER}(?:{word})|(?:{word}){_DELIMITER}{named}" if word else named
+    pattern = f"(?:.*[^a-z0-9])?(?:{either})"
     return (k for k, name in enumerate(names) if re.fullmatch(pattern, name))
 
 

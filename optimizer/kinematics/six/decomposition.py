@@ -129,7 +129,7 @@ class DecomposedArm:
         if simple is None:
             return None
         names = SphericalWrist.of(axes) or URGeometry.of(model, SETTINGS.ur_deviation)
-        # `loop_closure` is faster and finds more than EAIK for axes of other forms
+        # `multi_start` finds more configurations near singularities for axes of other forms
         return None if names is None else cls(chain, names, simple)
 
     def label(self, q: Array) -> BranchLabel:

@@ -1,8 +1,10 @@
 """Inverse kinematics of any six-joint arm by Newton's method from many starts: the last resort.
 
-The first starts are the roots of `loop_closure`, which has all configurations. If Newton's method
-does not reach as many as are real, or for other numbers of joints, starts are drawn uniformly over
-all joint positions, with a fixed seed, in rounds until several consecutive rounds find nothing new.
+Far from singularities, an arm with three parallel or three meeting axes is solved by EAIK alone
+(`simple_arm`). Otherwise, the first starts are the roots of `loop_closure`, which has all
+configurations. If Newton's method does not reach as many as are real, or for other numbers of
+joints, starts are drawn uniformly over all joint positions, with a fixed seed, in rounds until
+several consecutive rounds find nothing new.
 A branch may still be missed, so the result is never `complete`. A general arm has at most sixteen
 branches (E. J. F. Primrose, "On the input-output equation of the general 7R-mechanism", 1986).
 """
@@ -20,11 +22,13 @@ from joulepath.optimizer.exceptions import SingularPose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.isolated import ISOLATED, distinct, lies_on_a_curve
+from joulepath.optimizer.kinematics.joint_axes import JointAxes
 from joulepath.optimizer.kinematics.newton import solved
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
-from joulepath.optimizer.kinematics.six.loop_closure import LoopClosure
+from joulepath.optimizer.kinematics.six.loop_closure import JOINTS, LoopClosure
 from joulepath.optimizer.kinematics.six.named_branches import in_order, numbered
+from joulepath.optimizer.kinematics.six.simple_arm import SimpleArm
 from joulepath.optimizer.problem.branches import BranchLabel, NumberedBranch
 
 
@@ -58,6 +62,11 @@ class MultiStartSettings:
     """
     nearly_singular: float = 0.1
     """Smallest singular value below which another branch is probably near."""
+    regular: float = 1e-3
+    """Smallest singular value of all configurations above which EAIK loses none."""
+    near: float = 0.03
+    """Error [m, 1] of a row of EAIK in the matrix of the pose, up to which it may stand for lost
+    configurations."""
     cached_poses: int = 256
     """Number of poses with cached configurations."""
 
@@ -77,7 +86,7 @@ class MultiStart:
     @classmethod
     def of(cls, chain: Chain) -> MultiStart | None:
         """Inverse kinematics of a chain; None unless it has six joints."""
-        return cls(chain) if chain.nq == 6 else None
+        return cls(chain) if chain.nq == JOINTS else None
 
     def label(self, q: Array) -> BranchLabel:
         """Branch of a configuration (6,) [rad]: the number of the nearest solution, 1 on a
@@ -100,11 +109,28 @@ class MultiStart:
             SingularPose: a solution lies on a self-motion.
         """
         q = self.configurations(T)
-        return q, [numbered(each, q) for each in q]
+        return q, [NumberedBranch(number) for number in range(1, len(q) + 1)]
 
     def configurations(self, T: Array) -> Array:
         """Configurations (n, 6) [rad] of the flange pose T (4, 4), as those of `solve`."""
         return self._found(np.ascontiguousarray(T, dtype=float).tobytes())
+
+    def closed_form(self, T: Array) -> Array | None:
+        """All configurations (n, 6) [rad] by EAIK; None for an arm of another form, or if any may
+        be lost: without a solution, beside a singularity, or near a row that is no solution.
+        """
+        if self._simple is None:
+            return None
+        rows = self._simple.rows(T)
+        T_reached, jacobian = self._chain.flange_and_jacobian(rows)
+        residual = np.abs(T_reached - T).max(axis=(1, 2))
+        near = residual < MULTI_START.near
+        off = residual[near]
+        if not len(off) or off.max() > MULTI_START.solved or np.abs(rows).max() > np.pi:
+            return None
+        # EAIK has a row far from the pose where a wrist is aligned
+        smallest = np.linalg.svd(jacobian, compute_uv=False)[:, -1].min()
+        return rows[near] if smallest > MULTI_START.regular else None
 
     def self_motions(self, T: Array, limits: Limits | None = None) -> list[SelfMotion]:
         """Always empty: no self-motion is known."""
@@ -116,6 +142,13 @@ class MultiStart:
 
     def _solve(self, matrix: bytes) -> Array:
         T = np.frombuffer(matrix).reshape(4, 4)
+        found = self.closed_form(T)
+        found = in_order(self._searched(T) if found is None else found)
+        found.setflags(write=False)
+        return found
+
+    def _searched(self, T: Array) -> Array:
+        """Configurations (n, nq) [rad] by eigenvalues, and from many starts."""
         if self._chain.beyond_length(T) > REACH.beyond:
             return np.zeros((0, self._chain.nq))
         shape = (MULTI_START.round_size, self._chain.nq)
@@ -141,13 +174,17 @@ class MultiStart:
         for k in np.flatnonzero(singular < ISOLATED.singular_value):
             if lies_on_a_curve(self._chain, found[k], T):
                 raise SingularPose("goal", float(singular[k]))
-        found = in_order(found)
-        found.setflags(write=False)
         return found
 
     @cached_property
     def _closure(self) -> LoopClosure | None:
         return LoopClosure.of(self._chain)
+
+    @cached_property
+    def _simple(self) -> SimpleArm | None:
+        if self._chain.nq != JOINTS or self._chain.coupling.follows:
+            return None
+        return SimpleArm.of(JointAxes.of(self._chain).simplified())
 
     def _roots(self, T: Array) -> tuple[Array, bool]:
         """Configurations (n, 6) [rad] by the eigenvalues of the closed loop, and whether they are
@@ -167,10 +204,10 @@ class MultiStart:
         slow = np.flatnonzero((residual >= MULTI_START.solved) & (residual < REACH.near))
         if len(slow):
             q[slow], residual[slow] = solved(self._chain, q[slow], T)
-        done = self._is_reached(residual, self._smallest(q))
-        q = np.vstack([found, np.clip(wrapped(q[done]), -np.pi, np.pi)])
-        smallest = self._smallest(q)
-        return np.asarray(q[distinct(q, np.append(np.zeros(len(found)), residual[done]), smallest)])
+        q = np.vstack([found, np.clip(wrapped(q), -np.pi, np.pi)])
+        residual, smallest = np.append(np.zeros(len(found)), residual), self._smallest(q)
+        done = np.flatnonzero(self._is_reached(residual, smallest))
+        return np.asarray(q[done[distinct(q[done], residual[done], smallest[done])]])
 
     def _is_reached(self, residual: Array, smallest: Array) -> Mask:
         """Which configurations (n,) reach the pose, by their pose errors (n,) [m, rad] and smallest

@@ -39,18 +39,18 @@ def test_a_pose_stamped_in_another_frame_is_refused(header: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "said"),
     [
-        {"orientation": {"x": 0.0, "y": 0.5, "z": 0.0, "w": 0.0}},
-        {"orientation": {"x": 0.0, "y": 1.0, "z": 0.0}},
-        {"orientation": {"x": "0", "y": 1.0, "z": 0.0, "w": 0.0}},
-        {"position": {"x": 0.4, "y": -0.2}},
-        {"quaternion": [0.0, 1.0, 0.0, 0.0]},
+        ({"orientation": {"x": 0.0, "y": 0.5, "z": 0.0, "w": 0.0}}, "norm"),
+        ({"orientation": {"x": 0.0, "y": 1.0, "z": 0.0}}, "each of x, y, z and w"),
+        ({"orientation": {"x": "0", "y": 1.0, "z": 0.0, "w": 0.0}}, "number"),
+        ({"position": {"x": 0.4, "y": -0.2}}, "list"),
+        ({"quaternion": [0.0, 1.0, 0.0, 0.0]}, "validation error"),
     ],
 )
-def test_a_wrong_pose_of_ros_is_refused(changes: dict[str, Any]) -> None:
+def test_a_wrong_pose_of_ros_is_refused(changes: dict[str, Any], said: str) -> None:
     for kind in KINDS:
-        with pytest.raises(ValidationError):
+        with pytest.raises(ValidationError, match=said):
             kind.validate_python(ROS | changes)
 
 

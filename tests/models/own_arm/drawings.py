@@ -45,6 +45,14 @@ def right_angled(nq: int, rng: np.random.Generator) -> Convention:
     return Convention(rng.choice([-1.0, 1.0], nq), zeros, np.array(frames))
 
 
+def inclined(nq: int, rng: np.random.Generator) -> Convention:
+    """As `right_angled`, with the frames of every second link inclined by a multiple of 15°."""
+    designed = right_angled(nq, rng)
+    angles = rng.integers(1, 24, nq + 1) * (np.arange(nq + 1) % 2) * np.pi / 12
+    turns = [pin.exp3(angle * np.eye(3)[rng.integers(3)]) for angle in angles]
+    return Convention(designed.senses, designed.zeros, designed.frames @ turns)
+
+
 def drawn(robot: Robot, convention: Convention, figure: Figure = repr) -> str:
     """URDF of the robot in a convention; `figure` writes the angles of origins."""
     model, nq = robot.model, robot.nq

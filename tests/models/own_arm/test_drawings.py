@@ -13,7 +13,7 @@ from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.robot import Robot
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.models.own_arm.arms import AMPLE, robot
-from tests.models.own_arm.drawings import Convention, any_convention, drawn, right_angled
+from tests.models.own_arm.drawings import Convention, any_convention, drawn, inclined, right_angled
 from tests.optimizer.kinematics.six_joints import KUKA, UR5E, flange
 from tests.selection import long_but
 
@@ -60,8 +60,8 @@ def test_rounded_figures_are_the_arm_that_they_stand_for(
     arm: Robot, figure: Callable[[float], str]
 ) -> None:
     rng = np.random.default_rng(22)
-    for _ in range(6):
-        convention = right_angled(6, rng)
+    for drawing in (right_angled, inclined) * 3:
+        convention = drawing(6, rng)
         made = robot(described(drawn(arm, convention, figure)))
         assert required_inverse_kinematics(made, "goal").complete
         q = rng.uniform(-2, 2, 6)
@@ -69,17 +69,27 @@ def test_rounded_figures_are_the_arm_that_they_stand_for(
 
 
 @pytest.mark.parametrize(
-    ("written", "quarter"),
-    [("1.571", 1), ("-1.5707", -1), ("3.1416", 2), ("3.14159", 2), ("4.712", 3), ("1.5707963", 1)],
+    ("written", "degrees"),
+    [
+        ("1.571", 90),
+        ("-1.5707", -90),
+        ("3.1416", 180),
+        ("3.14159", 180),
+        ("4.712", 270),
+        ("1.5707963", 90),
+        ("0.7854", 45),
+        ("-0.262", -15),
+        ("1.047198", 60),
+    ],
 )
-def test_a_quarter_turn_is_taken_as_meant(written: str, quarter: int) -> None:
-    exact = robot(described(_first_turned(repr(quarter * np.pi / 2))))
+def test_a_rounded_angle_is_taken_as_meant(written: str, degrees: int) -> None:
+    exact = robot(described(_first_turned(repr(float(np.radians(degrees))))))
     rounded = robot(described(_first_turned(written)))
     q = np.linspace(-1, 1, 6)
     assert flange(rounded, q) == pytest.approx(flange(exact, q), abs=1e-14)
 
 
-@pytest.mark.parametrize("written", ["1.5709", "1.57", "0.001", "1.5702", "3.14"])
+@pytest.mark.parametrize("written", ["1.5709", "1.57", "0.001", "1.5702", "3.14", "0.79", "0.7851"])
 def test_another_angle_stays_as_it_is(written: str) -> None:
     turned = robot(described(_first_turned(written)))
     straight = robot(described(_first_turned("0")))

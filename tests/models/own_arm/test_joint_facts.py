@@ -47,7 +47,15 @@ def test_a_safety_controller_without_a_range_limits_nothing(part: str) -> None:
 
 
 def test_soft_limits_beyond_the_range_are_refused() -> None:
-    refused("urdf", "'shoulder' cannot move: its soft limits", with_parts(soft(2.5, 3.0), ""))
+    for lower, upper in ((2.5, 3.0), (1.0, -1.0)):
+        refused("urdf", "'shoulder' cannot move: its soft", with_parts(soft(lower, upper), ""))
+
+
+def test_one_soft_limit_alone_holds() -> None:
+    limits = robot(
+        with_parts('<safety_controller soft_upper_limit="1" k_velocity="1"/>', "")
+    ).limits
+    assert limits.q_min.tolist() == [-2.0, -2.5] and limits.q_max.tolist() == [1.0, 2.5]
 
 
 def test_friction_of_all_joints_is_taken_with_the_letter_of_the_urdf() -> None:
@@ -114,6 +122,20 @@ def test_gravity_of_a_tilted_base_is_that_of_the_upright_root() -> None:
     assert (Arm(robot=made, gravity=given).gravity == given).all()
 
 
+def test_a_joint_beneath_the_base_turns_gravity_and_is_named() -> None:
+    table = (
+        '<link name="floor"/><joint name="table" type="revolute"><parent link="floor"/>'
+        '<child link="base"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="9" '
+        'velocity="1"/></joint></robot>'
+    )
+    given = replace(PLAIN, urdf=PLAIN.urdf.replace("</robot>", table), base="base")
+    assert any("turn, and gravity with them: table." in each for each in own_figures("m", given)[1])
+    held = replace(given, locked={"table": 0.5})
+    assert not any("with them" in each for each in own_figures("m", held)[1])
+    tilted = 9.81 * np.array([0.0, -np.sin(0.5), -np.cos(0.5)])
+    assert robot(held).gravity == pytest.approx(tilted)
+
+
 def test_gravity_of_an_upright_base_is_no_figure() -> None:
     figures, warnings = own_figures("mine", PLAIN)
     assert "gravity" not in figures["kinematics"]
@@ -126,4 +148,9 @@ def test_elements_without_effect_are_named() -> None:
     assert (
         "Elements of the URDF without effect: gazebo, transmission."
         in own_figures("mine", replace(PLAIN, urdf=urdf))[1]
+    )
+    inside = with_parts('<calibration rising="0"/>', '<limit lower="0" upper="1"/>')
+    assert (
+        "Elements of the URDF without effect: calibration, second limit of elbow."
+        in own_figures("mine", inside)[1]
     )

@@ -91,6 +91,15 @@ def test_joints_with_the_prefix_of_an_arm(ur: Recording) -> None:
     np.testing.assert_allclose(positions(text.encode()), ur.q, atol=WRITTEN)
 
 
+@pytest.mark.parametrize("prefix", ["", "left_", "cell/ur5e::"])
+def test_a_table_of_positions_under_the_names_of_the_joints(ur: Recording, prefix: str) -> None:
+    order = np.argsort(UR.joint_names)
+    header = ["t", *(prefix + UR.joint_names[k] for k in order)]
+    rows = np.column_stack([ur.time, ur.q[:, order]]).tolist()
+    text = "\n".join([",".join(header), *(",".join(f"{x:.12g}" for x in row) for row in rows)])
+    np.testing.assert_allclose(positions(text.encode()), ur.q, atol=WRITTEN)
+
+
 def test_a_nominal_clock_is_named_and_right_speeds_are_kept(ur: Recording) -> None:
     exact = recorded(UR, truth_of(UR), moves=3, noise=SILENT)
     slow = csv_of(exact, time=exact.time * 0.62, without="aiP")
