@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from uuid import uuid4
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from tests.browser.pages import (
     FIRST,
     SHOWN,
     fill_json,
+    go,
     new_cell,
     opened,
     optimised,
@@ -84,6 +86,28 @@ def test_projects_are_named_saved_and_opened(
         page.get_by_label("Search projects").fill("New")
         page.get_by_role("dialog").get_by_role("button", name="New cell").first.click()
         assert state(page, "project.name") == "New cell"
+
+
+def test_a_kept_answer_comes_back_as_it_was_typed(browser: Browser, service: Server) -> None:
+    """In another browser, from the list of answers: poses as poses, and numbers digit by digit."""
+    name = f"Night cell {uuid4().hex[:6]}"
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        page.get_by_label("Name of the project").fill(name)
+        page.get_by_label("Name of the project").blur()
+        type_into(page, "/payload/mass", "1,2500")
+        type_into(page, "/goal/pose/position/2", "449,125")
+        optimised(page)
+        asked = state(page, "request")
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        go(page, "Library")
+        page.get_by_label("Search answers").fill(name)
+        page.locator("#answers button.choice", has_text=name).click()
+        until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.answered)")
+        assert state(page, "request") == asked and not state(page, "stale")
+        expect(page.locator("[data-pointer='/payload/mass']")).to_have_value("1,2500")
+        expect(page.locator("[data-pointer='/goal/pose/position/2']")).to_have_value("449,125")
 
 
 @pytest.mark.parametrize(

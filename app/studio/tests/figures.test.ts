@@ -1,7 +1,8 @@
 import { busyAfter } from "../src/logs/model";
 import { expect, it } from "vitest";
 import { costsOf, DEFAULT_ECONOMICS } from "../src/store/economics";
-import { parseMoves, requestsOf } from "../src/store/moves";
+import { csvOfJob, type Job, type JobRow } from "../src/jobs/model";
+import { moveName, parseMoves, requestsOf } from "../src/store/moves";
 import { Problem } from "../src/store/client";
 import { trouble } from "../src/store/state";
 import { tell } from "../src/store/trouble";
@@ -83,6 +84,22 @@ it("a table of moves becomes requests of the cell", () => {
     payload: { mass: 1.5, com: [0, 0, 0.05] },
   });
   expect(read.moves[0]).toMatchObject({ from: "bin", to: "shelf", mass: 1.5 });
+});
+
+it("the moves of a job have names, also in its CSV", () => {
+  const move = { from: "bin\u200b 1", to: "s".repeat(300), mass: null, start: "", goal: "" };
+  expect(moveName(move)).toBe(`bin 1 to ${"s".repeat(191)}`);
+  const row = { index: 0, name: 'a "b", c', kind: "optimize", state: "done", answer: "/answers/1" };
+  const rows = [row, { ...row, index: 1, name: null }].map(
+    (each) => ({ ...each, energy: 1, duration: 2, problem: null }) as JobRow,
+  );
+  const notes = { id: "j", source: "", masses: [1.5, null], requests: [] };
+  const shown = { job: {} as Job, rows, notes, details: null };
+  expect(csvOfJob(shown).split("\n").slice(0, 3)).toEqual([
+    "no,move,kg,state,duration_s,energy_J,p5_J,p95_J,rival,rival_J,saving,problem,answer",
+    '1,"a ""b"", c",1.5,done,2,1,,,,,,,/answers/1',
+    "2,move 2,,done,2,1,,,,,,,/answers/1",
+  ]);
 });
 
 it("targets in rows are moves from each to the next", () => {

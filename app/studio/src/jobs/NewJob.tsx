@@ -3,7 +3,7 @@ import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
 import { robotNow } from "../picture/pictured";
 import { post } from "../store/client";
-import { parseMoves, requestsOf } from "../store/moves";
+import { moveName, parseMoves, requestsOf } from "../store/moves";
 import { keepJob } from "../store/persist";
 import { robotName } from "../store/request";
 import { request, project } from "../store/state";
@@ -31,9 +31,13 @@ export function NewJob({ onClose }: { onClose: () => void }) {
     setWhy("");
     try {
       const requests = requestsOf(moves, reading!, request.value, joints);
-      const bodies = requests.map((each) => ({ optimize: { ...each, candidates: "none" } }));
+      const bodies = requests.map((each, k) => ({
+        name: moveName(moves[k]!),
+        optimize: { ...each, candidates: "none" },
+      }));
       const { id } = await post<Job>("jobs", { name, requests: bodies });
-      await keepJob({ id, source, moves, requests }).catch(() => undefined);
+      const masses = moves.map(({ mass }) => mass);
+      await keepJob({ id, source, masses, requests }).catch(() => undefined);
       await loadJobs();
       await loadJob(id);
       onClose();
@@ -135,10 +139,10 @@ export function NewJob({ onClose }: { onClose: () => void }) {
               {moves.length} moves, read as {reading.echo}.
             </p>
             <ul class="hint">
-              {moves.slice(0, SHOWN).map(({ from, to, mass }, k) => (
+              {moves.slice(0, SHOWN).map((move, k) => (
                 <li key={k}>
-                  {from} → {to}
-                  {mass === null ? "" : `, ${figure(mass)} kg`}
+                  {moveName(move)}
+                  {move.mass === null ? "" : `, ${figure(move.mass)} kg`}
                 </li>
               ))}
             </ul>
