@@ -1,11 +1,12 @@
 import { busyAfter } from "../src/logs/model";
 import { expect, it } from "vitest";
 import { costsOf, DEFAULT_ECONOMICS } from "../src/store/economics";
-import { csvOfJob, type Job, type JobRow } from "../src/jobs/model";
+import { csvOfJob, refusal, type Job, type JobRow } from "../src/jobs/model";
 import { moveName, parseMoves, requestsOf } from "../src/store/moves";
 import { Problem } from "../src/store/client";
 import { trouble } from "../src/store/state";
 import { tell } from "../src/store/trouble";
+import type { ApiRequest, ProblemDetails } from "../src/store/types";
 import { asShown, atMost, figure, parseNumber, shown, typedValue } from "../src/store/units";
 import { MOVE } from "./cells";
 
@@ -102,6 +103,14 @@ it("the moves of a job have names, also in its CSV", () => {
   ]);
 });
 
+it("a table that the service refuses is told by its rows", () => {
+  const loc = ["body", "requests", 2, "optimize", "payload", "mass"];
+  const errors = [{ loc, msg: "Input should be less than or equal to 2000" }];
+  expect(refusal(new Problem({ title: "Invalid request", errors }))).toBe(
+    "Row 3, payload.mass: Input should be less than or equal to 2000.",
+  );
+});
+
 it("targets in rows are moves from each to the next", () => {
   const read = parseMoves("a;0;-90;90;-90;-90;0\nb;30;-90;90;-90;-90;0\nc;60;-90;90;-90;-90;0", 6);
   if ("why" in read) throw new Error(read.why);
@@ -149,6 +158,30 @@ it("what the service says has the units and the names of the page", () => {
       { pointer: "/payload/mass", text: "Too heavy" },
     ],
   });
+});
+
+it("a problem stands at the place that it names", () => {
+  const stops = [{ name: "bin" }, { name: "bead/2" }, {}];
+  const round = { ...MOVE, stops } as ApiRequest;
+  const at = (details: ProblemDetails, asked = round) => {
+    tell(new Problem({ title: "No", detail: "Why.", ...details }), asked);
+    expect(trouble.value!.fields.map(({ pointer }) => pointer)).toEqual(
+      trouble.value!.pointer === null ? [] : [trouble.value!.pointer],
+    );
+    return trouble.value!.pointer;
+  };
+  const type = "/problems/duration-too-short";
+  expect(at({ target: "goal" }, MOVE)).toBe("/goal");
+  expect(at({ path: "path" }, MOVE)).toBe("/path");
+  expect(at({ target: "stops.2.target" })).toBe("/stops/2/target");
+  expect(at({ target: "stops/bead/2" })).toBe("/stops/1/target");
+  expect(at({ path: "stops/bin/approach" })).toBe("/stops/0/target");
+  expect(at({ stop: "stops/3" })).toBe("/stops/2/target");
+  expect(at({ stop: "start" })).toBe("/start");
+  expect(at({ type }, MOVE)).toBe("/duration");
+  expect(at({ type })).toBe("/time");
+  expect(at({ pair: ["forearm_link", "table"] })).toBe("/scene/obstacles/0");
+  expect(at({ pair: ["forearm_link", "tool"] })).toBeNull();
 });
 
 it("a mass of a table that is no number is named, and not left out", () => {

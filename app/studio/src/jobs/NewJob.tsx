@@ -8,7 +8,7 @@ import { keepJob } from "../store/persist";
 import { robotName } from "../store/request";
 import { request, project } from "../store/state";
 import { figure } from "../store/units";
-import { loadJob, loadJobs, type Job } from "./model";
+import { loadJob, loadJobs, refusal, type Job } from "./model";
 
 const SAMPLE = "from; to; kg; x mm; y; z; rx rad; ry; rz; x mm; y; z; rx; ry; rz";
 const SHOWN = 5;
@@ -42,7 +42,7 @@ export function NewJob({ onClose }: { onClose: () => void }) {
       await loadJob(id);
       onClose();
     } catch (error) {
-      setWhy((error as Error).message);
+      setWhy(refusal(error));
     } finally {
       setBusy(false);
     }

@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { get, listed, send } from "../store/client";
 import { jobNotes, type JobNotes } from "../store/persist";
+import { said } from "../store/trouble";
 import type { Interval, ProblemDetails, Solution } from "../store/types";
 
 export interface Job {
@@ -42,6 +43,10 @@ export interface Opened {
 }
 
 const PAGE = 1000;
+
+/** Why a table was refused, by its rows. */
+export const refusal = (error: unknown): string =>
+  said(error).replace(/requests\.(\d+)\.optimize\./g, (_, k) => `Row ${Number(k) + 1}, `);
 
 export const jobs = signal<Job[] | null>(null);
 export const opened = signal<Opened | null>(null);
