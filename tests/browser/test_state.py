@@ -5,12 +5,13 @@ where it was made.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from uuid import uuid4
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.app.live import Server
 from tests.browser.pages import (
@@ -103,7 +104,7 @@ def test_a_kept_answer_comes_back_as_it_was_typed(browser: Browser, service: Ser
         until(page, SHOWN)
         go(page, "Library")
         page.get_by_label("Search answers").fill(name)
-        page.locator("#answers button.choice", has_text=name).click()
+        page.locator("#answers b", has_text=re.compile(f"^{name}$")).click()
         until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.answered)")
         assert state(page, "request") == asked and not state(page, "stale")
         expect(page.locator("[data-pointer='/payload/mass']")).to_have_value("1,2500")
@@ -163,6 +164,27 @@ def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
     type_into(page, "/payload/mass", "-1")
     page.locator("#optimise").click()
     expect(page.locator("#form")).to_contain_text("greater than or equal to 0")
+
+
+def test_what_is_typed_stays_while_poses_are_checked(page: Page) -> None:
+    """The answer of the service to one number comes while the next one is typed."""
+    fill_json(page, FIRST)
+    show_json(page, False)
+    row = page.locator("[data-row='/goal']")
+    expect(row).to_contain_text("free")
+    held: list[Route] = []
+    page.route("**/ik", lambda route: held.append(route))
+    type_into(page, "/goal/pose/position/2", "449,125")
+    expect(row).to_contain_text("checking")
+    cell = page.locator("[data-pointer='/goal/pose/position/0']")
+    cell.fill("-351,5")
+    while held:
+        held.pop().continue_()
+    expect(row).to_contain_text("free")
+    expect(cell).to_have_value("-351,5")
+    cell.press("Enter")
+    assert state(page, "request.goal.pose.position") == [-0.3515, -0.52, 0.449125]
+    page.unroute("**/ik")
 
 
 def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:

@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
+import { useDraft } from "../ui/draft";
 import { Errors } from "../ui/Errors";
 import { Menu } from "../ui/Menu";
 import { NumberCell } from "../ui/NumberCell";
@@ -72,12 +73,13 @@ function rowKey(event: KeyboardEvent, row: Row): (() => void) | null {
 
 function StopName({ row }: { row: Row }) {
   const pointer = `${row.pointer.replace(/\/target$/, "")}/name`;
+  const { field } = useDraft(row.name);
   return (
     <input
       type="text"
       class="name"
       aria-label={`Name of ${row.name}`}
-      value={row.name}
+      {...field}
       onChange={(event) => edit(put(request.value, pointer, event.currentTarget.value))}
     />
   );
