@@ -135,8 +135,8 @@ class OutsideLimits(JoulepathError):
     title = "Joint position outside its limits"
     remedy = "Give a value between `lower` and `upper`."
 
-    target: Annotated[str, Internal]
-    """`start`, `goal`, `centre`, or the target of a stop."""
+    target: str
+    """`start`, `goal` or `centre`; or the target of a stop as a field, such as `stops.0.target`."""
     joint: str
     """Name of the joint."""
     value: Radians

@@ -1,4 +1,6 @@
-"""Strict reading of JSON from clients: errors with line and column, no duplicate names."""
+"""JSON of clients: a strict reader, with line and column of errors and no duplicate names; and
+requests as they were sent.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ import re
 from typing import Any
 
 import jiter
+from pydantic import BaseModel
 
 from joulepath.app.exceptions.base import InvalidRequest
 
@@ -70,3 +73,8 @@ def _message(said: str) -> str:
 
 def _refused(message: str) -> InvalidRequest:
     return InvalidRequest([{"loc": ["body"], "msg": message}])
+
+
+def sent(request: BaseModel) -> bytes:
+    """The JSON of a request as it was sent, without defaults."""
+    return request.model_dump_json(exclude_unset=True).encode()

@@ -30,6 +30,8 @@ class StoredAnswer:
     figures: AnswerFigures = field(default_factory=AnswerFigures)
     kind: str | None = None
     """Endpoint of the answer; None for that of all answers of its result."""
+    asked: bytes | None = None
+    """Its request as it was sent (JSON); None if it is kept elsewhere or is that of another."""
 
     @property
     def path(self) -> str:
@@ -45,7 +47,8 @@ class TaskResult:
     `kept_as` is the id under which the document itself is to be kept; it is in the second field,
     `id`, and the path in the last field, `answer`. `figures` are its figures in lists. `is_optimal`
     says that more time would not improve it. `age` [s] is the age of a repeated document. `motions`
-    are the motions of a cell used or found by the task, by their keys, for later cycles.
+    are the motions of a cell used or found by the task, by their keys, for later cycles. `asked` is
+    the request as it was sent, to be kept with the document.
     """
 
     document: bytes
@@ -56,6 +59,7 @@ class TaskResult:
     is_optimal: bool = False
     age: int | None = None
     motions: Mapping[str, bytes] = field(default_factory=dict)
+    asked: bytes | None = None
 
     @classmethod
     def of_json(cls, content: Any, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
@@ -64,12 +68,20 @@ class TaskResult:
 
     @classmethod
     def of_kept_json(
-        cls, content: Any, figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()
+        cls,
+        content: Any,
+        figures: AnswerFigures,
+        stored: tuple[StoredAnswer, ...] = (),
+        asked: bytes | None = None,
     ) -> TaskResult:
         """A JSON document to be kept, with `request` and `id` first and `answer` last."""
-        is_optimal = figures.status == "optimal"
         return cls(
-            json_document(content), "application/json", stored, None, figures, is_optimal
+            json_document(content),
+            "application/json",
+            stored,
+            figures=figures,
+            is_optimal=figures.status == "optimal",
+            asked=asked,
         ).kept()
 
     def kept(self) -> TaskResult:

@@ -35,6 +35,7 @@ PAGES = PageSettings()
 
 _COLUMNS = (
     "index",
+    "name",
     "kind",
     "state",
     "attempt",
@@ -61,7 +62,7 @@ def summary(view: JobView) -> dict[str, Any]:
 
 def status(request: JobRequest) -> dict[str, Any]:
     """The fields of a request of a job."""
-    names = ("kind", "state", "attempt", "wall_time", "energy", "duration", "status")
+    names = ("name", "kind", "state", "attempt", "wall_time", "energy", "duration", "status")
     answer = None if request.answer_id is None else f"/answers/{request.answer_id}"
     own = {name: getattr(request, name) for name in names}
     return {"index": request.number, **own, "answer": answer, "problem": request.problem}

@@ -28,43 +28,54 @@ Kind = Literal[
 ]
 
 
-class OptimizeJob(Request):
+class NamedRequest(Request):
+    """A request of a job, beside the name of its row."""
+
+    name: Name | None = described(
+        "Name of the request in the job's table, CSV and report.",
+        None,
+        "bin to shelf",
+        default=None,
+    )
+
+
+class OptimizeJob(NamedRequest):
     """A request to `POST /optimize`."""
 
     optimize: OptimizeRequest = described("A body of `POST /optimize`.", None, OPTIMIZE)
 
 
-class CycleJob(Request):
+class CycleJob(NamedRequest):
     """A request to `POST /cycle`."""
 
     cycle: CycleRequest = part("A body of `POST /cycle`.")
 
 
-class PlacementJob(Request):
+class PlacementJob(NamedRequest):
     """A request to `POST /placement`."""
 
     placement: PlacementRequest = part("A body of `POST /placement`.")
 
 
-class ParetoJob(Request):
+class ParetoJob(NamedRequest):
     """A request to `POST /pareto`."""
 
     pareto: ParetoRequest = described("A body of `POST /pareto`.", None, OPTIMIZE)
 
 
-class CompareJob(Request):
+class CompareJob(NamedRequest):
     """A request to `POST /compare`."""
 
     compare: CompareRequest = described("A body of `POST /compare`.", None, OPTIMIZE)
 
 
-class WhatifJob(Request):
+class WhatifJob(NamedRequest):
     """A request to `POST /whatif`."""
 
     whatif: WhatifRequest = part("A body of `POST /whatif`.")
 
 
-class EvaluateJob(Request):
+class EvaluateJob(NamedRequest):
     """A request to `POST /evaluate`."""
 
     evaluate: EvaluateRequest = described("A JSON body of `POST /evaluate`.", None, EVALUATE)
@@ -149,6 +160,7 @@ class RequestStatus(Response):
     """One request of a job."""
 
     index: int = described("Index in the job, from 0.", "1", 3)
+    name: str | None = described("Name of the request; null without one.", None, "bin to shelf")
     kind: Kind = described("Endpoint of the request.", None, "optimize")
     state: RequestState = described("State of the request.", None, "done")
     attempt: int = described(

@@ -19,6 +19,10 @@ class Lengths:
     """Name of an API key."""
     robot: int = 64
     """Name of a robot."""
+    pointer: int = 200
+    """JSON pointer to a number of a request."""
+    number: int = 64
+    """Number as it was typed."""
     tool: int = 64
     """Name of a tool."""
     holder: int = 128

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
 
+import orjson
 from sqlalchemy import Select, and_, func, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
@@ -16,7 +17,11 @@ from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import AnswerInUse, UnknownAnswer
 from joulepath.app.store.paging import having, position_after, position_of
-from joulepath.app.store.tables import Answer, Job, is_id, now
+from joulepath.app.store.tables import Answer, Iteration, Job, JobRequest, is_id, now
+
+_WITHOUT_DOCUMENTS = [
+    defer(column, raiseload=True) for column in (Answer.body, Answer.request, Answer.typed)
+]
 
 
 def put(
@@ -27,15 +32,20 @@ def put(
     owner: str | None = None,
     is_part: bool = False,
 ) -> int:
-    """Stores an answer, the JSON document of the endpoint `kind`. Returns its size as it is kept
-    [byte]. A part is a motion of another answer.
+    """Stores an answer, the JSON document of the endpoint `kind`, and its request. Returns their
+    size as they are kept [byte]. A part is a motion of another answer.
 
     The answer of a study stays until the study is deleted; any other until `prune` deletes it.
     """
-    body = packed(answer.body)
-    stored = replace(answer, body=body)
-    session.add(_row(kind, stored, study_id=study_id, owner=owner, is_part=is_part))
-    return len(body)
+    row = _row(kind, packed_answer(answer), study_id=study_id, owner=owner, is_part=is_part)
+    session.add(row)
+    return row.size
+
+
+def packed_answer(answer: StoredAnswer) -> StoredAnswer:
+    """The answer with its document and its request compressed."""
+    asked = None if answer.asked is None else packed(answer.asked)
+    return replace(answer, body=packed(answer.body), asked=asked)
 
 
 def put_of_job(
@@ -46,14 +56,15 @@ def put_of_job(
 
 
 def _row(kind: str, compressed: StoredAnswer, **whose: str | bool | None) -> Answer:
-    id, body, figures = compressed.id, compressed.body, compressed.figures
+    body, asked = compressed.body, compressed.asked
     return Answer(
-        id=id,
+        id=compressed.id,
         kind=compressed.kind or kind,
         created=now(),
-        size=len(body),
+        size=len(body) + len(asked or b""),
         body=body,
-        **vars(figures),
+        request=asked,
+        **vars(compressed.figures),
         **whose,
     )
 
@@ -64,6 +75,16 @@ def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
     if answer is None:
         raise UnknownAnswer
     return answer, unpacked(answer.body)
+
+
+def request_of(session: Session, answer: Answer) -> Any:
+    """The request of an answer as it was sent, for orjson; None for a part of another answer."""
+    asked = answer.request or session.scalar(
+        select(JobRequest.body).where(JobRequest.answer_id == answer.id)
+    )
+    if asked is not None:
+        return orjson.Fragment(unpacked(asked))
+    return session.scalar(select(Iteration.request).where(Iteration.answer_id == answer.id))
 
 
 def of_job(session: Session, job_id: str, kind: str) -> bytes | None:
@@ -107,19 +128,29 @@ def page(
         query = query.where(
             or_(Answer.created < created, and_(Answer.created == created, Answer.id < answer_id))
         )
-    found = list(session.scalars(query.options(defer(Answer.body, raiseload=True))))
+    found = list(session.scalars(query.options(*_WITHOUT_DOCUMENTS)))
     more, found = len(found) > limit, found[:limit]
     return found, position_of(found[-1]) if more else None
 
 
-def rename(session: Session, answer_id: str, name: str | None, client: Client) -> Answer:
-    """Gives an answer a name, or none. Raises UnknownAnswer or NotOwner."""
-    query = select(Answer).where(Answer.id == answer_id).options(defer(Answer.body, raiseload=True))
+def rename(
+    session: Session,
+    answer_id: str,
+    name: str | None,
+    typed: dict[str, str] | None,
+    client: Client,
+) -> Answer:
+    """Gives an answer a name, or none, and the texts of its request's numbers, if there are any.
+    Raises UnknownAnswer or NotOwner.
+    """
+    query = select(Answer).where(Answer.id == answer_id).options(*_WITHOUT_DOCUMENTS)
     answer = session.scalar(query) if is_id(answer_id) else None
     if answer is None:
         raise UnknownAnswer
     check_owner(client, answer.owner)
     answer.name = name
+    if typed is not None:
+        answer.typed = typed
     return answer
 
 

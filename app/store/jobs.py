@@ -37,14 +37,15 @@ _AT_A_TIME = 50
 class NewRequest:
     """A validated request to the endpoint `kind`.
 
-    It has a `body` of compressed JSON, a deadline [s], and its meaning, if the answer to an equal
-    request may be used.
+    It has a `body` of compressed JSON, a deadline [s], its meaning, if the answer to an equal
+    request may be used, and the name of its row.
     """
 
     kind: str
     body: bytes
     deadline: float
     meaning: Meaning | None = None
+    name: str | None = None
 
 
 @dataclass(frozen=True)

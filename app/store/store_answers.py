@@ -57,7 +57,7 @@ async def keep_answer(
     Without the database, the result has no id of its own.
     """
     assert result.kept_as is not None
-    kept = StoredAnswer(result.kept_as, result.document, result.figures)
+    kept = StoredAnswer(result.kept_as, result.document, result.figures, asked=result.asked)
 
     def remember(session: Session) -> None:
         if asked is not None:

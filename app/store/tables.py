@@ -161,9 +161,13 @@ class Answer(Table):
     duration: Mapped[float | None]
     status: Mapped[str | None] = mapped_column(String(16))
     size: Mapped[int]
-    """Size of the compressed body [byte]."""
+    """Size of the compressed body and request [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
+    request: Mapped[bytes | None] = mapped_column(LargeBinary)
+    """The request as it was sent: JSON, compressed. Those of jobs and studies are with these."""
     name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
+    typed: Mapped[dict[str, str] | None] = mapped_column(JSON(none_as_null=True))
+    """Texts in which the numbers of the request were typed, by JSON pointers."""
     is_part: Mapped[bool] = mapped_column(server_default=false())
     """Whether the answer is a motion of another answer: of a cycle, of a front, of what-if."""
 
@@ -266,6 +270,7 @@ class JobRequest(Table):
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     """Index in the job, from 0."""
+    name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
     kind: Mapped[str] = mapped_column(String(32))
     """Endpoint of the request."""
     deadline: Mapped[float]

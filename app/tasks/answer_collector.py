@@ -20,10 +20,11 @@ class AnswerCollector:
     def __init__(self) -> None:
         self._answers: list[StoredAnswer] = []
 
-    def add(self, content: Answer, endpoint: str | None = None) -> str:
+    def add(self, content: Answer, endpoint: str | None = None, asked: bytes | None = None) -> str:
         """Adds an answer, sets its fields `id` and `answer`, and returns its path.
 
-        `endpoint` is its kind where it differs from that of most answers of the result.
+        `endpoint` is its kind where it differs from that of most answers of the result, and `asked`
+        its request (JSON).
 
         Raises InvalidRequest above MOST_BYTES.
         """
@@ -31,7 +32,7 @@ class AnswerCollector:
         own = {"id": answer_id, "answer": StoredAnswer(answer_id, b"").path}
         kind: type = type(content)
         kept = replace(content, **{name: own[name] for name in own.keys() & shown_fields(kind)})
-        answer = StoredAnswer(answer_id, json_document(kept), content.figures, endpoint)
+        answer = StoredAnswer(answer_id, json_document(kept), content.figures, endpoint, asked)
         self._answers.append(answer)
         if sum(len(each.body) for each in self._answers) > MOST_BYTES:
             message = (

@@ -9,13 +9,14 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from joulepath.app.convert.json_text import parsed_json
+from joulepath.app.convert.json_text import parsed_json, sent
 from joulepath.app.convert.packed import packed
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import FieldError, InvalidRequest
 from joulepath.app.http.problems import MOST_ERRORS, invalid_request
 from joulepath.app.schemas.common import Request
 from joulepath.app.schemas.evaluate import EvaluateRequest
+from joulepath.app.schemas.jobs import KINDS
 from joulepath.app.schemas.jobs import NewJob as JobModel
 from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.tasks.read_body import HeldBody
@@ -105,12 +106,13 @@ def _job(asked: JobModel, deadlines: Deadlines, fresh: bool) -> NewJob:
     wrong: list[FieldError] = []
     requests = []
     for index, each in enumerate(asked.requests):
-        ((kind, request),) = ((name, getattr(each, name)) for name in type(each).model_fields)
+        kind = next(kind for kind in KINDS if hasattr(each, kind))
+        request: Request = getattr(each, kind)
         too_long = _too_long(request, deadlines)
         if too_long is not None:
             wrong.append({"loc": ["body", "requests", index, kind, "deadline"], "msg": too_long})
         else:
-            requests.append(_new_request(kind, request, deadlines, fresh))
+            requests.append(_new_request(kind, request, deadlines, fresh, each.name))
     if wrong:
         raise InvalidRequest(wrong[:MOST_ERRORS])
     told_apart_by = f"{asked.keep_going} {asked.name}"
@@ -123,16 +125,17 @@ def _too_long(asked: Request, deadlines: Deadlines) -> str | None:
     return f"deadline must be at most {deadlines.longest:g} s." if too_long else None
 
 
-def _new_request(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -> NewRequest:
+def _new_request(
+    kind: str, asked: Request, deadlines: Deadlines, fresh: bool, name: str | None = None
+) -> NewRequest:
     given = getattr(asked, "deadline", None)
     deadline = min(deadlines.without if given is None else given, deadlines.longest)
-    body = asked.model_dump_json(exclude_unset=True).encode()
     meaning = None if fresh else meaning_of(kind, asked)
-    return NewRequest(kind, packed(body), deadline, meaning)
+    return NewRequest(kind, packed(sent(asked)), deadline, meaning, name)
 
 
 def _fingerprint(requests: Iterable[NewRequest], rest: str) -> str:
     digest = hashlib.sha256(rest.encode())
     for each in requests:
-        digest.update(f"\0{each.kind}\0{len(each.body)}\0".encode() + each.body)
+        digest.update(f"\0{each.kind}\0{each.name}\0{len(each.body)}\0".encode() + each.body)
     return digest.hexdigest()

@@ -17,8 +17,8 @@ answers to short motions, of 50 kB each, these are 1,300 requests."""
 
 
 def job_document(session: Session, job_id: str, most: int) -> bytes:
-    """The job as JSON: `name`, and `rows` with `index`, `kind`, `state`, `request`, `answer` and
-    `problem`.
+    """The job as JSON: `name`, and `rows` with `index`, `name`, `kind`, `state`, `request`,
+    `answer` and `problem`.
 
     Raises UnknownJob, or InvalidRequest for more than `most` requests or `MOST_BYTES`.
     """
@@ -34,6 +34,7 @@ def job_document(session: Session, job_id: str, most: int) -> bytes:
         rows.append(
             {
                 "index": row.number,
+                "name": row.name,
                 "kind": row.kind,
                 "state": row.state,
                 "problem": row.problem,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import orjson
@@ -26,6 +26,7 @@ from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.app.store.answers import packed_answer
 from joulepath.app.store.leases import FoundFigures
 from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.optimizer.deadline import Deadline
@@ -81,7 +82,7 @@ class JobRequestTask:
         return JobResult(
             packed(result.document),
             result.media_type,
-            tuple(replace(part, body=packed(part.body)) for part in result.stored),
+            tuple(map(packed_answer, result.stored)),
             result.kept_as,
             figures,
             result.is_optimal,

@@ -85,13 +85,6 @@ def trapezoid(limits: Limits, q_start: Array, q_goal: Array, duration: float) ->
     return _trapezoid(q_start, q_goal, duration, blend)
 
 
-def even_speed(duration: float) -> SampledMotion:
-    """Trapezoidal speed profile of one coordinate from 0 to 1 in `duration` [s], with ramps of a
-    third of it.
-    """
-    return _trapezoid(np.zeros(1), np.ones(1), duration, duration / 3)
-
-
 def blend_time(limits: Limits, displacement: Array, duration: Array) -> Array:
     """Time (...,) [s] of acceleration and of deceleration of a trapezoidal profile over
     `displacement` (..., nq) [rad].

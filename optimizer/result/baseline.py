@@ -30,6 +30,7 @@ BaselineName = Literal[
     "controller_default",
     "waypoints",
     "blended",
+    "even_speed",
 ]
 
 
@@ -47,8 +48,10 @@ class Baseline:
     `controller_default`: the robot's own controller with its default speed
     and acceleration. `waypoints`: from waypoint to waypoint of a planned path without collisions,
     straight in joints, with a rest at each. `blended`: along the same path without a rest, its
-    corners rounded. The last two are computed if fewer than two others are within every limit; they
-    are as fast as the limits allow, but not faster than the answer."""
+    corners rounded. These two are computed if fewer than two others are within every limit; they
+    are as fast as the limits allow, but not faster than the answer. Along a tool path, there are
+    `even_speed`, with an even speed between two smooth ramps, and `quintic`, both along the joint
+    path of the answer and as fast as the last two."""
     duration: Seconds
     """Duration of this motion."""
     electrical: Joules

@@ -137,10 +137,10 @@ def along_waypoints(
     motions: dict[BaselineName, SampledMotion] = {"waypoints": in_a_row(legs)}
     smooth = smooth_path(prepared, paths[0])
     if smooth is not None:
-        motions["blended"] = _samples_of(without_rest(smooth.control_points, limits.rates))
+        motions["blended"] = samples_of(without_rest(smooth.control_points, limits.rates))
     held, found = standing(arm, q_goal, prepared.torques), list[Baseline]()
     for name, given in motions.items():
-        motion = _slowed(prepared, given, least)
+        motion = slowed(prepared, given, least)
         tau = prepared.torques(motion.q, motion.v, motion.a)
         (broken,) = prepared.broken_on_the_way([motion.q], [motion.v], [motion.q])
         found.append(
@@ -191,13 +191,14 @@ def without_rest(points: Array, rates: Array) -> Spline:
     return fastest
 
 
-def _samples_of(spline: Spline) -> SampledMotion:
+def samples_of(spline: Spline) -> SampledMotion:
+    """A motion from rest to rest as samples."""
     tau, weights = lobatto_nodes(np.unique(spline.knots) / spline.duration)
     t = tau * spline.duration
     return SampledMotion(t, weights * spline.duration, *sample(spline, t), *peak_rates(spline))
 
 
-def _slowed(prepared: PreparedProblem, motion: SampledMotion, least: float) -> SampledMotion:
+def slowed(prepared: PreparedProblem, motion: SampledMotion, least: float) -> SampledMotion:
     """The motion, slowed down to a duration [s] if it is shorter, and to the limits on speeds of
     points of the arm."""
     factor = max(least / motion.duration, 1.0) if motion.duration > 0 else 1.0

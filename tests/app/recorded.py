@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import pickle
 import re
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
+from joulepath.app.convert.json_text import sent
 from joulepath.app.engine import forkserver, pool
 from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.engine.task import Task, outcome
@@ -105,7 +108,11 @@ def _instead_of(
     kind: str, run: Callable[[Any, float], TaskResult]
 ) -> Callable[[Any, float], TaskResult]:
     def instead(task: Any, deadline: float) -> TaskResult:
-        return recorded(kind, task.request_id) if _is_recorded.get() else run(task, deadline)
+        if not _is_recorded.get():
+            return run(task, deadline)
+        # as a process receives it: a large body is pickled until then
+        asked = sent(pickle.loads(pickle.dumps(task.request)))
+        return replace(recorded(kind, task.request_id), asked=asked)
 
     return instead
 

@@ -241,15 +241,11 @@ def test_a_cycle_is_played_as_one(browser: Browser, service: Server, page: Page)
         )
     expect(page.locator(".label.stop", has_text="finished")).to_be_visible()
     kept = state(page, "answered.cycle.id")
+    # every browser opens it with its request
     with opened(browser, f"{service.url}/studio#answer={kept}") as other:
         until(other, SHOWN)
         assert other.locator("#timeline .leg").count() == len(legs)
-        expect(other.locator("#status")).to_contain_text("joints of the answer")
-    # this browser knows what was asked for
-    page.goto("about:blank")
-    page.goto(f"{service.url}/studio#answer={kept}")
-    until(page, f"() => window.studio?.state.answered?.cycle?.id === '{kept}'")
-    assert state(page, "request") == body and not state(page, "stale")
+        assert state(other, "request") == body and not state(other, "stale")
 
 
 def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:

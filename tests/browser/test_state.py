@@ -5,17 +5,20 @@ where it was made.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from uuid import uuid4
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.app.live import Server
 from tests.browser.pages import (
     FIRST,
     SHOWN,
     fill_json,
+    go,
     new_cell,
     opened,
     optimised,
@@ -86,6 +89,28 @@ def test_projects_are_named_saved_and_opened(
         assert state(page, "project.name") == "New cell"
 
 
+def test_a_kept_answer_comes_back_as_it_was_typed(browser: Browser, service: Server) -> None:
+    """In another browser, from the list of answers: poses as poses, and numbers digit by digit."""
+    name = f"Night cell {uuid4().hex[:6]}"
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        page.get_by_label("Name of the project").fill(name)
+        page.get_by_label("Name of the project").blur()
+        type_into(page, "/payload/mass", "1,2500")
+        type_into(page, "/goal/pose/position/2", "449,125")
+        optimised(page)
+        asked = state(page, "request")
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        go(page, "Library")
+        page.get_by_label("Search answers").fill(name)
+        page.locator("#answers b", has_text=re.compile(f"^{name}$")).click()
+        until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.answered)")
+        assert state(page, "request") == asked and not state(page, "stale")
+        expect(page.locator("[data-pointer='/payload/mass']")).to_have_value("1,2500")
+        expect(page.locator("[data-pointer='/goal/pose/position/2']")).to_have_value("449,125")
+
+
 @pytest.mark.parametrize(
     ("pointer", "text", "told"),
     [
@@ -139,6 +164,27 @@ def test_numbers_that_are_none_are_refused_at_their_cells(page: Page) -> None:
     type_into(page, "/payload/mass", "-1")
     page.locator("#optimise").click()
     expect(page.locator("#form")).to_contain_text("greater than or equal to 0")
+
+
+def test_what_is_typed_stays_while_poses_are_checked(page: Page) -> None:
+    """The answer of the service to one number comes while the next one is typed."""
+    fill_json(page, FIRST)
+    show_json(page, False)
+    row = page.locator("[data-row='/goal']")
+    expect(row).to_contain_text("free")
+    held: list[Route] = []
+    page.route("**/ik", lambda route: held.append(route))
+    type_into(page, "/goal/pose/position/2", "449,125")
+    expect(row).to_contain_text("checking")
+    cell = page.locator("[data-pointer='/goal/pose/position/0']")
+    cell.fill("-351,5")
+    while held:
+        held.pop().continue_()
+    expect(row).to_contain_text("free")
+    expect(cell).to_have_value("-351,5")
+    cell.press("Enter")
+    assert state(page, "request.goal.pose.position") == [-0.3515, -0.52, 0.449125]
+    page.unroute("**/ik")
 
 
 def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:

@@ -231,6 +231,9 @@ def test_a_researcher_takes_a_front(browser: Browser, service: Server) -> None:
         )
 
 
+NAMES = ["bin to shelf", "shelf to bin", "bin to far"]
+
+
 def test_an_engineer_takes_a_table_of_moves_overnight(
     browser: Browser, service: Server, tmp_path: Path
 ) -> None:
@@ -262,7 +265,7 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
             page.locator("#job-csv").click()
         lines = list(csv.DictReader(io.StringIO(Path(download.value.path()).read_text())))
         assert [line["state"] for line in lines] == ["done", "done", "failed"]
-        assert [line["from"] for line in lines] == ["bin", "shelf", "bin"]
+        assert [line["move"] for line in lines] == NAMES
         joules = [float(line["energy_J"]) for line in lines[:2]]
         for line, energy in zip(lines, joules, strict=False):
             assert float(line["p5_J"]) < energy < float(line["p95_J"])
@@ -275,6 +278,16 @@ def test_an_engineer_takes_a_table_of_moves_overnight(
         page.locator("#moves tbody tr.failed").get_by_role("button", name="Open in cell").click()
         until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.trouble)")
         expect(page.locator("[data-row='/goal']")).to_contain_text("out of reach")
+    # whoever looks at it elsewhere sees the names, and the moves as they were asked for
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        go(page, "Jobs")
+        page.locator("#jobs button.choice", has_text="line 2").click()
+        for name in NAMES:
+            expect(page.locator("#moves")).to_contain_text(name)
+        page.get_by_role("button", name=NAMES[1]).click()
+        until(page, "() => studio.state.page === 'cell' && !studio.state.stale")
+        assert state(page, "request.goal.pose.position") == [-0.42, 0.28, 0.3]
 
 
 def test_an_engineer_reports_to_those_who_decide(page: Page) -> None:

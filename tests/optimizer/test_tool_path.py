@@ -80,9 +80,9 @@ def test_a_corner_is_rounded_within_its_blend() -> None:
     assert position.max() < path.position_tolerance and rotation.max() < path.rotation_tolerance
     gap = np.linalg.norm(poses_of(found)[:, :3, 3] - corner.T[:3, 3], axis=1).min()
     assert 0.001 < gap < path.blend
-    (even,) = found.baselines
     own = found.energy.electrical.total
-    assert even.name == "trapezoid" and own < even.electrical, "slow in the corner, fast beside it"
+    for each in found.baselines:
+        assert each.within_limits and own < each.electrical, "slow in the corner, fast beside it"
 
 
 def test_an_arc_is_part_of_a_circle() -> None:
@@ -147,7 +147,7 @@ def test_many_tight_corners_are_followed(corners: int) -> None:
     assert found.certificate.valid and found.certificate.worst_ratio["path_position"] <= 1
     for corner in turns[:-1]:
         assert np.linalg.norm(poses_of(found)[:, :3, 3] - corner.T[:3, 3], axis=1).min() < 0.005
-    (even,) = found.baselines
+    even = found.baselines[0]
     less = 1 - found.energy.electrical.total / even.electrical
     assert less > 0.1, "an even speed is as slow everywhere as the corners need"
 
@@ -193,8 +193,8 @@ def test_the_tool_is_no_slower_than_asked_between_the_ramps() -> None:
         and 0.19 * (1 - 1e-6) < least < most < 0.2 * (1 + 1e-6)
         and first < 0.02
     )
-    (even,) = found.baselines
-    assert not even.within_limits and even.reason is not None and "path speed" in even.reason
+    for each in found.baselines:
+        assert each.saving is None and each.reason is not None and "path speed" in each.reason
 
 
 def test_the_certificate_finds_a_motion_that_is_too_slow() -> None:

@@ -7,11 +7,15 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from joulepath.app.schemas.common import Response, described, part
-from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, JOB_ID
+from joulepath.app.schemas.common import NO_CONTROLS, Response, described, part
+from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, JOB_ID, OPTIMIZE
 from joulepath.app.schemas.lengths import LENGTHS
-from joulepath.app.schemas.naming import Name, search_in
+from joulepath.app.schemas.naming import Name, NewName, search_in
 from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+
+Pointer = Annotated[str, Field(max_length=LENGTHS.pointer, pattern=NO_CONTROLS)]
+TypedNumber = Annotated[str, Field(max_length=LENGTHS.number, pattern=NO_CONTROLS)]
+_TYPED = {"/payload/mass": "1,60"}
 
 
 class KeptAnswer(Response):
@@ -51,6 +55,28 @@ class StoredAnswer(KeptAnswer):
         "The answer, with the fields that this endpoint documents.",
         None,
         {"robot": "ur5e", "duration": 1.8, "status": "optimal"},
+    )
+    request: dict[str, Any] | None = described(
+        "The request as it was sent. Null for a part of another answer, such as a motion of a "
+        "cycle.",
+        None,
+        OPTIMIZE,
+    )
+    typed: dict[str, str] | None = described(
+        "Texts in which its numbers were typed, see `PATCH /answers/{id}`.", None, _TYPED
+    )
+
+
+class AnswerName(NewName):
+    """Another name of a kept answer, and how its request was typed."""
+
+    typed: dict[Pointer, TypedNumber] | None = described(
+        "Texts in which the numbers of its request were typed, by JSON pointers, for pages that "
+        "show it again. Null: those that it has.",
+        None,
+        _TYPED,
+        default=None,
+        max_length=10_000,
     )
 
 

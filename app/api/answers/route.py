@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import orjson
 from fastapi import APIRouter, Path, Query, Response
+from sqlalchemy.orm import Session
 
 from joulepath.app.api.answers.models import (
     AnswerList,
+    AnswerName,
     AnswerPage,
     AnswerSummary,
     KeptAnswer,
@@ -23,7 +25,6 @@ from joulepath.app.exceptions.stored import AnswerInUse, StoreUnavailable, Unkno
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import ANSWER_ID
-from joulepath.app.schemas.naming import NewName
 from joulepath.app.store import answers
 from joulepath.app.store.tables import Answer
 
@@ -58,10 +59,15 @@ def _summary(answer: Answer) -> AnswerSummary:
     responses=problem_responses(UnknownAnswer, StoreUnavailable),
 )
 async def show(id: AnswerId, store: ServiceStore) -> Response:
-    """The complete answer with this id."""
-    answer, body = await store.read(partial(answers.get, answer_id=id))
-    content = {name: getattr(answer, name) for name in KeptAnswer.model_fields}
-    return result_response(TaskResult.of_json(content | {"answer": orjson.Fragment(body)}))
+    """The complete answer with this id, and its request."""
+
+    def read(session: Session) -> dict[str, Any]:
+        answer, body = answers.get(session, id)
+        own = {name: getattr(answer, name) for name in (*KeptAnswer.model_fields, "typed")}
+        asked = answers.request_of(session, answer)
+        return own | {"request": asked, "answer": orjson.Fragment(body)}
+
+    return result_response(TaskResult.of_json(await store.read(read)))
 
 
 @router.patch(
@@ -71,10 +77,10 @@ async def show(id: AnswerId, store: ServiceStore) -> Response:
     responses=problem_responses(InvalidRequest, UnknownAnswer, NotOwner, StoreUnavailable),
 )
 async def rename(
-    id: AnswerId, body: NewName, store: ServiceStore, client: ServiceClient
+    id: AnswerId, body: AnswerName, store: ServiceStore, client: ServiceClient
 ) -> AnswerSummary:
     """Gives the answer a name, by which `GET /answers` finds it."""
-    rename = partial(answers.rename, answer_id=id, name=body.name, client=client)
+    rename = partial(answers.rename, answer_id=id, name=body.name, typed=body.typed, client=client)
     return await store.write(lambda session: _summary(rename(session)))
 
 

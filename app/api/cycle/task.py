@@ -12,6 +12,7 @@ from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.table import to_cycle_csv
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.known_motions import to_kept, to_known_motions
 from joulepath.app.convert.unlikely_units import unlikely_units
 from joulepath.app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
@@ -93,7 +94,8 @@ class CycleTask:
             return TaskResult.of_csv(to_cycle_csv(found))
         collector = AnswerCollector()
         answer = cycle_answer(self.request, self.request_id, found, collector)
-        return TaskResult.of_kept_json(answer, answer.figures, collector.stored)
+        stored, asked = collector.stored, sent(self.request)
+        return TaskResult.of_kept_json(answer, answer.figures, stored, asked)
 
 
 def cycle_answer(

@@ -8,6 +8,7 @@ from typing import Any, Protocol, Self
 from joulepath.app.answers.envelope import AnswerFigures, MotionAnswer
 from joulepath.app.convert.arm_fields import arm_fields
 from joulepath.app.convert.candidates import chosen
+from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.unlikely_units import unlikely_units
 from joulepath.app.convert.warnings import certified_warnings
@@ -83,7 +84,7 @@ class OptimizeTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
         answer = self.answer(deadline)
-        return TaskResult.of_kept_json(answer, answer.figures)
+        return TaskResult.of_kept_json(answer, answer.figures, asked=sent(self.request))
 
     def answer(self, deadline: float) -> OptimizeAnswer:
         """The answer within about `deadline` seconds, not kept yet."""

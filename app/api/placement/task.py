@@ -12,6 +12,7 @@ from joulepath.app.api.cycle.task import cycle_answer
 from joulepath.app.api.placement.problem import request_at, to_placement
 from joulepath.app.api.placement.request import PlacementRequest
 from joulepath.app.convert.arm_fields import LARGEST
+from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.warnings import AT_EDGE, JOINT_POSITIONS
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult, json_document
@@ -89,7 +90,8 @@ class PlacementTask:
             warnings=_warnings(self.request, found),
             **vars(found.solved_placement()) | {"best": best, "nominal": nominal},
         )
-        return TaskResult.of_kept_json(answer, answer.figures, collector.stored)
+        stored, asked = collector.stored, sent(self.request)
+        return TaskResult.of_kept_json(answer, answer.figures, stored, asked)
 
     def _placed(self, found: PlacedRound, collector: AnswerCollector) -> PlacedCycles:
         """A place, with the answers of its cycles collected."""
@@ -98,7 +100,7 @@ class PlacementTask:
         for own, cycle, solution in zip(asked, found.placed_cycles, found.solutions, strict=True):
             request = request_at(own, cycle)
             answer = cycle_answer(request, self.request_id, solution, collector)
-            path = collector.add(answer, CYCLE)
+            path = collector.add(answer, CYCLE, sent(request))
             body = request.model_dump(mode="json", exclude_unset=True)
             short = len(json_document(body)) <= LARGEST
             placed.append(PlacedCycle(answer=path, request=body if short else None))

@@ -12,8 +12,8 @@ _LEFT_OUT = frozenset({"candidates", "limits", "branch", "unreachable", "solver"
 _SAMPLED = ("t", "q", "v", "a", "tau")
 
 
-def row_of(row: Json, name: str | None) -> Json:
-    """A row of `job_document` with its name, and without the samples of its motion but three."""
+def row_of(row: Json) -> Json:
+    """A row of `job_document` without the samples of its motion but three."""
     answer = row["answer"]
     if answer is not None:
         answer = {key: value for key, value in answer.items() if key not in _LEFT_OUT}
@@ -22,7 +22,7 @@ def row_of(row: Json, name: str | None) -> Json:
             last = len(trajectory["t"]) - 1
             thin = {key: [trajectory[key][k] for k in (0, last // 2, last)] for key in _SAMPLED}
             answer["trajectory"] = thin | {"spline": trajectory["spline"]}
-    return row | {"answer": answer, "name": name}
+    return row | {"answer": answer}
 
 
 def answered(rows: Sequence[Json]) -> list[Json]:

@@ -101,12 +101,6 @@ class ReportRequest(AnsweredRequest):
         {"cycle": CYCLE, "region": {"x": [-0.3, 0.3], "y": [-0.2, 0.2]}},
         default=None,
     )
-    names: Annotated[list[Text], Field(max_length=MOST_ROWS)] = described(
-        "Names of the requests of the `job`, in their order. Fewer: the others have none.",
-        None,
-        ["bin to shelf", "shelf to bin"],
-        default=[],
-    )
     title: Text | None = described(
         "Title of the report. Null: one of the request's kind.",
         None,

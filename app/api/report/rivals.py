@@ -29,6 +29,7 @@ _RIVALS = {
     "controller_default": "Controller's default",
     "waypoints": "Via points, with rests",
     "blended": "Via points, rounded",
+    "even_speed": "Even speed along the path",
     "stopping": "With a rest at every stop",
     "move_by_move": "Each move by itself",
     "same_factor": "All moves slowed alike",

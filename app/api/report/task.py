@@ -98,8 +98,7 @@ class ReportTask:
     def _job(self, id: str) -> Json:
         """The rows of a job, and their sums."""
         job = kept_answers([f"{JOBS}/{id}"])[0]
-        names = dict(enumerate(self.request.names))
-        rows = [row_of(row, names.get(row["index"])) for row in job["rows"]]
+        rows = [row_of(row) for row in job["rows"]]
         return {
             "request": {"job": id, "name": job["name"]},
             "answer": summed(rows),

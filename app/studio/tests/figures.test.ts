@@ -1,10 +1,12 @@
 import { busyAfter } from "../src/logs/model";
 import { expect, it } from "vitest";
 import { costsOf, DEFAULT_ECONOMICS } from "../src/store/economics";
-import { parseMoves, requestsOf } from "../src/store/moves";
+import { csvOfJob, refusal, type Job, type JobRow } from "../src/jobs/model";
+import { moveName, parseMoves, requestsOf } from "../src/store/moves";
 import { Problem } from "../src/store/client";
 import { trouble } from "../src/store/state";
 import { tell } from "../src/store/trouble";
+import type { ApiRequest, ProblemDetails } from "../src/store/types";
 import { asShown, atMost, figure, parseNumber, shown, typedValue } from "../src/store/units";
 import { MOVE } from "./cells";
 
@@ -85,6 +87,30 @@ it("a table of moves becomes requests of the cell", () => {
   expect(read.moves[0]).toMatchObject({ from: "bin", to: "shelf", mass: 1.5 });
 });
 
+it("the moves of a job have names, also in its CSV", () => {
+  const move = { from: "bin\u200b 1", to: "s".repeat(300), mass: null, start: "", goal: "" };
+  expect(moveName(move)).toBe(`bin 1 to ${"s".repeat(191)}`);
+  const row = { index: 0, name: 'a "b", c', kind: "optimize", state: "done", answer: "/answers/1" };
+  const rows = [row, { ...row, index: 1, name: null }].map(
+    (each) => ({ ...each, energy: 1, duration: 2, problem: null }) as JobRow,
+  );
+  const notes = { id: "j", source: "", masses: [1.5, null], requests: [] };
+  const shown = { job: {} as Job, rows, notes, details: null };
+  expect(csvOfJob(shown).split("\n").slice(0, 3)).toEqual([
+    "no,move,kg,state,duration_s,energy_J,p5_J,p95_J,rival,rival_J,saving,problem,answer",
+    '1,"a ""b"", c",1.5,done,2,1,,,,,,,/answers/1',
+    "2,move 2,,done,2,1,,,,,,,/answers/1",
+  ]);
+});
+
+it("a table that the service refuses is told by its rows", () => {
+  const loc = ["body", "requests", 2, "optimize", "payload", "mass"];
+  const errors = [{ loc, msg: "Input should be less than or equal to 2000" }];
+  expect(refusal(new Problem({ title: "Invalid request", errors }))).toBe(
+    "Row 3, payload.mass: Input should be less than or equal to 2000.",
+  );
+});
+
 it("targets in rows are moves from each to the next", () => {
   const read = parseMoves("a;0;-90;90;-90;-90;0\nb;30;-90;90;-90;-90;0\nc;60;-90;90;-90;-90;0", 6);
   if ("why" in read) throw new Error(read.why);
@@ -132,6 +158,30 @@ it("what the service says has the units and the names of the page", () => {
       { pointer: "/payload/mass", text: "Too heavy" },
     ],
   });
+});
+
+it("a problem stands at the place that it names", () => {
+  const stops = [{ name: "bin" }, { name: "bead/2" }, {}];
+  const round = { ...MOVE, stops } as ApiRequest;
+  const at = (details: ProblemDetails, asked = round) => {
+    tell(new Problem({ title: "No", detail: "Why.", ...details }), asked);
+    expect(trouble.value!.fields.map(({ pointer }) => pointer)).toEqual(
+      trouble.value!.pointer === null ? [] : [trouble.value!.pointer],
+    );
+    return trouble.value!.pointer;
+  };
+  const type = "/problems/duration-too-short";
+  expect(at({ target: "goal" }, MOVE)).toBe("/goal");
+  expect(at({ path: "path" }, MOVE)).toBe("/path");
+  expect(at({ target: "stops.2.target" })).toBe("/stops/2/target");
+  expect(at({ target: "stops/bead/2" })).toBe("/stops/1/target");
+  expect(at({ path: "stops/bin/approach" })).toBe("/stops/0/target");
+  expect(at({ stop: "stops/3" })).toBe("/stops/2/target");
+  expect(at({ stop: "start" })).toBe("/start");
+  expect(at({ type }, MOVE)).toBe("/duration");
+  expect(at({ type })).toBe("/time");
+  expect(at({ pair: ["forearm_link", "table"] })).toBe("/scene/obstacles/0");
+  expect(at({ pair: ["forearm_link", "tool"] })).toBeNull();
 });
 
 it("a mass of a table that is no number is named, and not left out", () => {

@@ -10,9 +10,20 @@ import {
   renameProject,
   saveNow,
 } from "../src/store/persist";
+import { openKept } from "../src/store/open";
 import { cellOf, link, presentCell, shared } from "../src/store/share";
-import { answered, replaceCell, saved, write, type Answered } from "../src/store/state";
+import {
+  answered,
+  replaceCell,
+  request,
+  saved,
+  typed,
+  write,
+  type Answered,
+} from "../src/store/state";
 import { MOVE } from "./cells";
+
+vi.mock("../src/store/run", () => ({ showAnswer: () => Promise.resolve() }));
 
 beforeAll(() => {
   vi.stubGlobal("window", new EventTarget());
@@ -53,14 +64,32 @@ it("the request of an answer is known again by its id", async () => {
   answered.value = null;
 });
 
-it("names of the moves of a job are kept", async () => {
+it("a kept answer that this browser has not asked for comes back as it was typed", async () => {
+  const branch = { start: { q: [0] }, goal: { q: [1] } };
+  const kept = {
+    name: "Night cell",
+    request: MOVE as typeof MOVE | null,
+    typed: { "/payload/mass": "0,80" } as Record<string, string> | null,
+    answer: { id: "answer-9", robot: "ur5e", arm: null, branch },
+  };
+  vi.stubGlobal("sessionStorage", { getItem: () => null });
+  vi.stubGlobal("fetch", () => Promise.resolve(Response.json(kept)));
+  await openKept("answer-9");
+  expect([request.value, typed.value]).toEqual([MOVE, { "/payload/mass": "0,80" }]);
+  kept.request = kept.typed = null; // a move of a round
+  await openKept("/answers/answer-9");
+  expect(request.value).toEqual({ robot: "ur5e", ...branch });
+  expect(typed.value).toEqual({});
+});
+
+it("what the moves of a job carry is kept", async () => {
   await keepJob({
     id: "j",
     source: "moves.csv",
-    moves: [{ from: "a", to: "b", mass: null }],
+    masses: [1.5, null],
     requests: [MOVE],
   });
-  expect((await jobNotes("j"))?.moves[0]?.from).toBe("a");
+  expect((await jobNotes("j"))?.masses).toEqual([1.5, null]);
 });
 
 it("a link brings the whole cell back", async () => {

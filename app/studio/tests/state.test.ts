@@ -35,6 +35,14 @@ it("an edit is undone and done again, with what was typed", () => {
   expect([canUndo.value, canRedo.value]).toEqual([true, false]);
 });
 
+it("what was typed stays where another field changes", () => {
+  write("/payload/mass", 1.6, "1,6");
+  answer();
+  edit(put(request.value, "/goal", { q: [0] }));
+  revert();
+  expect(typed.value).toEqual({ "/payload/mass": "1,6" });
+});
+
 it("a new edit ends what could be done again", () => {
   write("/payload/mass", 1, "1");
   undo();

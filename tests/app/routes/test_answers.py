@@ -70,6 +70,31 @@ def test_every_answer_is_kept(recorded: TestClient) -> None:
     assert recorded.post("/optimize", json=move()).json()["answer"] != content["answer"]
 
 
+def test_an_answer_has_its_request_as_it_was_sent(recorded: TestClient) -> None:
+    """Those of jobs and studies, too, but no part of another answer."""
+    one = {**move(), "payload": None, "deadline": 9.0}
+    (of_job,) = ended(recorded, sent(recorded, [{"optimize": one, "name": "bin to shelf"}]))[
+        "requests"
+    ]
+    assert of_job["name"] == "bin to shelf"
+    study = recorded.post("/studies", json={"name": "A study", "threshold": 1.0})
+    iterations = f"{study.headers['location']}/iterations"
+    step = recorded.post(iterations, json={"optimize": one}).json()
+    whole = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}
+    cycle = recorded.post("/cycle", json=whole).json()
+    part = next(leg["answer"] for leg in cycle["legs"] if leg["kind"] == "move")
+    own = recorded.post("/optimize", json=one).json()["answer"]
+    of_study = {"robot": "ur5e", "objective": "electrical"}
+    expected = {of_job["answer"]: one, f"/answers/{step['answer']}": one | of_study, own: one}
+    for path, request in (expected | {cycle["answer"]: whole, part: None}).items():
+        assert recorded.get(path).json()["request"] == request, path
+    typed = {"/deadline": "9,0"}
+    assert recorded.patch(own, json={"name": "a", "typed": typed}).status_code == 200
+    recorded.patch(own, json={"name": "b"})
+    kept = recorded.get(own).json()
+    assert (kept["name"], kept["typed"]) == ("b", typed)
+
+
 def test_the_answers_are_listed(recorded: TestClient) -> None:
     """Newest first, page by page, each with the figures of its motion; those of studies and jobs,
     too.

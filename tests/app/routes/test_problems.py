@@ -31,7 +31,7 @@ from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
 from tests.app.live import LOCAL
 from tests.app.problems import checked
-from tests.app.requests import AMPLE, move
+from tests.app.requests import AMPLE, HOME, move
 from tests.optimizer.chains import serial_chain
 
 DOWN = [0.0, 1.0, 0.0, 0.0]
@@ -124,7 +124,10 @@ def test_a_stretched_wrist_names_the_joints_that_are_free(client: TestClient) ->
 def test_outside_limits(client: TestClient) -> None:
     q = [0.0, -1.57, 3.5, -1.57, -1.57, 0.0]
     content = refused(client.post("/optimize", json=move(start={"q": q})), OutsideLimits)
-    assert content["joint"] == "elbow_joint"
+    assert content["target"] == "start" and content["joint"] == "elbow_joint"
+    cycle = {"start": {"q": HOME}, "stops": [{"target": {"q": q}}]}
+    of_stop = refused(client.post("/cycle", json=cycle), OutsideLimits)
+    assert of_stop["target"] == "stops.0.target"
     assert content["value"] == 3.5
     assert content["lower"] == pytest.approx(-3.14159265)
     assert content["upper"] == pytest.approx(3.14159265)

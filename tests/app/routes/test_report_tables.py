@@ -22,7 +22,6 @@ from tests.identification_logs import csv_of, recorded, truth_of
 Json = dict[str, Any]
 ROBOT = load_robot("ur5e")
 CSV = {"Content-Type": "text/csv"}
-NAMES = ["bin to shelf", "shelf <to> bin"]
 
 
 def reported(client: TestClient, **body: Any) -> bytes:
@@ -35,8 +34,8 @@ def reported(client: TestClient, **body: Any) -> bytes:
 def job(client: TestClient) -> str:
     """Two motions, one that cannot be, one request without a motion of its own, and a cycle."""
     requests = [
-        optimization(1.0),
-        optimization(2.0),
+        optimization(1.0) | {"name": "bin to shelf"},
+        optimization(2.0) | {"name": "shelf <to> bin"},
         {"optimize": move(duration=0.01)},
         evaluation(),
         {"cycle": CYCLE},
@@ -49,7 +48,7 @@ def job(client: TestClient) -> str:
 
 @pytest.fixture(scope="module")
 def page(client: TestClient, job: str) -> bytes:
-    return reported(client, job=job, names=NAMES, costs={"price": {"value": 0.2}})
+    return reported(client, job=job, costs={"price": {"value": 0.2}})
 
 
 @pytest.fixture(scope="module")

@@ -138,7 +138,9 @@ def _answers() -> None:
         sa.Column("status", sa.String(16), nullable=True),
         sa.Column("size", sa.Integer(), nullable=False),
         sa.Column("body", sa.LargeBinary(), nullable=False),
+        sa.Column("request", sa.LargeBinary(), nullable=True),
         sa.Column("name", sa.String(200), nullable=True),
+        sa.Column("typed", sa.JSON(none_as_null=True), nullable=True),
         sa.Column("is_part", sa.Boolean(), server_default=sa.false(), nullable=False),
         sa.ForeignKeyConstraint(
             ["study_id"], ["studies.id"], name="fk_answers_study_id", ondelete="CASCADE"
@@ -214,6 +216,7 @@ def _job_requests() -> None:
         "job_requests",
         sa.Column("job_id", sa.String(36), nullable=False),
         sa.Column("number", sa.Integer(), autoincrement=False, nullable=False),
+        sa.Column("name", sa.String(200), nullable=True),
         sa.Column("kind", sa.String(32), nullable=False),
         sa.Column("deadline", sa.Double(), nullable=False),
         sa.Column("body", sa.LargeBinary(), nullable=False),

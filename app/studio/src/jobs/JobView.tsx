@@ -9,7 +9,16 @@ import { save } from "../store/share";
 import { economics } from "../store/state";
 import { trying } from "../store/trouble";
 import { asShown, figure, percent } from "../store/units";
-import { csvOfJob, isOver, loadDetails, loadJob, namesOf, type JobRow, type Opened } from "./model";
+import {
+  csvOfJob,
+  isOver,
+  loadDetails,
+  loadJob,
+  massOf,
+  nameOf,
+  type JobRow,
+  type Opened,
+} from "./model";
 
 type Filter = "all" | JobRow["state"];
 
@@ -102,9 +111,9 @@ export function JobView({ shown }: { shown: Opened }) {
         <table class="moves" id="moves">
           <thead>
             <tr>
-              {["no.", "from", "to", "kg", "s", "J", "likely", "nearest usual way", "saves"].map(
+              {["no.", "move", "kg", "s", "J", "likely", "nearest usual way", "saves"].map(
                 (name, k) => (
-                  <th scope="col" key={name} class={k > 2 ? "number" : undefined}>
+                  <th scope="col" key={name} class={k > 1 ? "number" : undefined}>
                     {name}
                   </th>
                 ),
@@ -131,7 +140,6 @@ const reportJob = (shown: Opened, format: ReportFormat) =>
   report(
     {
       job: shown.job.id,
-      names: (shown.notes?.moves ?? []).map(({ from, to }) => (to ? `${from} to ${to}` : from)),
       costs: costsFor(economics.value, null),
     },
     shown.job.name ?? "A table of moves",
@@ -170,11 +178,10 @@ function Totals({ shown: { rows, details } }: { shown: Opened }) {
 }
 
 function MoveRow({ row, shown }: { row: JobRow; shown: Opened }) {
-  const [from, to] = namesOf(shown, row.index);
-  const mass = shown.notes?.moves[row.index]?.mass ?? null;
+  const name = nameOf(row);
+  const mass = massOf(shown, row);
   const asked = shown.notes?.requests[row.index];
   const detail = shown.details?.get(row.index);
-  const name = to ? `${from} to ${to}` : from;
   const open = () =>
     row.answer
       ? openKept(row.answer)
@@ -187,13 +194,12 @@ function MoveRow({ row, shown }: { row: JobRow; shown: Opened }) {
       <th scope="row">
         {row.answer || asked ? (
           <button type="button" class="plain" title="Open in the cell" onClick={trying(open)}>
-            {from}
+            {name}
           </button>
         ) : (
-          from
+          name
         )}
       </th>
-      <td>{to}</td>
       <td class="number">{mass ? figure(mass) : "–"}</td>
     </>
   );

@@ -3,12 +3,12 @@ import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
 import { robotNow } from "../picture/pictured";
 import { post } from "../store/client";
-import { parseMoves, requestsOf } from "../store/moves";
+import { moveName, parseMoves, requestsOf } from "../store/moves";
 import { keepJob } from "../store/persist";
 import { robotName } from "../store/request";
 import { request, project } from "../store/state";
 import { figure } from "../store/units";
-import { loadJob, loadJobs, type Job } from "./model";
+import { loadJob, loadJobs, refusal, type Job } from "./model";
 
 const SAMPLE = "from; to; kg; x mm; y; z; rx rad; ry; rz; x mm; y; z; rx; ry; rz";
 const SHOWN = 5;
@@ -31,14 +31,18 @@ export function NewJob({ onClose }: { onClose: () => void }) {
     setWhy("");
     try {
       const requests = requestsOf(moves, reading!, request.value, joints);
-      const bodies = requests.map((each) => ({ optimize: { ...each, candidates: "none" } }));
+      const bodies = requests.map((each, k) => ({
+        name: moveName(moves[k]!),
+        optimize: { ...each, candidates: "none" },
+      }));
       const { id } = await post<Job>("jobs", { name, requests: bodies });
-      await keepJob({ id, source, moves, requests }).catch(() => undefined);
+      const masses = moves.map(({ mass }) => mass);
+      await keepJob({ id, source, masses, requests }).catch(() => undefined);
       await loadJobs();
       await loadJob(id);
       onClose();
     } catch (error) {
-      setWhy((error as Error).message);
+      setWhy(refusal(error));
     } finally {
       setBusy(false);
     }
@@ -135,10 +139,10 @@ export function NewJob({ onClose }: { onClose: () => void }) {
               {moves.length} moves, read as {reading.echo}.
             </p>
             <ul class="hint">
-              {moves.slice(0, SHOWN).map(({ from, to, mass }, k) => (
+              {moves.slice(0, SHOWN).map((move, k) => (
                 <li key={k}>
-                  {from} → {to}
-                  {mass === null ? "" : `, ${figure(mass)} kg`}
+                  {moveName(move)}
+                  {move.mass === null ? "" : `, ${figure(move.mass)} kg`}
                 </li>
               ))}
             </ul>

@@ -1,7 +1,8 @@
-// Jobs of the service, and what the page adds to them: names of moves, intervals and savings.
+// Jobs of the service, and what the page adds to them: masses, intervals and savings.
 import { signal } from "@preact/signals";
 import { get, listed, send } from "../store/client";
 import { jobNotes, type JobNotes } from "../store/persist";
+import { said } from "../store/trouble";
 import type { Interval, ProblemDetails, Solution } from "../store/types";
 
 export interface Job {
@@ -16,6 +17,7 @@ export interface Job {
 
 export interface JobRow {
   index: number;
+  name: string | null;
   kind: string;
   state: keyof Job["counts"];
   energy: number | null;
@@ -26,6 +28,7 @@ export interface JobRow {
 
 /** What a whole answer says beyond its row. */
 export interface Detail {
+  mass: number | null;
   interval: Interval | null;
   rival: string | null;
   rivalEnergy: number | null;
@@ -40,6 +43,10 @@ export interface Opened {
 }
 
 const PAGE = 1000;
+
+/** Why a table was refused, by its rows. */
+export const refusal = (error: unknown): string =>
+  said(error).replace(/requests\.(\d+)\.optimize\./g, (_, k) => `Row ${Number(k) + 1}, `);
 
 export const jobs = signal<Job[] | null>(null);
 export const opened = signal<Opened | null>(null);
@@ -113,6 +120,7 @@ function keep(
   const fast = kept.filter(({ duration }) => duration <= AS_FAST * result.duration!);
   const [rival] = (fast.length ? fast : kept).sort((a, b) => a.saving! - b.saving!);
   details.set(index, {
+    mass: result.arm?.payload?.mass ?? null,
     interval: result.energy.electrical.interval ?? null,
     rival: rival?.name ?? null,
     // in the same time: the shorter of both waits
@@ -121,11 +129,11 @@ function keep(
   });
 }
 
-/** The names of a move. */
-export function namesOf({ notes }: Opened, index: number): [string, string] {
-  const move = notes?.moves[index];
-  return move ? [move.from, move.to] : [`move ${index + 1}`, ""];
-}
+export const nameOf = ({ name, index }: JobRow) => name ?? `move ${index + 1}`;
+
+/** What a move carries [kg]; null: nothing, or not known. */
+export const massOf = ({ notes, details }: Opened, { index }: JobRow) =>
+  notes?.masses[index] ?? details?.get(index)?.mass ?? null;
 
 /** The table of a job as CSV. */
 export function csvOfJob(shown: Opened): string {
@@ -135,8 +143,7 @@ export function csvOfJob(shown: Opened): string {
   };
   const head = [
     "no",
-    "from",
-    "to",
+    "move",
     "kg",
     "state",
     "duration_s",
@@ -150,7 +157,6 @@ export function csvOfJob(shown: Opened): string {
     "answer",
   ];
   const lines = shown.rows.map((row) => {
-    const [from, to] = namesOf(shown, row.index);
     const detail = shown.details?.get(row.index);
     const { interval, rival, rivalEnergy, saving } = detail ?? {
       interval: null,
@@ -160,9 +166,8 @@ export function csvOfJob(shown: Opened): string {
     };
     return [
       row.index + 1,
-      from,
-      to,
-      shown.notes?.moves[row.index]?.mass,
+      nameOf(row),
+      massOf(shown, row),
       row.state,
       row.duration,
       row.energy,

@@ -11,6 +11,7 @@ export const BASELINES: Record<string, string> = {
   controller_default: "Controller default",
   waypoints: "Via points, with rests",
   blended: "Via points, rounded",
+  even_speed: "Even speed along the path",
   stopping: "Rests at every stop",
   move_by_move: "Each move by itself",
   same_factor: "All moves slowed alike",

@@ -15,6 +15,12 @@ export interface Move {
 
 export type MovesRead = { moves: Move[]; readings: Reading[] } | { why: string };
 
+const LONGEST_NAME = 200;
+
+/** The name of a move in its job, without characters that do not show. */
+export const moveName = ({ from, to }: Move): string =>
+  `${from} to ${to}`.replace(/\p{C}/gu, "").slice(0, LONGEST_NAME);
+
 const SEPARATOR = /[;,\t]/;
 const isNumber = (cell: string) => /^[+\-−]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(cell);
 

@@ -1,12 +1,19 @@
 // Opening cells: from an example, a project, a link or a kept answer.
 import { get } from "./client";
-import { stopsOf } from "./cycle";
 import { askedFor, newId, projects, type Saved } from "./persist";
 import { optimise, showAnswer } from "./run";
 import type { Cell } from "./share";
 import { page, replaceCell, toast } from "./state";
 import { tell } from "./trouble";
-import type { ApiRequest, Cycle, Solution, Stop } from "./types";
+import type { ApiRequest, Cycle, Solution } from "./types";
+
+/** A kept answer with its request; a part of another answer, such as a move of a round, has none. */
+interface Kept {
+  name: string | null;
+  request: ApiRequest | null;
+  typed: Cell["typed"] | null;
+  answer: Solution & Partial<Cycle>;
+}
 
 const FIRST = "studio/first.json";
 
@@ -53,31 +60,26 @@ export async function openProject(project: Saved): Promise<void> {
   }
 }
 
-/**
- * A kept answer by its id or path: with its request as it was typed, where this browser has asked
- * for it. Throws Problem.
- */
+/** A kept answer by its id or path, with its request as it was typed. Throws Problem. */
 export async function openKept(path: string): Promise<void> {
   const address = path.includes("/")
     ? path.replace(/^\//, "")
     : `answers/${encodeURIComponent(path)}`;
-  const kept = await get<{ name?: string | null; answer: Solution & Partial<Cycle> }>(address);
-  const { answer } = kept;
+  const { name, request: sent, typed, answer } = await get<Kept>(address);
   if (!answer?.branch && !answer?.legs)
     throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
-  const known = answer.id ? await askedFor(answer.id) : null;
-  const request =
-    known?.request ??
-    (answer.legs ? requestOfCycle(answer as unknown as Cycle) : requestOfMove(answer));
+  const here = answer.id ? await askedFor(answer.id) : null;
+  const request = here?.request ?? sent ?? requestOfMove(answer);
   replaceCell({
-    project: { id: newId(), name: kept.name ?? `Kept ${answer.id?.slice(0, 8) ?? "answer"}` },
+    project: { id: newId(), name: name ?? `Kept ${answer.id?.slice(0, 8) ?? "answer"}` },
     request,
-    typed: known?.typed,
-    economics: known?.economics,
+    typed: here?.typed ?? typed ?? {},
+    economics: here?.economics,
   });
   page.value = "cell";
   await showAnswer(answer, request);
-  if (!known) toast.value = "The request was not typed here: targets are the joints of the answer.";
+  if (!here && !sent)
+    toast.value = "A part of an answer has no request: targets are the joints of the answer.";
 }
 
 /**
@@ -90,13 +92,3 @@ const requestOfMove = ({ robot, arm, branch }: Solution): ApiRequest => ({
   start: { q: branch.start.q },
   goal: { q: branch.goal.q },
 });
-
-function requestOfCycle(cycle: Cycle): ApiRequest {
-  const places = new Map(stopsOf(cycle).map(({ stop, q }) => [stop ?? "", q]));
-  const dwell = (name: string) =>
-    cycle.legs.find((leg) => leg.kind === "dwell" && leg.goal.stop === name)?.duration ?? 0;
-  const stops = cycle.order
-    .filter((name) => places.has(name))
-    .map((name): Stop => ({ name, target: { q: places.get(name) }, dwell: dwell(name) }));
-  return { robot: cycle.robot, start: { q: cycle.legs[0]!.start.q }, stops };
-}

@@ -80,11 +80,12 @@ async function keepAsked(id: string, cell: Cell): Promise<void> {
   if (ids.length > MOST_ASKED) await within("asked", "readwrite", (store) => store.delete(ids[0]!));
 }
 
-/** What the page knows of a job that it has started: the names of its moves. */
+/** What the page knows of a job that it has started. */
 export interface JobNotes {
   id: string;
   source: string;
-  moves: { from: string; to: string; mass: number | null }[];
+  /** What each move carries [kg]; null: the payload of the cell. */
+  masses: (number | null)[];
   requests: Cell["request"][];
 }
 

@@ -1,7 +1,7 @@
 // Where to put the robot: the region, the map of the service, and the place that is looked at.
 import { batch, computed, signal } from "@preact/signals";
 import { inverse, multiply, ofPose, poseOfMatrix, type Matrix } from "./chain";
-import { get, Problem } from "./client";
+import { get } from "./client";
 import { diff } from "./diff";
 import { asKind } from "./edits";
 import { capital, energyOf } from "./facts";
@@ -25,7 +25,8 @@ import {
   type Looked,
 } from "./state";
 import type { ApiRequest } from "./types";
-import { asShown, typedValue, type UnitName } from "./units";
+import { said } from "./trouble";
+import { typedValue, type UnitName } from "./units";
 
 /** The base of the robot among what can be dragged. */
 export const BASE = "/base";
@@ -155,14 +156,6 @@ export async function search(): Promise<void> {
 
 export const bestPose = ({ answer, world }: Mapped) =>
   multiply(inverse(world), ofPose(answer.best.base));
-
-function said(error: unknown): string {
-  const fields = error instanceof Problem ? (error.details.errors ?? []) : [];
-  const text = error instanceof Error ? error.message : String(error);
-  return fields.length
-    ? fields.map(({ loc, msg }) => `${loc.slice(1).join(".")}: ${msg}.`).join(" ")
-    : asShown(text);
-}
 
 /** Moves the base in the picture, without computing. Throws Problem. */
 export async function moveBase(pose: Matrix): Promise<Looked> {

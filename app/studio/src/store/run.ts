@@ -18,6 +18,7 @@ import {
   time,
   toast,
   trouble,
+  typed,
   type Answered,
   type Run,
 } from "./state";
@@ -39,12 +40,15 @@ export async function optimise(asked: ApiRequest = request.value): Promise<void>
   if (tab.value === "task") tab.value = "answer";
 }
 
-/** Names a kept answer after the project, unless this browser has asked for it before. */
+/**
+ * Names a kept answer after the project, and keeps with it how its request was typed, unless this
+ * browser has asked for it before.
+ */
 export async function named(id: string | null, what?: string): Promise<void> {
   if (id === null || (await askedFor(id))) return;
   const after = what ? `, ${what}` : "";
   const name = project.value.name.slice(0, LONGEST_NAME - after.length) + after;
-  void patch(`answers/${id}`, { name }).catch(() => undefined);
+  void patch(`answers/${id}`, { name, typed: typed.value }).catch(() => undefined);
 }
 
 /** Shows an answer of `POST /optimize` or `POST /cycle` with its request. Throws Problem. */

@@ -229,5 +229,5 @@ export function replaceCell(cell: {
 /** Takes the request back to that of the answer, as one step. */
 export function revert(): void {
   const asked = answered.value?.asked;
-  if (asked) edit(asked, {});
+  if (asked) edit(asked);
 }

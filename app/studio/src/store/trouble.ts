@@ -1,10 +1,10 @@
 // Errors, as sentences at the fields that caused them.
 import { Problem } from "./client";
 import { unitAt } from "./diff";
-import { located, type Pointer } from "./pointer";
-import { kindOf, listOf, stopName } from "./request";
+import { join, located, type Pointer } from "./pointer";
+import { kindOf, listOf, obstaclesListed, stopName } from "./request";
 import { request, trouble } from "./state";
-import type { ApiRequest, ProblemDetails } from "./types";
+import type { ApiRequest, Obstacle, ProblemDetails } from "./types";
 import { asShown, UNITS } from "./units";
 
 // the field that a problem without one is about
@@ -24,16 +24,17 @@ const slugOf = (details: ProblemDetails) => details.type?.split("/").at(-1) ?? "
 
 /** The field that a problem is about; null if it names none. */
 function pointerOf(details: ProblemDetails, asked: ApiRequest): Pointer | null {
-  const { target } = details;
-  if (target === "start" || target === "goal") return `/${target}`;
-  const stop = target?.startsWith("stops/") ? target.slice(6) : null;
-  if (stop) {
-    const index = listOf(asked.stops).findIndex((each, k) => stopName(each, k) === stop);
-    if (index >= 0) return `/stops/${index}/target`;
-  }
-  if (target?.startsWith("path")) return "/path";
-  const pointer = FIELDS[slugOf(details)] ?? null;
-  return pointer === "/duration" && kindOf(asked) === "round" ? "/time" : pointer;
+  const place = details.target ?? details.stop ?? details.path;
+  if (place && !place.startsWith("stops/")) return `/${place.replaceAll(".", "/")}`;
+  // also a line of a stop, or the begin of its path
+  const isOf = (stop: unknown, k: number) => `${place}/`.startsWith(`stops/${stopName(stop, k)}/`);
+  const stop = listOf(asked.stops).findIndex(isOf);
+  if (stop >= 0) return `/stops/${stop}/target`;
+  const pointer = FIELDS[slugOf(details)];
+  if (pointer) return pointer === "/duration" && kindOf(asked) === "round" ? "/time" : pointer;
+  const isNear = ({ name }: Obstacle) => details.pair?.includes(name);
+  const obstacle = obstaclesListed(asked).findIndex(isNear);
+  return obstacle >= 0 ? join("scene", "obstacles", obstacle) : null;
 }
 
 /** Shows what went wrong with a request, at its fields where they are known. */
@@ -59,6 +60,15 @@ export function tell(error: unknown, asked: ApiRequest = request.value): void {
     pointer,
     fields,
   };
+}
+
+/** What went wrong, in words, with the fields that the service names. */
+export function said(error: unknown): string {
+  const fields = error instanceof Problem ? (error.details.errors ?? []) : [];
+  const text = error instanceof Error ? error.message : String(error);
+  return fields.length
+    ? fields.map(({ loc, msg }) => `${loc.slice(1).join(".")}: ${msg}.`).join(" ")
+    : asShown(text);
 }
 
 /** Does something that may fail, and says so if it does. */

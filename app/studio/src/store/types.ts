@@ -232,7 +232,12 @@ export interface ProblemDetails {
   title?: string;
   status?: number;
   detail?: string;
+  /** The place at fault: `start`, `goal`, `path`, `stops/` and a name, or a field of the request. */
   target?: string;
+  stop?: string;
+  path?: string;
+  /** Two bodies that are too near. */
+  pair?: [string, string];
   retry?: number | null;
   errors?: { loc: (string | number)[]; msg: string }[];
 }

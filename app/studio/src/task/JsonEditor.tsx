@@ -17,7 +17,7 @@ export function JsonEditor() {
       const next = parsed(given);
       jsonBroken.value = false;
       setWhy("");
-      if (JSON.stringify(next) !== JSON.stringify(request.value)) edit(next, {});
+      if (JSON.stringify(next) !== JSON.stringify(request.value)) edit(next);
     } catch (error) {
       setOwn(given);
       setWhy((error as Error).message);

@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
+import { useDraft } from "../ui/draft";
 import { Errors } from "../ui/Errors";
 import { Menu } from "../ui/Menu";
 import { NumberCell } from "../ui/NumberCell";
@@ -63,22 +64,22 @@ export function PoseRow({ row, index }: { row: Row; index: number }) {
 function rowKey(event: KeyboardEvent, row: Row): (() => void) | null {
   if (!entryOf(row)) return null;
   const inside = (event.target as HTMLElement).matches("input, select, textarea");
-  if (event.altKey && event.key === "ArrowUp") return () => edit(moved(request.value, row, -1), {});
-  if (event.altKey && event.key === "ArrowDown")
-    return () => edit(moved(request.value, row, 1), {});
+  if (event.altKey && event.key === "ArrowUp") return () => edit(moved(request.value, row, -1));
+  if (event.altKey && event.key === "ArrowDown") return () => edit(moved(request.value, row, 1));
   if ((event.ctrlKey || event.metaKey) && event.key === "d")
-    return () => edit(duplicated(request.value, row), {});
-  return event.key === "Delete" && !inside ? () => edit(withoutRow(request.value, row), {}) : null;
+    return () => edit(duplicated(request.value, row));
+  return event.key === "Delete" && !inside ? () => edit(withoutRow(request.value, row)) : null;
 }
 
 function StopName({ row }: { row: Row }) {
   const pointer = `${row.pointer.replace(/\/target$/, "")}/name`;
+  const { field } = useDraft(row.name);
   return (
     <input
       type="text"
       class="name"
       aria-label={`Name of ${row.name}`}
-      value={row.name}
+      {...field}
       onChange={(event) => edit(put(request.value, pointer, event.currentTarget.value))}
     />
   );
@@ -199,20 +200,16 @@ function RowMenu({ row, target, onSliders }: { row: Row; target: Target; onSlide
       </Button>
       {entryOf(row) && (
         <>
-          <Button kind="quiet" onClick={() => edit(duplicated(request.value, row), {})}>
+          <Button kind="quiet" onClick={() => edit(duplicated(request.value, row))}>
             Duplicate
           </Button>
-          <Button kind="quiet" onClick={() => edit(moved(request.value, row, -1), {})}>
+          <Button kind="quiet" onClick={() => edit(moved(request.value, row, -1))}>
             Move up
           </Button>
-          <Button kind="quiet" onClick={() => edit(moved(request.value, row, 1), {})}>
+          <Button kind="quiet" onClick={() => edit(moved(request.value, row, 1))}>
             Move down
           </Button>
-          <Button
-            kind="quiet"
-            icon="trash"
-            onClick={() => edit(withoutRow(request.value, row), {})}
-          >
+          <Button kind="quiet" icon="trash" onClick={() => edit(withoutRow(request.value, row))}>
             Delete
           </Button>
         </>

@@ -125,7 +125,7 @@ export function SceneList() {
                   label={`Delete ${String(obstacle.name)}`}
                   onClick={() => {
                     setOpen(null);
-                    edit(withoutObstacle(request.value, k), {});
+                    edit(withoutObstacle(request.value, k));
                   }}
                 />
               </div>

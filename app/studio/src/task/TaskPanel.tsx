@@ -29,7 +29,7 @@ export function TaskPanel() {
           label="Kind of task"
           options={KINDS}
           value={kind.value}
-          onChange={(next) => edit(asKind(request.value, next), {})}
+          onChange={(next) => edit(asKind(request.value, next))}
         />
         <Button
           kind="quiet"

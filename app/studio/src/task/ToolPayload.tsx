@@ -5,7 +5,7 @@ import { robotNow } from "../picture/pictured";
 import { untyped } from "../picture/drag";
 import { at, join, put } from "../store/pointer";
 import { isObject, listOf, sixOf, withNumber } from "../store/request";
-import { edit, request } from "../store/state";
+import { edit, request, typed } from "../store/state";
 import type { Pose, Tool } from "../store/types";
 import { figure } from "../store/units";
 import { dressed, toolNow } from "../store/tools";
@@ -99,7 +99,7 @@ function TcpCells({ tcp }: { tcp: Pose }) {
         six={six}
         onNumber={(index, value, text, pointer) =>
           edit(put(request.value, "/tcp", withNumber(tcp, index, value)), {
-            ...untyped(""),
+            ...typed.value,
             [pointer]: text,
           })
         }

@@ -23,7 +23,7 @@ export function ToolPicker() {
   const name = toolName(request.value);
   const choose = (next: string) => {
     const bare = put(put(request.value, "/tool", undefined), "/tcp", undefined);
-    edit(next ? { ...bare, tool: next } : bare, {});
+    edit(next ? { ...bare, tool: next } : bare);
   };
   return (
     <>

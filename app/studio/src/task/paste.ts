@@ -61,7 +61,7 @@ export function answer({ row, table }: Question, reading: Reading): void {
   question.value = null;
   if (table) {
     const [next, count] = withRows(request.value, table, reading);
-    edit(next, {});
+    edit(next);
     toast.value = `${count} stops from the table, read as ${reading.echo}.`;
     return;
   }

@@ -2,6 +2,7 @@ import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { trying } from "../store/trouble";
 import { Button } from "./Button";
+import { useDraft } from "./draft";
 
 interface Props {
   /** What it was named; null without a name. */
@@ -20,6 +21,7 @@ interface Props {
 /** Something that is kept, in a list: opened by its name, renamed and deleted. */
 export function KeptRow(props: Props) {
   const [naming, setNaming] = useState(false);
+  const { field, end } = useDraft(props.name ?? "");
   const { facts, onOpen, onRename, onDelete, current, before, progress } = props;
   const name = props.name ?? props.unnamed ?? "";
   if (naming)
@@ -30,13 +32,16 @@ export function KeptRow(props: Props) {
           class="search"
           aria-label={`New name of ${name}`}
           maxLength={200}
-          value={props.name ?? ""}
+          {...field}
           ref={(input) => input?.focus()}
           onChange={({ currentTarget: { value } }) => {
             const given = value.trim() || null;
             if (given !== props.name) trying(() => onRename!(given))();
           }}
-          onBlur={() => setNaming(false)}
+          onBlur={() => {
+            end();
+            setNaming(false);
+          }}
           onKeyDown={({ key, currentTarget }) => {
             if (key === "Escape") currentTarget.value = props.name ?? "";
             if (key === "Enter" || key === "Escape") currentTarget.blur();

@@ -2,6 +2,7 @@ import { useEffect, useState } from "preact/hooks";
 import { changes, trouble, typed, unread, write } from "../store/state";
 import type { Pointer } from "../store/pointer";
 import { shown, typedValue, UNITS, type UnitName } from "../store/units";
+import { useDraft } from "./draft";
 
 interface Props {
   label: string;
@@ -35,7 +36,9 @@ export function NumberCell({ label, pointer, value, unit, onValue, onPaste, with
   const text = wrong ?? (same ? own : shown(value, unit));
   const change = changes.value.find((each) => each.pointer === pointer);
   const bad = isWrong || trouble.value?.fields.some((each) => each.pointer === pointer);
+  const { field, end } = useDraft(text);
   const commit = (next: string) => {
+    end();
     const number = typedValue(next, unit);
     if (number === null) {
       setWrong(next);
@@ -63,7 +66,7 @@ export function NumberCell({ label, pointer, value, unit, onValue, onPaste, with
         type="text"
         inputMode="decimal"
         id={id}
-        value={text}
+        {...field}
         data-pointer={pointer}
         aria-label={sign ? `${label} in ${sign}` : label}
         aria-invalid={bad ? "true" : undefined}
