@@ -1,6 +1,7 @@
 """Planning problems of others, from a file: how many are answered, how fast, with how much energy.
 
     python -m benchmarks.foreign FILE
+    python -m benchmarks.foreign FILE --robot panda
     python -m benchmarks.foreign FILE --count 10 --seed 1 --families cage box --kinds joint
 
 FILE is JSON in the format of docs/explained/foreign_scenes.md, which names sources of such sets.
@@ -29,6 +30,7 @@ from joulepath import optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import warm_up
 
@@ -36,10 +38,10 @@ Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")
 # deadline of a request, and period of the replay [s]
 DEADLINE, REPLAY = 10.0, 1e-3
-# the robot of all problems
+# robot of the problems, unless --robot names another
 ROBOT = "ur5e"
-# a gripper modelled for another arm reaches into the capsules of the links next to it
-TOUCHED = ["wrist_2", "wrist_3"]
+# a gripper modelled for another arm reaches into the capsules of this many links next to it
+TOUCHED = 2
 
 
 @dataclass(frozen=True)
@@ -72,11 +74,12 @@ class Outcome:
     collisions: int = 0
 
 
-def problems_of(path: Path) -> list[ForeignProblem]:
-    """The problems of a file, in its order."""
+def problems_of(path: Path, robot: str = ROBOT) -> list[ForeignProblem]:
+    """The problems of a file for a robot, in the file's order."""
     given = orjson.loads(path.read_bytes())
-    capsules = [{"touches": TOUCHED, **capsule} for capsule in given["tool"]["capsules"]]
-    shared = {"robot": ROBOT, "tool": {"capsules": capsules}, "tcp": given["tcp"]}
+    touched = [*load_robot(robot).link_names[-TOUCHED:]]
+    capsules = [{"touches": touched, **capsule} for capsule in given["tool"]["capsules"]]
+    shared = {"robot": robot, "tool": {"capsules": capsules}, "tcp": given["tcp"]}
     return [
         ForeignProblem(
             each["name"],
@@ -192,6 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
     command = parser(__doc__)
     command.add_argument("file", type=Path, help="file of problems")
+    command.add_argument("--robot", default=ROBOT, help="robot of the problems (%(default)s)")
     command.add_argument(
         "--count", type=int, default=0, help="problems of each family, drawn by --seed (0: all)"
     )
@@ -204,7 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     command.add_argument("--verbose", action="store_true", help="a line for each request")
     given = command.parse_args(arguments)
-    problems = problems_of(given.file)
+    problems = problems_of(given.file, given.robot)
     families = list(dict.fromkeys(each.family for each in problems))
     unknown = sorted(set(given.families or ()) - set(families))
     if unknown:
@@ -212,7 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f"no family {', '.join(unknown)} in {given.file}: it has {', '.join(families)}"
         )
     on_one_core()
-    warm_up(ROBOT)
+    warm_up(given.robot)
     outcomes: list[Outcome] = []
     for problem in chosen(problems, given.families or families, given.count, given.seed):
         for kind in given.kinds:
