@@ -24,6 +24,7 @@ from joulepath.optimizer.search.free_members import bounded
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
 from joulepath.optimizer.search.no_trajectory import no_trajectory
 from joulepath.optimizer.search.other_starts import start_beside
+from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.path_ends import path_candidates
 from joulepath.optimizer.search.refinement import refine, refine_rivals
 from joulepath.optimizer.search.sampled_ends import between
@@ -171,6 +172,7 @@ PREPARATION: tuple[Stage, ...] = (find_candidates, bound_candidates)
 SEARCH: tuple[Stage, ...] = (
     solve_without_storage,
     explore_candidates,
+    explore_other_ways,
     refine_sampled_ends,
     until_confirmed(
         refine_best,
