@@ -127,8 +127,8 @@ def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
     def outcome(**found: Any) -> Outcome:
         return Outcome(problem.name, problem.family, kind, **found)
 
-    asked = to_problem(OptimizeRequest.model_validate(problem.requests[kind]), deadline)
     try:
+        asked = to_problem(OptimizeRequest.model_validate(problem.requests[kind]), deadline)
         solution = optimize(asked)
     except JoulepathError as error:
         took = {"wall": time.perf_counter() - began, "cpu": time.process_time() - used}
