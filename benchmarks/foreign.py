@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import sys
 import time
+from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -191,23 +192,26 @@ def print_summary(results: dict[str, Any]) -> None:
         )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command; returns the exit code."""
-    command = parser(__doc__)
+def problem_parser(description: str | None, robot: str, deadline: float) -> ArgumentParser:
+    """A parser with the options that choose problems of a file, a robot and a deadline."""
+    command = parser(description)
     command.add_argument("file", type=Path, help="file of problems")
-    command.add_argument("--robot", default=ROBOT, help="robot of the problems (%(default)s)")
+    command.add_argument("--robot", default=robot, help="robot of the problems (%(default)s)")
     command.add_argument(
         "--count", type=int, default=0, help="problems of each family, drawn by --seed (0: all)"
     )
     command.add_argument("--families", nargs="+", help="families (all)")
     command.add_argument(
-        "--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)"
-    )
-    command.add_argument(
-        "--deadline", type=float, default=DEADLINE, help="deadline of a request [s] (%(default)s)"
+        "--deadline", type=float, default=deadline, help="deadline of a request [s] (%(default)s)"
     )
     command.add_argument("--verbose", action="store_true", help="a line for each request")
-    given = command.parse_args(arguments)
+    return command
+
+
+def selected(command: ArgumentParser, given: Namespace) -> list[ForeignProblem]:
+    """The problems that the options of `problem_parser` choose; ends the command if there is no
+    such family.
+    """
     problems = problems_of(given.file, given.robot)
     families = list(dict.fromkeys(each.family for each in problems))
     unknown = sorted(set(given.families or ()) - set(families))
@@ -215,10 +219,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command.error(
             f"no family {', '.join(unknown)} in {given.file}: it has {', '.join(families)}"
         )
+    return chosen(problems, given.families or families, given.count, given.seed)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command; returns the exit code."""
+    command = problem_parser(__doc__, ROBOT, DEADLINE)
+    command.add_argument(
+        "--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)"
+    )
+    given = command.parse_args(arguments)
+    problems = selected(command, given)
     on_one_core()
     warm_up(given.robot)
     outcomes: list[Outcome] = []
-    for problem in chosen(problems, given.families or families, given.count, given.seed):
+    for problem in problems:
         for kind in given.kinds:
             found = run(problem, kind, given.deadline)
             outcomes.append(found)
