@@ -1,6 +1,7 @@
 """Planning problems of others, from a file: how many are answered, how fast, with how much energy.
 
     python -m benchmarks.foreign FILE
+    python -m benchmarks.foreign FILE --robot panda
     python -m benchmarks.foreign FILE --count 10 --seed 1 --families cage box --kinds joint
 
 FILE is JSON in the format of docs/explained/foreign_scenes.md, which names sources of such sets.
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import sys
 import time
+from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -29,6 +31,7 @@ from joulepath import optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import warm_up
 
@@ -36,10 +39,10 @@ Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")
 # deadline of a request, and period of the replay [s]
 DEADLINE, REPLAY = 10.0, 1e-3
-# the robot of all problems
+# robot of the problems, unless --robot names another
 ROBOT = "ur5e"
-# a gripper modelled for another arm reaches into the capsules of the links next to it
-TOUCHED = ["wrist_2", "wrist_3"]
+# a gripper modelled for another arm reaches into the capsules of this many links next to it
+TOUCHED = 2
 
 
 @dataclass(frozen=True)
@@ -72,11 +75,12 @@ class Outcome:
     collisions: int = 0
 
 
-def problems_of(path: Path) -> list[ForeignProblem]:
-    """The problems of a file, in its order."""
+def problems_of(path: Path, robot: str = ROBOT) -> list[ForeignProblem]:
+    """The problems of a file for a robot, in the file's order."""
     given = orjson.loads(path.read_bytes())
-    capsules = [{"touches": TOUCHED, **capsule} for capsule in given["tool"]["capsules"]]
-    shared = {"robot": ROBOT, "tool": {"capsules": capsules}, "tcp": given["tcp"]}
+    touched = [*load_robot(robot).link_names[-TOUCHED:]]
+    capsules = [{"touches": touched, **capsule} for capsule in given["tool"]["capsules"]]
+    shared = {"robot": robot, "tool": {"capsules": capsules}, "tcp": given["tcp"]}
     return [
         ForeignProblem(
             each["name"],
@@ -124,8 +128,8 @@ def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
     def outcome(**found: Any) -> Outcome:
         return Outcome(problem.name, problem.family, kind, **found)
 
-    asked = to_problem(OptimizeRequest.model_validate(problem.requests[kind]), deadline)
     try:
+        asked = to_problem(OptimizeRequest.model_validate(problem.requests[kind]), deadline)
         solution = optimize(asked)
     except JoulepathError as error:
         took = {"wall": time.perf_counter() - began, "cpu": time.process_time() - used}
@@ -188,33 +192,48 @@ def print_summary(results: dict[str, Any]) -> None:
         )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command; returns the exit code."""
-    command = parser(__doc__)
+def problem_parser(description: str | None, robot: str, deadline: float) -> ArgumentParser:
+    """A parser with the options that choose problems of a file, a robot and a deadline."""
+    command = parser(description)
     command.add_argument("file", type=Path, help="file of problems")
+    command.add_argument("--robot", default=robot, help="robot of the problems (%(default)s)")
     command.add_argument(
         "--count", type=int, default=0, help="problems of each family, drawn by --seed (0: all)"
     )
     command.add_argument("--families", nargs="+", help="families (all)")
     command.add_argument(
-        "--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)"
-    )
-    command.add_argument(
-        "--deadline", type=float, default=DEADLINE, help="deadline of a request [s] (%(default)s)"
+        "--deadline", type=float, default=deadline, help="deadline of a request [s] (%(default)s)"
     )
     command.add_argument("--verbose", action="store_true", help="a line for each request")
-    given = command.parse_args(arguments)
-    problems = problems_of(given.file)
+    return command
+
+
+def selected(command: ArgumentParser, given: Namespace) -> list[ForeignProblem]:
+    """The problems that the options of `problem_parser` choose; ends the command if there is no
+    such family.
+    """
+    problems = problems_of(given.file, given.robot)
     families = list(dict.fromkeys(each.family for each in problems))
     unknown = sorted(set(given.families or ()) - set(families))
     if unknown:
         command.error(
             f"no family {', '.join(unknown)} in {given.file}: it has {', '.join(families)}"
         )
+    return chosen(problems, given.families or families, given.count, given.seed)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command; returns the exit code."""
+    command = problem_parser(__doc__, ROBOT, DEADLINE)
+    command.add_argument(
+        "--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)"
+    )
+    given = command.parse_args(arguments)
+    problems = selected(command, given)
     on_one_core()
-    warm_up(ROBOT)
+    warm_up(given.robot)
     outcomes: list[Outcome] = []
-    for problem in chosen(problems, given.families or families, given.count, given.seed):
+    for problem in problems:
         for kind in given.kinds:
             found = run(problem, kind, given.deadline)
             outcomes.append(found)

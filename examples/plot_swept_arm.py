@@ -129,7 +129,7 @@ def _surfaces(
 
     obstacles = {obstacle.name for obstacle in problem.arm.scene.obstacles}
     for body in model.bodies:
-        if body.cloud is not None:
+        if body.cloud is not None or body.is_hull:
             continue
         if body.name in obstacles:
             add(body, np.eye(4), OBSTACLE, 0.18 if body.core.is_half_space else 0.4)

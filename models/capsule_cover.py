@@ -1,9 +1,10 @@
-"""Proof that capsules cover surfaces: every point of every triangle, not only the corners.
+"""Proof that capsules and hulls cover surfaces: every point of every triangle, not only the
+corners.
 
-A capsule is convex, so it contains a triangle if and only if it contains the three corners. A
-triangle without a containing capsule is bisected at its longest edge until every piece lies in one
-capsule. This proves the cover for every point of the surface, without sampling. A corner of a piece
-outside all capsules is an uncovered point.
+Capsules and grown hulls are convex, so one of them contains a triangle if and only if it contains
+the three corners. A triangle that none contains is bisected at its longest edge until every piece
+lies in one of them. This proves the cover for every point of the surface, without sampling. A
+corner of a piece outside all of them is an uncovered point.
 """
 
 from __future__ import annotations
@@ -12,35 +13,40 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from joulepath.models.robot import Array, LinkCapsule
+from joulepath.models.hull_cover import from_hull
+from joulepath.models.robot import Array, LinkCapsule, LinkHull
 
+LinkCover = LinkCapsule | LinkHull
 SMALLEST = 2e-5
 """Longest edge [m] below which a piece is not bisected further: it lies outside, or where two
-capsules touch."""
+of the covers touch."""
 
 
-def outside(points: Array, capsules: Sequence[LinkCapsule]) -> Array:
-    """Signed distances (m, k) [m] of points (k, 3) [m] from m capsules; negative inside."""
+def outside(points: Array, covers: Sequence[LinkCover]) -> Array:
+    """Signed distances (m, k) [m] of points (k, 3) [m] from m capsules or hulls; negative
+    inside.
+    """
     distances = []
-    for capsule in capsules:
-        begin, along = capsule.axis[0], capsule.axis[1] - capsule.axis[0]
+    for cover in covers:
+        if isinstance(cover, LinkHull):
+            distances.append(from_hull(points, cover.points) - cover.radius)
+            continue
+        begin, along = cover.axis[0], cover.axis[1] - cover.axis[0]
         from_begin = points - begin
         share = np.clip(from_begin @ along / max(float(along @ along), 1e-18), 0.0, 1.0)
-        distances.append(
-            np.linalg.norm(from_begin - share[:, None] * along, axis=1) - capsule.radius
-        )
+        distances.append(np.linalg.norm(from_begin - share[:, None] * along, axis=1) - cover.radius)
     return np.array(distances)
 
 
-def not_held(triangles: Array, capsules: Sequence[LinkCapsule]) -> Array:
-    """Uncovered pieces (k, 3, 3) [m] of triangles (t, 3, 3) [m] in the frame of the capsules.
+def not_held(triangles: Array, covers: Sequence[LinkCover]) -> Array:
+    """Uncovered pieces (k, 3, 3) [m] of triangles (t, 3, 3) [m] in the frame of capsules and hulls.
 
-    The result is empty if the cover is proven. Otherwise every piece has a corner outside all
-    capsules, or a longest edge below SMALLEST.
+    The result is empty if the cover is proven. Otherwise every piece has a corner outside all of
+    them, or a longest edge below SMALLEST.
     """
     found, pieces = [np.empty((0, 3, 3))], triangles
     while len(pieces):
-        distances = outside(pieces.reshape(-1, 3), capsules).reshape(len(capsules), -1, 3)
+        distances = outside(pieces.reshape(-1, 3), covers).reshape(len(covers), -1, 3)
         is_held = (distances.max(axis=2) <= 0).any(axis=0)
         has_corner_outside = (distances.min(axis=0) > 0).any(axis=1)
         edges = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2)

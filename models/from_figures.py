@@ -17,6 +17,7 @@ from joulepath.models.robot import (
     FrictionLaw,
     Limits,
     LinkCapsule,
+    LinkHull,
     Mains,
     Robot,
     TorqueSide,
@@ -25,8 +26,8 @@ from joulepath.models.robot import (
 from joulepath.models.shape_sizes import check_lengths
 from joulepath.models.urdf import coupling_of, urdf_of
 
-# figures of the section `collision` beside the capsules of links
-NO_LINKS = ("elbow", "meshes", "never_meet")
+# figures of the sections `collision` and `hulls` beside the shapes of links
+NO_LINKS = ("elbow", "meshes", "never_meet", "radius")
 
 
 def robot_of(name: str, figures: dict[str, Any]) -> Robot:
@@ -64,6 +65,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
             (first, second) for first, second in figures["collision"]["never_meet"]["value"]
         ),
         figures=figures,
+        hulls=_hulls(figures.get("hulls", {}), model),
         torque_side=_torque_side(limits),
         elbow=_elbow(figures, capsules),
         T_base_base_link=_base_link(figures["kinematics"]),
@@ -125,6 +127,19 @@ def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, .
     for link, row in rows:
         check_lengths(f"The radius of a capsule of {link_names(model)[link]!r}", row[6])
     return tuple(LinkCapsule(link, row[:6].reshape(2, 3), float(row[6])) for link, row in rows)
+
+
+def _hulls(figures: dict[str, Any], model: pin.Model) -> tuple[LinkHull, ...]:
+    """Hulls of the links of the section `hulls`, from the base on. Raises ValueError."""
+    rows = {
+        link: figures[name]["value"]
+        for link, name in enumerate(link_names(model))
+        if name in figures
+    }
+    return tuple(
+        LinkHull(link, read_only(points, (len(points), 3), "A hull"), figures["radius"]["value"])
+        for link, points in rows.items()
+    )
 
 
 def _default_motion(figures: dict[str, Any]) -> DefaultMotion | None:

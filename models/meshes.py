@@ -1,8 +1,9 @@
 """Triangles of the meshes covered by the capsules of a robot, in link frames.
 
-The meshes are not part of this package. A folder contains `visual/NAME.obj` and
-`collision/NAME.obj`, like the package `airo-models` on PyPI with the meshes of the maker's
-description.
+The meshes are not part of this package. For arms of Universal Robots, a folder contains
+`visual/NAME.obj` and `collision/NAME.obj`, like the package `airo-models` on PyPI with the meshes
+of the maker's description. For the Panda, it contains `visual/linkK.dae` and
+`collision/linkK.stl`, like meshes/robot_arms/fer in github.com/frankaemika/franka_description.
 """
 
 from __future__ import annotations
@@ -12,8 +13,13 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull
 
 from joulepath.models.robot import Array
+from joulepath.models.uploads.collada import collada_corners
+from joulepath.models.uploads.limits import unwatched
+from joulepath.models.uploads.mesh import read_mesh
+from joulepath.models.uploads.mesh_text import MeshSize
 
 # detailed surfaces for display, and the maker's coarser surfaces for collision checks
 KINDS = ("visual", "collision")
@@ -25,6 +31,8 @@ SHIFTS = {
     "ur10e": (0.1762, 0.0393, -0.135, -0.12, -0.1168),
     "ur16e": (0.176, 0.04, -0.135, -0.12, -0.1168),
 }
+# the arm whose meshes are in the frames of the links
+PANDA = "panda"
 # files of the links, base first, and roll, pitch, yaw [rad] of the meshes in the link frames
 _ALONG = (np.pi / 2, 0.0, -np.pi / 2)
 _UPRIGHT = (np.pi / 2, 0.0, 0.0)
@@ -53,8 +61,11 @@ def mesh_placement(robot: str, link: int) -> pin.SE3:
 
 
 def link_surfaces(folder: Path, robot: str, link: int) -> dict[str, Array]:
-    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link. `robot` is one of
-    SHIFTS."""
+    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link. `robot` is one of SHIFTS
+    or PANDA; of the visual meshes of the latter, the triangles of the convex hull.
+    """
+    if robot == PANDA:
+        return {"visual": _hull_of_dae(folder, link), "collision": _stl(folder, link)}
     T = mesh_placement(robot, link)
     return {
         kind: _triangles(mesh_file(folder, kind, link)) @ T.rotation.T + T.translation
@@ -85,3 +96,16 @@ def _triangles(path: Path) -> Array:
             corners = [int(corner.split("/")[0]) - 1 for corner in rest]
             faces += [[corners[0], *corners[k : k + 2]] for k in range(1, len(corners) - 1)]
     return np.asarray(np.array(vertices)[np.array(faces)])
+
+
+def _stl(folder: Path, link: int) -> Array:
+    corners, triangles = read_mesh(
+        "stl", (folder / "collision" / f"link{link}.stl").read_bytes(), MeshSize()
+    )
+    return np.asarray(corners[triangles])
+
+
+def _hull_of_dae(folder: Path, link: int) -> Array:
+    content = (folder / "visual" / f"link{link}.dae").read_bytes()
+    corners = collada_corners(content, MeshSize(), unwatched)
+    return np.asarray(corners[ConvexHull(corners).simplices])

@@ -176,6 +176,18 @@ class LinkCapsule:
 
 
 @dataclass(frozen=True, eq=False)
+class LinkHull:
+    """The convex hull of `points` (n, 3) [m] in the frame of a link, grown by `radius` [m].
+
+    `link` is the number of the joint moving the link, 0 for the base.
+    """
+
+    link: int
+    points: Array
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
 class Robot:
     """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`.
     Compared by identity.
@@ -185,13 +197,15 @@ class Robot:
     content of `GET /robots/{name}`: every figure with its unit, source and trust letter.
     `default_motion` is None if the controller's defaults are unknown.
 
-    The `capsules` cover the meshes of the links. `never_in_collision` has pairs of non-adjacent
-    links which cannot touch in any configuration. `elbow` is the capsule around the elbow, for its
-    speed limit; None for an arm without an elbow. `torque_side` is `motor` if the torque limits
-    include rotor and friction, `link` if they exclude them. `T_base_base_link` (4, 4) is the pose
-    of ROS's frame `base_link` in `base`. `gravity` (3,) [m/s²] is that in `base` unless an arm has
-    another mounting. `mains` is None where nobody measured what the control box draws. `coupling`
-    has the joints of the chain that follow others; the others are the nq joints of the arm.
+    The `capsules` cover the meshes of the links. So do the `hulls` of those links that have one,
+    more closely: obstacles are compared with them, and links with each other by the capsules.
+    `never_in_collision` has pairs of non-adjacent links which cannot touch in any configuration.
+    `elbow` is the capsule around the elbow, for its speed limit; None for an arm without an elbow.
+    `torque_side` is `motor` if the torque limits include rotor and friction, `link` if they exclude
+    them. `T_base_base_link` (4, 4) is the pose of ROS's frame `base_link` in `base`. `gravity` (3,)
+    [m/s²] is that in `base` unless an arm has another mounting. `mains` is None where nobody
+    measured what the control box draws. `coupling` has the joints of the chain that follow others;
+    the others are the nq joints of the arm.
     """
 
     name: str
@@ -206,6 +220,7 @@ class Robot:
     capsules: tuple[LinkCapsule, ...]
     never_in_collision: frozenset[tuple[int, int]]
     figures: dict[str, Any] = field(repr=False)
+    hulls: tuple[LinkHull, ...] = ()
     torque_side: TorqueSide = "motor"
     elbow: LinkCapsule | None = None
     T_base_base_link: Array = field(default_factory=lambda: np.eye(4), repr=False)

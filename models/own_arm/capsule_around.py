@@ -38,7 +38,7 @@ def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[A
 
     Direct searches from the three principal axes minimise the volume. The radius is exact.
     """
-    points = _outermost(points, checkpoint)
+    points = outermost(points, checkpoint)
     centre = points.mean(axis=0)
     found = []
     for direction in np.linalg.svd(points - centre, full_matrices=False)[2]:
@@ -66,14 +66,14 @@ def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[A
     return axis, float(np.ceil(_reach(axis, points) / SEARCH.digit) * SEARCH.digit)
 
 
-def _outermost(points: Array, checkpoint: Checkpoint) -> Array:
+def outermost(points: Array, checkpoint: Checkpoint) -> Array:
     """Vertices of the convex hull; all points if they are flat.
 
     Very many points are divided into parts, whose hulls are united.
     """
     parts = np.array_split(points, -(-len(points) // SEARCH.hull_points))
     if len(parts) > 1:
-        points = np.concatenate([_outermost(part, checkpoint) for part in parts])
+        points = np.concatenate([outermost(part, checkpoint) for part in parts])
     checkpoint()
     try:
         return (

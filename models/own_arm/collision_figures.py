@@ -1,4 +1,4 @@
-"""Figures of link shapes: capsules, and pairs of links excluded from collision checks.
+"""Figures of link shapes: capsules, hulls, and pairs of links excluded from collision checks.
 
 A link without capsules of the user and without shapes in the URDF gets a capsule from joint to
 joint.
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from joulepath.models.hull_cover import HULL_FIT
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
 from joulepath.models.own_arm.figure import assumed, stated
 from joulepath.models.own_arm.link_shapes import LinkShapes, Rows, check_near
@@ -28,15 +29,15 @@ SHORT = 1e-3
 _FRAME = "x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, radius."
 
 
-def collision_figures(
+def shape_figures(
     description: Description,
     chain: Chain,
     upright: UprightChain,
     links: list[str],
     warnings: list[str],
     checkpoint: Checkpoint,
-) -> dict[str, Any]:
-    """Figures of the section `collision`.
+) -> dict[str, dict[str, Any]]:
+    """Figures of the section `collision`, and of the section `hulls` if any link has a hull.
 
     Args:
         description: the user's description.
@@ -80,7 +81,20 @@ def collision_figures(
         )
     if shapes.unknown:
         warnings.append(f"Shapes that are not read count as nothing: {_listed(shapes.unknown)}.")
-    return figures
+    return {"collision": figures} | _hull_figures(description, links, shapes)
+
+
+def _hull_figures(
+    description: Description, links: list[str], shapes: LinkShapes
+) -> dict[str, dict[str, Any]]:
+    """The section `hulls`; none without a link that has one."""
+    found = {name: points for k, name in enumerate(links, 1) if (points := shapes.hull(k))}
+    if not found:
+        return {}
+    note = "x, y, z in the link frame. Obstacles are compared with it, except clouds."
+    figures = {name: stated(description, points, "m", note) for name, points in found.items()}
+    radius = stated(description, HULL_FIT.radius, "m", "Grows the hulls of the points.")
+    return {"hulls": {"radius": radius} | figures}
 
 
 def _doubt(meeting: MeetingPairs, chain: Chain) -> str:

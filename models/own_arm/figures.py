@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from joulepath.models.from_figures import NO_LINKS
 from joulepath.models.own_arm.chain_warnings import chain_warnings
-from joulepath.models.own_arm.collision_figures import collision_figures
+from joulepath.models.own_arm.collision_figures import shape_figures
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm, Problems
 from joulepath.models.own_arm.energy_figures import drives, electronics, friction
 from joulepath.models.own_arm.figure import assumed, either, per_joint, stated
@@ -66,7 +66,7 @@ def own_figures(
         "kinematics": _kinematics(description, chain, upright, links),
         "inertials": inertials,
         "limits": limits,
-        "collision": collision_figures(description, chain, upright, links, warnings, checkpoint),
+        **shape_figures(description, chain, upright, links, warnings, checkpoint),
         "drives": drives(description, chain.joints, ruling),
         "electronics": electronics(description, chain.nq),
         "friction_table": {

@@ -13,8 +13,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import QhullError
 
-from joulepath.models.own_arm.capsule_around import capsule_around
+from joulepath.models.hull_cover import hull_around
+from joulepath.models.own_arm.capsule_around import capsule_around, outermost
 from joulepath.models.own_arm.description import PLAUSIBLE, CapsuleRow, Description, InvalidArm
 from joulepath.models.own_arm.mesh_files import corners
 from joulepath.models.own_arm.robot_xml import ZERO, numbers
@@ -24,6 +26,8 @@ from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
 from joulepath.models.uploads.limits import LIMITS, Checkpoint
 
+MOST_POINTS = 128
+"""Most points of a hull: with more, distances take longer than those of a few capsules."""
 Rows = list[list[float]]
 """Capsules: both ends of the axis and the radius [m], as in the figures of a robot."""
 Around = tuple[Array, float]
@@ -46,6 +50,7 @@ class LinkShapes:
     unknown: list[str] = field(default_factory=list)
     _seen: list[str] = field(default_factory=list)
     _made: dict[tuple[str, str | None], Around] = field(default_factory=dict)
+    _outermost: dict[tuple[str, str | None], Array] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -70,6 +75,30 @@ class LinkShapes:
         ]
         return given + of_urdf
 
+    def hull(self, k: int) -> Rows | None:
+        """Points of the hull around the mesh of link k, after `rows`; None unless one mesh is the
+        only shape of the link, or if the hull would need more than MOST_POINTS.
+        """
+        links = [link for link in self.chain.rigid[k] if link in self.capsules or self._of(link)]
+        if len(links) != 1 or links[0] in self.capsules or len(shapes := self._of(links[0])) != 1:
+            return None
+        mesh = shapes[0].find("geometry/mesh")
+        key = ("", None) if mesh is None else (mesh.get("filename", ""), mesh.get("scale"))
+        if key not in self._outermost:
+            return None
+        self.checkpoint()
+        T = self._frame(k, links[0]) * _origin(shapes[0].find("origin"), "A <collision> has")
+        try:
+            points = hull_around(self._outermost[key] @ T.rotation.T + T.translation)
+        except QhullError:
+            return None
+        return points.tolist() if len(points) <= MOST_POINTS else None
+
+    def _of(self, link: str) -> list[Element]:
+        """The collision shapes of a URDF link."""
+        element = next(each for each in self.chain.root.findall("link") if each.get("name") == link)
+        return element.findall("collision")
+
     def _given(self, k: int, link: str) -> Rows:
         """The user's capsules of a URDF link."""
         rows = self.capsules.get(link, ())
@@ -83,9 +112,8 @@ class LinkShapes:
 
     def _of_urdf(self, k: int, link: str) -> Rows:
         """A capsule around each collision shape of a URDF link."""
-        element = next(each for each in self.chain.root.findall("link") if each.get("name") == link)
         frame, rows = self._frame(k, link), list[list[float]]()
-        for shape in element.findall("collision"):
+        for shape in self._of(link):
             self._count("urdf", link)
             where = f"A <collision> of link {link!r} has"
             geometry = shape.find("geometry")
@@ -125,13 +153,13 @@ class LinkShapes:
             if points is None:
                 self.missing.append(name)
                 return None
-            self._made[name, scaled] = self._around_points(
-                points, numbers(mesh, "scale", where, "1 1 1"), where
-            )
+            scale = numbers(mesh, "scale", where, "1 1 1")
+            points = self._outermost[name, scaled] = self._scaled(points, scale, where)
+            self._made[name, scaled] = capsule_around(points, self.checkpoint)
         return self._made[name, scaled]
 
-    def _around_points(self, points: Array, scale: Array, where: str) -> Around:
-        """The capsule around the corners of a mesh, in units of `scale` (3,) [m]."""
+    def _scaled(self, points: Array, scale: Array, where: str) -> Array:
+        """The outermost corners (n, 3) [m] of a mesh, given in units of `scale` (3,) [m]."""
         with _of_field("urdf"):
             check_scale(f"{where} with a `scale` that", scale, points)
         points = points * scale
@@ -141,7 +169,7 @@ class LinkShapes:
             )
         with _of_field("meshes"):
             check_surface(f"{where} that", points)
-        return capsule_around(points, self.checkpoint)
+        return outermost(points, self.checkpoint)
 
     def _count(self, field: str, link: str) -> None:
         """Counts a shape of a link. Raises InvalidArm for too many."""

@@ -5,11 +5,11 @@ the base (scene).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import MOST_ROBOTS, Array, Robot
 from joulepath.optimizer.collision.clouds import Cloud, cloud_of
 from joulepath.optimizer.collision.cores import Core, core_of
 from joulepath.optimizer.collision.cores import Indices as Indices
@@ -24,8 +24,9 @@ class Body:
     """Core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
 
     Other bodies must keep a distance of at least `margin` [m]. `touches` are the links that the
-    body touches by design. A body with a `cloud` is its patch `patch`; the core is then only a box
-    around it, with the radius of its parts.
+    body touches by design. A body with `is_hull` is the hull of a link: it is compared with
+    obstacles in place of the link's capsules. A body with a `cloud` is its patch `patch`; the core
+    is then only a box around it, with the radius of its parts.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Body:
     T_link_core: Array
     margin: float = 0.0
     touches: frozenset[int] = frozenset()
+    is_hull: bool = False
     cloud: Cloud | None = None
     patch: int = 0
 
@@ -68,15 +70,12 @@ class Body:
 
 
 def bodies_of(arm: Arm) -> tuple[Body, ...]:
-    """Bodies of an arm: the capsules of the robot, then tool and payload, then the obstacles of the
-    scene.
+    """Bodies of an arm: the capsules of the robot, then tool and payload, then the hulls of the
+    robot if there is any obstacle, then the obstacles of the scene.
     """
-    robot, last, names = arm.robot, arm.robot.last_link, arm.robot.link_names
+    robot, last = arm.robot, arm.robot.last_link
     T_last_flange = robot.T_last_flange
-    links = [
-        Body(names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
-        for capsule in robot.capsules
-    ]
+    capsules, hulls = _bodies_of_links(robot)
     parts = [(TOOL, part) for part in arm.tool]
     if arm.payload.shape is not None:
         parts.append((PAYLOAD, arm.payload.shape))
@@ -91,7 +90,20 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
         for name, p in parts
     ]
     obstacles = [body for obstacle in arm.scene.obstacles for body in _bodies_of_obstacle(obstacle)]
-    return (*links, *attached, *obstacles)
+    return (*capsules, *attached, *(hulls if obstacles else ()), *obstacles)
+
+
+@lru_cache(MOST_ROBOTS)
+def _bodies_of_links(robot: Robot) -> tuple[list[Body], list[Body]]:
+    """The capsules and the hulls of a robot's links."""
+    names, stand = robot.link_names, np.eye(4)
+    return (
+        [Body(names[c.link], c.link, Core(c.axis, c.radius), stand) for c in robot.capsules],
+        [
+            Body(names[h.link], h.link, Core(h.points, h.radius), stand, is_hull=True)
+            for h in robot.hulls
+        ],
+    )
 
 
 def _bodies_of_obstacle(obstacle: Obstacle) -> list[Body]:

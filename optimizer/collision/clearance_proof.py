@@ -64,9 +64,9 @@ class ClearanceProofSettings:
     """Checks of a pair over an interval after which the proof ends with the bound reached so
     far.
     """
-    cloud_distance_margin: float = 0.1
-    """Excess [m] over the least sampled distance above which the distance of a whole cloud is not
-    computed.
+    distance_margin: float = 0.1
+    """Excess [m] over the least sampled distance above which the distances of clouds, and of convex
+    bodies without a closed form, are not computed.
     """
     part_travel: float = 0.02
     """Travel [m] of a body over an interval up to which the parts of a cloud are checked one by
@@ -262,9 +262,9 @@ class _Proof:
         """Distances and normals of pairs (k,) at instants (k,); they update the least sampled
         distance.
         """
-        within = max(self.least, 0.0) + self.settings.cloud_distance_margin
+        within = max(self.least, 0.0) + self.settings.distance_margin
         witness = self.geometry.witness_points(instants.frames, instant, pair, within, part)
-        # For patches of a cloud that are farther away, a lower bound is enough.
+        # For bodies that are farther away, a lower bound is enough.
         witness.distance[np.isinf(witness.distance)] = within
         if len(pair):
             k = int(witness.distance.argmin())

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import coal
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.cores import Core
@@ -159,21 +158,9 @@ def coal_shape(core: Core) -> tuple[coal.CollisionGeometry, float, coal.Transfor
     for vertex in points:
         vertices.append(vertex)
     # A triangle is a body with two faces and no volume.
-    for triangle in [[0, 1, 2], [0, 2, 1]] if len(points) == 3 else _outward(points):
+    for triangle in [[0, 1, 2], [0, 2, 1]] if len(points) == 3 else core.triangles:
         triangles.append(coal.Triangle(*triangle))
     return coal.Convex(vertices, triangles), 0.0, _transform(local)
-
-
-def _outward(points: Array) -> list[list[int]]:
-    """Triangles of the convex hull, with corners counterclockwise as seen from outside."""
-    hull = ConvexHull(points)
-    corners = points[hull.simplices]
-    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("ki,ki->k", faces, hull.equations[:, :3]) < 0
-    triangles = hull.simplices.copy()
-    triangles[inward] = triangles[inward][:, ::-1]
-    result: list[list[int]] = triangles.tolist()
-    return result
 
 
 def _transform(T: Array) -> coal.Transform3s:

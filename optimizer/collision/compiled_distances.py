@@ -103,17 +103,26 @@ class CompiledDistances:
         return result
 
     def witness_points(
-        self, frames: Array, configuration: Indices, pair: Indices
+        self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf
     ) -> tuple[Array, Array, Array]:
         """Signed distance of the cores (k,) [m], normal and point (k, 3), as of
         `PairGeometry.witness_points`.
 
         The distance is NaN if Coal or a cloud has to compute it: that of overlapping cores without
-        a closed form, and that of clouds.
+        a closed form, and that of clouds. It is infinite if it has no closed form and the bodies
+        are farther apart than `within` [m].
         """
         k = len(pair)
         distance, normal, point = np.empty(k), np.empty((k, 3)), np.empty((k, 3))
-        self._call(library.witness_points, frames, configuration, pair, distance, normal, point)
+        of_pairs = [_plain(each) for each in (frames, configuration, pair)]
+        library.witness_points(
+            self._of,
+            address(of_pairs[0]),
+            k,
+            *map(address, of_pairs[1:]),
+            within,
+            *map(address, (distance, normal, point)),
+        )
         return distance, normal, point
 
     def separations(

@@ -44,6 +44,20 @@ class Core:
         """
         return np.asarray(ConvexHull(self.points).equations)
 
+    @cached_property
+    def triangles(self) -> list[list[int]]:
+        """Triangles of the hull of the points, with corners counterclockwise as seen from
+        outside.
+        """
+        hull = ConvexHull(self.points)
+        corners = self.points[hull.simplices]
+        faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inward = np.einsum("ki,ki->k", faces, hull.equations[:, :3]) < 0
+        triangles = hull.simplices.copy()
+        triangles[inward] = triangles[inward][:, ::-1]
+        result: list[list[int]] = triangles.tolist()
+        return result
+
 
 def core_of(shape: Shape) -> Core:
     """Core of a shape, in the frame of the shape. Obstacles of many parts have no core, see

@@ -52,7 +52,8 @@ class CollisionModel:
 
     Two links are checked unless they are adjacent or can never be in collision. Tool and payload
     are checked against all links except the links that they touch by design. The scene is checked
-    against every moving body. All distances have the margin of the obstacle subtracted.
+    against every moving body; of a link with a hull, its hull is checked, except against clouds,
+    and its capsules otherwise. All distances have the margin of the obstacle subtracted.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -99,7 +100,7 @@ class CollisionModel:
         """Signed distances of pairs at n configurations.
 
         Exact are the distances of half-spaces, and of pairs with lower bounds of at most `within`;
-        patches of a cloud are exact only if their distance is at most `within`.
+        those of clouds, and of convex bodies without a closed form, only up to `within`.
 
         Args:
             frames: link frames.
@@ -110,11 +111,11 @@ class CollisionModel:
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
         distance, configuration, column = self.geometry.bounds(frames, pairs, within, known)
         nearest = self.geometry.witness_points(frames, configuration, pairs[column], within)
-        if self.geometry.is_cloud.any() and np.isfinite(within):
-            # No part of these patches is within the limit, so the limit is the better lower bound.
-            beyond = np.isinf(nearest.distance)
+        beyond = np.isinf(nearest.distance)
+        if beyond.any():
+            # These bodies are not within the limit, so the limit is the better lower bound.
             far = configuration[beyond], column[beyond]
-            distance[far] = np.maximum(distance[far], within)
+            distance[far] = np.maximum(distance[far], np.nextafter(within, np.inf))
             configuration, column, nearest = (
                 configuration[~beyond],
                 column[~beyond],
@@ -171,7 +172,7 @@ class CollisionModel:
         is_within = np.zeros(len(every), dtype=bool)
         (near,) = np.nonzero((bound[closest, every] < within) & ~self.geometry.is_cloud)
         is_within[near] = (
-            self.geometry.witness_points(frames, closest[near], near).distance < within
+            self.geometry.witness_points(frames, closest[near], near, within).distance < within
         )
         (undecided,) = np.nonzero((bound[closest, every] < within) & ~is_within)
         is_within[undecided] = (
@@ -275,21 +276,28 @@ class CollisionModel:
 def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
     """Indices (p, 2) of the bodies of every checked pair."""
     links = range(len(arm.robot.capsules))
-    moving = range(len(arm.robot.capsules) + len(arm.tool) + (arm.payload.shape is not None))
+    moving = [k for k, body in enumerate(bodies) if body.link > 0 or k in links]
+    obstacles = [k for k, body in enumerate(bodies) if body.link == 0 and k not in links]
+    with_hull = {body.link for body in bodies if body.is_hull}
     pairs: list[tuple[int, int]] = []
     for k in moving:
-        link = bodies[k].link
-        if k in links:
+        body = bodies[k]
+        if body.is_hull:
+            others = []
+        elif k in links:
             others = [
                 i
                 for i in links
-                if link - bodies[i].link > 1
-                and (bodies[i].link, link) not in arm.robot.never_in_collision
+                if body.link - bodies[i].link > 1
+                and (bodies[i].link, body.link) not in arm.robot.never_in_collision
             ]
         else:
-            others = [i for i in links if bodies[i].link not in bodies[k].touches]
-        obstacles = range(len(moving), len(bodies)) if link > 0 else ()
-        pairs += [(i, k) for i in (*others, *obstacles)]
+            others = [i for i in links if bodies[i].link not in body.touches]
+        if k not in links:
+            others += [i for i in obstacles if not (body.is_hull and bodies[i].cloud)]
+        elif body.link > 0:
+            others += [i for i in obstacles if bodies[i].cloud or body.link not in with_hull]
+        pairs += [(i, k) for i in others]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 

@@ -69,6 +69,7 @@ class PairArrays:
         cores = [body.core for body in bodies]
         max_points = max((len(body.points) for body in bodies), default=1)
         radii = np.array([core.radius for core in cores])
+        covers = [_cover(body) for body in bodies]
         growth = radii + np.array([body.margin for body in bodies])
         primitive_half_sizes = np.array([_primitive_half_size(body) for body in bodies]).reshape(
             -1, 3
@@ -94,12 +95,10 @@ class PairArrays:
             radii=radii,
             ball_centres=np.array([body.ball_centre for body in bodies]).reshape(-1, 3),
             ball_radii=np.array([body.ball_radius for body in bodies]),
-            cover_centres=np.array([_cover_centres(body) for body in bodies]).reshape(
+            cover_centres=np.array([centres for centres, _ in covers]).reshape(
                 -1, COVER_SPHERES, 3
             ),
-            cover_radii=np.array(
-                [body.ball_radius / (COVER_SPHERES if body.is_segment else 1) for body in bodies]
-            ),
+            cover_radii=np.array([radius for _, radius in covers]),
             primitive_half_sizes=primitive_half_sizes,
             is_cylinder=np.array([core.disc_radius > 0 for core in cores], dtype=bool),
             pairs=pairs,
@@ -128,14 +127,24 @@ def _kinds(bodies: Sequence[Body], pairs: Indices) -> Indices:
     ).astype(np.intp)
 
 
-def _cover_centres(body: Body) -> Array:
-    """Centres (COVER_SPHERES, 3) [m] of the covering spheres in the link frame; they coincide
-    unless the body is a segment.
+def _cover(body: Body) -> tuple[Array, float]:
+    """Centres (COVER_SPHERES, 3) [m] of the covering spheres in the link frame, and their radius
+    [m].
+
+    The spheres of a moving body without discs stand in a row along its longest principal axis. For
+    any other body, they coincide.
     """
-    if not body.is_segment:
-        return np.tile(body.ball_centre, (COVER_SPHERES, 1))
-    fractions = (np.arange(COVER_SPHERES) + 0.5) / COVER_SPHERES
-    return np.asarray(body.points[0] + fractions[:, None] * (body.points[-1] - body.points[0]))
+    middle, points = body.ball_centre, body.points - body.ball_centre
+    if body.link > 0 and body.core.disc_radius == 0:
+        axis = np.linalg.svd(points, full_matrices=False)[2][0]
+        along = points @ axis
+        low, length = along.min(), np.ptp(along)
+        across = np.linalg.norm(points - along[:, None] * axis, axis=1).max()
+        radius = float(np.hypot(length / (2 * COVER_SPHERES), across))
+        if radius < body.ball_radius:
+            fractions = (np.arange(COVER_SPHERES) + 0.5) / COVER_SPHERES
+            return middle + (low + fractions * length)[:, None] * axis, radius
+    return np.tile(middle, (COVER_SPHERES, 1)), body.ball_radius
 
 
 def _primitive_half_size(body: Body) -> Array:

@@ -86,10 +86,11 @@ class PairGeometry:
     ) -> WitnessPoints:
         """Witness points of pairs (k,) at configurations (k,).
 
-        The distance of a patch of a cloud is the distance of its nearest part, infinite if it
-        exceeds `within` [m], or of `part` (k,) if that is not negative.
+        The distance of a patch of a cloud is the distance of its nearest part, or of `part` (k,) if
+        that is not negative. The distances of patches and of convex bodies without a closed form
+        are infinite if they exceed `within` [m].
         """
-        result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair))
+        result = WitnessPoints(*self._compiled.witness_points(frames, configuration, pair, within))
         remaining = np.flatnonzero(np.isnan(result.distance))
         of_cloud = self.is_cloud[pair[remaining]]
         for chosen, is_cloud in ((remaining[~of_cloud], False), (remaining[of_cloud], True)):

@@ -61,7 +61,7 @@ class StandIns:
         scene = Scene([replace(obstacle, margin=0.0) for obstacle in arm.scene.obstacles])
         alone = replace(
             arm,
-            robot=replace(arm.robot, capsules=()),
+            robot=replace(arm.robot, capsules=(), hulls=()),
             tool=() if rod is None else (rod,),
             payload=replace(arm.payload, shape=ball),
             scene=scene,

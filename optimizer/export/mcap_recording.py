@@ -93,7 +93,8 @@ def _messages(program: Program, options: McapOptions) -> Iterator[tuple[float, s
     frames = [prefix + name for name in robot.link_names]
     model = collision_model(program.moves[0].arm)
     yield 0.0, "/robot_description", STRING, {"data": _description(robot, prefix)}
-    yield 0.0, "/markers", MARKER_ARRAY, {"markers": markers(list(model.bodies), frames)}
+    shown = [body for body in model.bodies if not body.is_hull]
+    yield 0.0, "/markers", MARKER_ARRAY, {"markers": markers(shown, frames)}
     points = quintic_points(program, "mcap")
     yield 0.0, "/joint_trajectory", TRAJECTORY, joint_trajectory(program, points, prefix)
     for t, q, v, tau, power in _rows(program, options.period):

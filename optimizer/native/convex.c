@@ -122,9 +122,10 @@ static int reduce(Simplex *simplex, double *nearest) {
 }
 
 /* Distance [m] of the cores of two bodies, unit normal from the first to the second, and the nearest point of the
-   second. NAN if the cores touch or overlap, or if the search does not end. */
+   second. NAN if the cores touch or overlap, or if the search does not end. INFINITY as soon as they are proven to be
+   farther apart than `within`: normal and point are then those of an early step. */
 static double convex_convex(const Shapes *shapes, const double *frames, long configuration, long first, long second,
-                            double *normal, double *point) {
+                            double within, double *normal, double *point) {
   const double *A = frame_of(shapes, frames, configuration, first);
   const double *B = frame_of(shapes, frames, configuration, second);
   double x[3], at[3], v[3], before = INFINITY;
@@ -144,18 +145,18 @@ static double convex_convex(const Shapes *shapes, const double *frames, long con
     Corner *corner = simplex.corners + simplex.count;
     into(A, x, corner->second);
     for (int i = 0; i < 3; ++i) corner->difference[i] = corner->second[i] - at[i];
-    const double squared = dot(v, v);
+    const double squared = dot(v, v), distance = sqrt(squared), bound = dot(v, corner->difference) / distance;
+    const int ends = simplex.count > 0 && distance - bound <= GAP;
+    if (ends || bound > within) {
+      double nearest[3] = {0.0, 0.0, 0.0}, away[3];
+      for (int k = 0; k < simplex.count; ++k)
+        for (int i = 0; i < 3; ++i) nearest[i] += simplex.shares[k] * simplex.corners[k].second[i];
+      for (int i = 0; i < 3; ++i) away[i] = v[i] / distance;
+      turn(A, away, normal);
+      place(A, nearest, point);
+      return ends ? distance : INFINITY;
+    }
     if (simplex.count > 0) {
-      const double distance = sqrt(squared);
-      if (squared - dot(v, corner->difference) <= GAP * distance) {
-        double nearest[3] = {0.0, 0.0, 0.0}, away[3];
-        for (int k = 0; k < simplex.count; ++k)
-          for (int i = 0; i < 3; ++i) nearest[i] += simplex.shares[k] * simplex.corners[k].second[i];
-        for (int i = 0; i < 3; ++i) away[i] = v[i] / distance;
-        turn(A, away, normal);
-        place(A, nearest, point);
-        return distance;
-      }
       if (squared >= before) return NAN;
       before = squared;
     }

@@ -284,9 +284,9 @@ static double half_space(const Shapes *shapes, const double *frames, long config
 #include "convex.c"
 
 /* Signed distances (k), normals and points (k, 3) of pairs (k) at configurations (k). NAN where Coal or a cloud computes
-   them. */
+   them; INFINITY for convex cores without a closed form that are farther apart than `within` and the pair's growth. */
 void witness_points(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
-                    double *distance, double *normal, double *point) {
+                    double within, double *distance, double *normal, double *point) {
   for (long j = 0; j < k; ++j, normal += 3, point += 3) {
     const long c = configuration[j], first = shapes->first[pair[j]], second = shapes->second[pair[j]];
     double found = NAN, a[6], b[6];
@@ -307,7 +307,7 @@ void witness_points(const Shapes *shapes, const double *frames, long k, const lo
         found = half_space(shapes, frames, c, first, second, normal, point);
         break;
       case CONVEX:
-        found = convex_convex(shapes, frames, c, first, second, normal, point);
+        found = convex_convex(shapes, frames, c, first, second, within + shapes->growth[pair[j]], normal, point);
     }
     distance[j] = found;
   }

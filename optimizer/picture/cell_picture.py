@@ -104,7 +104,9 @@ def _placed(arm: Arm, q: Array) -> list[tuple[Body, Array]]:
     frames = model.frames(q[None])[0]
     own = {*arm.robot.link_names, TOOL, PAYLOAD}
     return [
-        (each, frames[each.link] @ each.T_link_core) for each in model.bodies if each.name in own
+        (each, frames[each.link] @ each.T_link_core)
+        for each in model.bodies
+        if each.name in own and not each.is_hull
     ]
 
 

@@ -76,7 +76,9 @@ def _add_geom(simulator: Any, spec: Any, link: Any, body: Body, name: str) -> No
             "fromto": body.points.ravel(),
         }
     else:
-        mesh = spec.add_mesh(name=name, uservert=core.points.ravel())
+        # MuJoCo grows no mesh: six points of each ball are inside the grown hull
+        grown = core.points[:, None] + core.radius * np.concatenate([np.eye(3), -np.eye(3)])
+        mesh = spec.add_mesh(name=name, uservert=grown.ravel())
         mesh.inertia = simulator.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         own = {"type": kinds.mjGEOM_MESH, "meshname": name}
     if "fromto" not in own:

@@ -156,9 +156,9 @@ def _tried(state: SearchState) -> list[Candidate]:
     targets that are quicker still.
     """
     candidates, prepared = state.candidates, state.prepared
-    tried = [each for each in candidates if each.holdable and not each.deferred] + fastest_samples(
-        candidates
-    )
+    tried = [
+        each for each in candidates if each.holdable and not each.deferred and not each.sampled
+    ] + fastest_samples(candidates)
     samples = (
         [] if prepared.problem.tool_path is not None else [each for each in tried if each.sampled]
     )

@@ -82,10 +82,10 @@ def activate_deferred(
 
 
 def fastest_samples(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The deferred samples of least proven duration: a batch, few of each pair of branches."""
+    """The samples of least proven duration: a batch, few of each pair of branches."""
     counts, chosen = Counter[tuple[str, str, int]](), list[Candidate]()
     for candidate in sorted(
-        (each for each in candidates if each.deferred and each.holdable),
+        (each for each in candidates if (each.deferred or each.sampled) and each.holdable),
         key=lambda each: each.shortest,
     ):
         branch_pair = _branch_pair(candidate)

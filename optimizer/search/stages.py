@@ -15,14 +15,16 @@ from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.answer import answer
 from joulepath.optimizer.search.baseline_comparison import baselines_of, compare_with_baselines
-from joulepath.optimizer.search.candidates import Reason, bound, pairs
+from joulepath.optimizer.search.candidates import Reason, pairs
 from joulepath.optimizer.search.ends import ends
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.exploration import explore
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
+from joulepath.optimizer.search.free_members import bounded
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
 from joulepath.optimizer.search.no_trajectory import no_trajectory
 from joulepath.optimizer.search.other_starts import start_beside
+from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.path_ends import path_candidates
 from joulepath.optimizer.search.refinement import refine, refine_rivals
 from joulepath.optimizer.search.sampled_ends import between
@@ -52,7 +54,7 @@ def find_candidates(state: SearchState) -> None:
 def bound_candidates(state: SearchState) -> None:
     """Rule out candidates with infeasible ends, and give each candidate its lower bound."""
     problem = state.problem
-    bound(state.prepared, state.candidates)
+    state.candidates = bounded(state.prepared, state.candidates)
     checkpoint()
     least = min(candidate.shortest for candidate in state.candidates)
     state.longest = max(least, problem.duration_min or 0.0)
@@ -170,6 +172,7 @@ PREPARATION: tuple[Stage, ...] = (find_candidates, bound_candidates)
 SEARCH: tuple[Stage, ...] = (
     solve_without_storage,
     explore_candidates,
+    explore_other_ways,
     refine_sampled_ends,
     until_confirmed(
         refine_best,

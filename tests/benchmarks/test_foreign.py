@@ -58,6 +58,13 @@ def test_an_obstacle_has_no_margin_and_no_name_of_the_arm(tmp_path: Path) -> Non
     assert obstacle["margin"] == 0 and obstacle["name"] == "scene base"
 
 
+def test_the_tool_touches_the_last_two_links_of_the_robot(tmp_path: Path) -> None:
+    (problem, *_) = problems_of(written(tmp_path), "panda")
+    assert problem.requests["pose"]["robot"] == "panda"
+    (capsule,) = problem.requests["pose"]["tool"]["capsules"]
+    assert capsule["touches"] == ["link6", "link7"]
+
+
 def test_problems_are_drawn_by_the_seed(tmp_path: Path) -> None:
     problems = problems_of(written(tmp_path, ("posts", "walls")))
     first, again = ([each.name for each in chosen(problems, ["posts"], 2, 1)] for _ in range(2))

@@ -101,6 +101,11 @@ class RobotDetail(RobotSummary):
         "carries the elbow, and pairs of links that are never in collision. A capsule is [x1, y1, "
         "z1, x2, y2, z2, radius]: both ends of its axis in the link frame."
     )
+    hulls: Parameters | None = part(
+        "Convex hulls that hold each link more closely, and are compared with obstacles: points "
+        "[x, y, z] in the link frame, whose hull is grown by `radius`; null for a robot without "
+        "hulls."
+    )
     drives: Parameters = part("Motors, gears and inverters.")
     electronics: Parameters = part(
         "Power that the electronics draw, and what the supply takes back."

@@ -53,6 +53,7 @@ _SECTIONS = (
     "inertials",
     "limits",
     "collision",
+    "hulls",
     "drives",
     "electronics",
     "default_motion",

@@ -118,6 +118,28 @@ def test_a_mesh_of_the_urdf_is_held_where_it_stands(tmp_path: Path) -> None:
         )
 
 
+def test_a_link_of_one_mesh_has_a_hull_around_it() -> None:
+    """Not a link with more shapes, with capsules of the user, or without its mesh. The block has
+    the place of the mesh's origin in the URDF."""
+    cylinder = NAMED.index('<collision><origin xyz="0.1 0 0" rpy="0 1.57 0"/>')
+    alone = NAMED[:cylinder] + NAMED[NAMED.index("<collision><geometry><mesh") :]
+    files = {"forearm.stl": stl(BLOCK)}
+    asked = dataclasses.replace(RICH_ARM, urdf=alone, meshes=files)
+    (hull,) = robot(asked).hulls
+    (capsule,) = [each for each in robot(asked).capsules if each.link == hull.link == 2]
+    assert len(hull.points) == 8
+    assert ConvexHull(hull.points).volume == pytest.approx(0.18 * 0.06 * 0.04, rel=0.01)
+    assert hull.points.mean(axis=0) == pytest.approx(capsule.axis.mean(axis=0), abs=5e-3)
+    forearm = {"forearm": [(0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.05)]}
+    own = dataclasses.replace(asked.collision, capsules=forearm)
+    for other in (
+        dataclasses.replace(asked, urdf=NAMED),
+        dataclasses.replace(asked, collision=own),
+        dataclasses.replace(asked, meshes={}),
+    ):
+        assert not robot(other).hulls
+
+
 def test_a_missing_mesh_is_told() -> None:
     figures, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, urdf=NAMED, meshes={}))
     assert any("package://cell/meshes/forearm.stl" in warning for warning in warnings)
@@ -194,8 +216,8 @@ def test_a_broken_zip_is_refused_as_what_it_is(method: int) -> None:
 
 @pytest.mark.long
 def test_an_arm_of_others_with_its_meshes(tmp_path: Path) -> None:
-    """The UR5e by its visual meshes: every link is within its capsule, as the bundled robot's
-    are."""
+    """The UR5e by its visual meshes: every link is within its capsule and its hull, as the bundled
+    robot's are."""
     text = (
         (arm_folder("ur5e") / "ur5e.urdf")
         .read_text()
@@ -219,4 +241,5 @@ def test_an_arm_of_others_with_its_meshes(tmp_path: Path) -> None:
     for link in range(1, 7):
         surface = link_surfaces(arm_folder("ur5e"), "ur5e", link)["visual"]
         assert not len(not_held(surface, [each for each in made.capsules if each.link == link]))
+        assert not len(not_held(surface, [each for each in made.hulls if each.link == link]))
     assert load_robot("ur5e").nq == made.nq

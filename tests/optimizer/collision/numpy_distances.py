@@ -81,7 +81,7 @@ class NumpyDistances:
         )
 
     def witness_points(
-        self, frames: Array, configuration: Indices, pair: Indices
+        self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf
     ) -> tuple[Array, Array, Array]:
         """Signed distance of the cores (k,) [m], normal and point (k, 3); NaN where there is no
         closed form.

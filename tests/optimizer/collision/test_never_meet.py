@@ -274,5 +274,7 @@ def test_a_twin_has_the_same_shape(name: str) -> None:
         for r in (robot, twin)
     )
     assert (own == same).all()
+    hulls = zip(robot.hulls, twin.hulls, strict=True)
+    assert all((one.points == other.points).all() for one, other in hulls)
     placements = zip(robot.model.jointPlacements, twin.model.jointPlacements, strict=True)
     assert all((one.homogeneous == other.homogeneous).all() for one, other in placements)

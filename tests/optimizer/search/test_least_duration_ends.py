@@ -75,3 +75,15 @@ def test_a_free_posture_is_no_slower_than_the_answer_of_least_energy() -> None:
     assert caught.value.shortest is not None and caught.value.shortest <= free.duration
     again = optimize(replace(problem, **fixed(caught.value.shortest)))
     assert again.certificate.valid
+
+
+def test_few_samples_are_tried_also_where_many_are_open() -> None:
+    """Otherwise neighbours on one self-motion were searched for their fastest motions in turn."""
+    run = Run(asked("panda", 0, free=False))
+    run.prepare()
+    candidates = run.state.candidates
+    deferred = fastest_samples(candidates)
+    for each in candidates:
+        each.activate()
+    assert [*map(id, fastest_samples(candidates))] == [*map(id, deferred)]
+    assert 0 < len(deferred) < len(candidates) / 4

@@ -1,0 +1,87 @@
+"""Convex hulls that cover links: distances of points from them, and their fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from joulepath.models.robot import Array
+
+BATCH = 4096
+"""Points of one batch, which needs some hundred megabytes at a hundred faces."""
+
+
+@dataclass(frozen=True)
+class HullFitSettings:
+    """Settings of the fit."""
+
+    radius: float = 0.0027
+    """Radius by which hulls are grown [m]. The larger it is, the fewer points a hull needs, and
+    the farther it reaches beyond the link."""
+    digit: float = 1e-4
+    """Last digit of the points [m]."""
+
+
+HULL_FIT = HullFitSettings()
+
+
+def from_hull(points: Array, corners: Array) -> Array:
+    """Signed distances (k,) [m] of points (k, 3) [m] from the convex hull of corners (m, 3) [m].
+
+    Inside, the distance is minus that of the nearest face.
+    """
+    hull = ConvexHull(corners)
+    distinct, which = np.unique(points, axis=0, return_inverse=True)
+    found = np.concatenate(
+        [_from_faces(distinct[k : k + BATCH], hull) for k in range(0, len(distinct), BATCH)]
+        or [np.empty(0)]
+    )
+    return np.asarray(found[which.ravel()])
+
+
+def _from_faces(points: Array, hull: ConvexHull) -> Array:
+    normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
+    height = points @ normals.T + offsets
+    result = np.asarray(height.max(axis=1))
+    outside = result > 0
+    points, height = points[outside], height[outside]
+    faces = hull.points[hull.simplices]
+    is_above, nearest = height > 0, np.full(len(points), np.inf)
+    for k in range(3):
+        first, edge = faces[:, k], faces[:, (k + 1) % 3] - faces[:, k]
+        from_first = points[:, None] - first
+        # the third corner is on the inner side of the edge
+        side = np.cross(edge, normals)
+        inward = np.sign(((faces[:, (k + 2) % 3] - first) * side).sum(axis=1))
+        is_above &= (from_first * (side * inward[:, None])).sum(axis=2) >= 0
+        share = np.clip((from_first * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
+        across = from_first - share[..., None] * edge
+        nearest = np.minimum(nearest, np.linalg.norm(across, axis=2).min(axis=1))
+    above_faces = np.where(is_above, height, np.inf).min(axis=1)
+    result[outside] = np.minimum(nearest, above_faces)
+    return result
+
+
+def hull_around(points: Array) -> Array:
+    """Points (n, 3) [m] whose hull, grown by the radius, contains points (k, 3) [m].
+
+    The point that is the farthest outside is added until none is. Raises QhullError for flat
+    points.
+    """
+    points = points[ConvexHull(points).vertices]
+    # Rounding moves a point, and with it the hull, by at most half of a cell's diagonal.
+    reach = HULL_FIT.radius - np.sqrt(3) / 2 * HULL_FIT.digit
+    directions = np.array(list(product((-1.0, 1.0), repeat=3)))
+    chosen = list(dict.fromkeys((points @ directions.T).argmax(axis=0).tolist()))
+    while True:
+        planes = ConvexHull(points[chosen]).equations
+        # The height above a face is never more than the distance, and found much sooner.
+        distance = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        if distance.max() <= reach:
+            distance = from_hull(points, points[chosen])
+        if distance.max() <= reach:
+            return np.round(points[chosen] / HULL_FIT.digit) * HULL_FIT.digit + 0.0
+        chosen.append(int(distance.argmax()))

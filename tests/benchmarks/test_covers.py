@@ -1,0 +1,46 @@
+"""The excess of covers beyond meshes, and a command about a robot without meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from benchmarks.covers import beyond, main
+from joulepath.models.robot import Array, LinkCapsule, LinkHull
+
+# m; between samples of the mesh, and of the ball by flat triangles
+SAMPLED = 4e-4
+
+
+def ball(radius: float) -> Array:
+    """Triangles (t, 3, 3) [m] of a ball."""
+    points = np.random.default_rng(0).normal(size=(4000, 3))
+    points *= radius / np.linalg.norm(points, axis=1)[:, None]
+    return np.asarray(points[ConvexHull(points).simplices])
+
+
+def test_the_excess_is_the_distance_between_the_surfaces() -> None:
+    """A ball of 50 mm within a concentric one of 55 mm, and within a cube that is grown by 5 mm."""
+    mesh, rng = ball(0.05), np.random.default_rng(1)
+    found = beyond([LinkCapsule(1, np.zeros((2, 3)), 0.055)], [mesh], rng)
+    assert found == pytest.approx(np.full(len(found), 5e-3), abs=SAMPLED)
+    cube = 0.05 * (np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T)
+    found = beyond([LinkHull(1, cube, 0.005)], [mesh], rng)
+    assert found.min() == pytest.approx(5e-3, abs=SAMPLED)
+    assert found.max() == pytest.approx(0.05 * np.sqrt(3) + 0.005 - 0.05, abs=SAMPLED)
+
+
+def test_what_another_cover_contains_is_no_excess() -> None:
+    """Of two equal balls side by side, each hides a part of the other."""
+    ends = [np.tile([x, 0.0, 0.0], (2, 1)) for x in (-0.02, 0.02)]
+    covers = [LinkCapsule(1, end, 0.055) for end in ends]
+    found = beyond(covers, [ball(0.05)], np.random.default_rng(1))
+    assert found.max() == pytest.approx(0.025, abs=SAMPLED)
+    assert found.min() >= np.sqrt(0.055**2 - 0.02**2) - 0.05 - SAMPLED
+
+
+def test_a_robot_without_readable_meshes_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--meshes", "gen3=."])
+    assert "gen3" in capsys.readouterr().err

@@ -1,0 +1,101 @@
+"""Hulls of links: distances of points from hulls, the fit around points and around the makers'
+meshes, and the shipped hulls.
+"""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull, QhullError
+
+from joulepath.models.capsule_cover import not_held
+from joulepath.models.fit_hulls import fitted_hull
+from joulepath.models.hull_cover import HULL_FIT, from_hull, hull_around
+from joulepath.models.meshes import KINDS, link_surfaces, sampled
+from joulepath.models.registry import load_robot, robot_names
+from joulepath.models.robot import Array, LinkHull
+from tests.mesh_folders import FOUND, meshes
+from tests.selection import long_but
+
+ROUNDING = 1e-12  # m; sums of squares of lengths below 1 m
+COALS = 1e-9  # m; the tolerance of Coal's search
+
+
+def points_around(rng: np.random.Generator, count: int) -> Array:
+    return rng.normal(size=(count, 3)) * [0.1, 0.06, 0.03]
+
+
+def test_distances_from_a_cube() -> None:
+    """From a face, an edge and a corner, and inside."""
+    cube = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T.astype(float)
+    points = np.array([[0.5, 0.4, 1.3], [1.3, 0.2, 1.4], [2, 2, 2], [0.5, 0.4, 0.7], [1, 1, 1]])
+    assert from_hull(points, cube) == pytest.approx([0.3, 0.5, np.sqrt(3), -0.3, 0], abs=ROUNDING)
+    assert from_hull(np.empty((0, 3)), cube).shape == (0,)
+
+
+def test_distances_are_coals() -> None:
+    rng = np.random.default_rng(4)
+    corners, points = points_around(rng, 30), points_around(rng, 400) * 1.5
+    hull = ConvexHull(corners)
+    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for corner in corners:
+        vertices.append(corner)
+    for triangle in hull.simplices.tolist():
+        triangles.append(coal.Triangle(*triangle))
+    shape, ball = coal.Convex(vertices, triangles), coal.Sphere(0.01)
+    request = coal.DistanceRequest(True, True)
+    request.gjk_tolerance = COALS / 100
+    found = from_hull(points, corners)
+    outside = found > 0.011
+    assert outside.sum() > 50 and (found < 0).sum() > 50
+    for point, distance in zip(points[outside], found[outside], strict=True):
+        at = coal.Transform3s(np.eye(3), point)
+        theirs = coal.distance(shape, coal.Transform3s(), ball, at, request, coal.DistanceResult())
+        assert distance - 0.01 == pytest.approx(theirs, abs=COALS)
+    planes = hull.equations
+    heights = points @ planes[:, :3].T + planes[:, 3]
+    np.testing.assert_array_equal(found < 0, (heights < 0).all(axis=1))
+
+
+def test_a_fit_covers_and_exceeds_by_no_more_than_its_radius() -> None:
+    # a smooth body: the points of a ball, stretched
+    around = np.random.default_rng(1).normal(size=(600, 3))
+    points = around / np.linalg.norm(around, axis=1)[:, None] * [0.1, 0.06, 0.05]
+    chosen = hull_around(points)
+    assert 20 < len(chosen) < 120
+    assert from_hull(points, chosen).max() <= HULL_FIT.radius
+    assert from_hull(chosen, points).max() <= HULL_FIT.digit
+    # a body with flat faces and sharp edges needs only its corners
+    box = np.array(np.meshgrid([0, 0.1], [0, 0.2], [0, 0.005])).reshape(3, 8).T
+    on_faces = np.vstack([box, box.mean(axis=0) + 0.5 * (box - box.mean(axis=0)) * [1, 1, 2]])
+    assert len(hull_around(on_faces)) == 8
+
+
+def test_flat_points_have_no_hull() -> None:
+    with pytest.raises(QhullError):
+        hull_around(np.random.default_rng(0).normal(size=(20, 3)) * [1, 1, 0])
+
+
+LINKS = [(name, link) for name in FOUND for link in range(1, 7)]
+
+
+@pytest.mark.parametrize(("name", "link"), long_but(LINKS[:2], LINKS))
+def test_a_fitted_hull_holds_every_surface(name: str, link: int) -> None:
+    """Every triangle of the maker's meshes; 1 mm less, and a surface is outside."""
+    surfaces = link_surfaces(meshes(name), name, link)
+    assert set(surfaces) == set(KINDS)
+    hull = fitted_hull(meshes(name), name, link)
+    for surface in surfaces.values():
+        assert not len(not_held(surface, [hull]))
+        points = sampled(surface, 5_000, np.random.default_rng(3))
+        assert from_hull(points, hull.points).max() <= hull.radius + ROUNDING
+    smaller = LinkHull(link, hull.points, hull.radius - 1e-3)
+    assert any(len(not_held(surface, [smaller])) for surface in surfaces.values())
+
+
+@pytest.mark.parametrize("name", [name for name in robot_names() if load_robot(name).hulls])
+def test_every_moving_link_has_a_hull_without_idle_points(name: str) -> None:
+    robot = load_robot(name)
+    assert [hull.link for hull in robot.hulls] == list(range(1, robot.nq + 1))
+    assert all(len(ConvexHull(hull.points).vertices) == len(hull.points) for hull in robot.hulls)

@@ -1,0 +1,114 @@
+"""Links with hulls: what obstacles are compared with, and how near their distances are to those
+from the meshes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import coal
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from joulepath.models.fit_hulls import fitted_hull
+from joulepath.models.meshes import link_surfaces
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.clearance_proof import proven_clearance
+from joulepath.optimizer.collision.coal_distance import coal_shape
+from joulepath.optimizer.collision.cores import Core
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.clouds import Points
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from tests.mesh_folders import meshes
+from tests.optimizer.cells import wander
+
+# hulls around the meshes of an arm that ships without them
+ROBOT = replace(
+    load_robot("ur5e"),
+    hulls=tuple(fitted_hull(meshes("ur5e"), "ur5e", link) for link in range(1, 7)),
+)
+EXCESS = 2.7e-3 + 1e-4  # m; of the fit beyond the hulls of the meshes, and of its last digit
+SEARCHED = 1e-6  # m; tolerance of Coal's search
+
+
+def at(x: float, y: float, z: float) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = [x, y, z]
+    return T
+
+
+POST = Obstacle("post", Box(np.array([0.1, 0.1, 0.8])), at(0.4, 0.3, 0.4), margin=0.0)
+BALL = Obstacle("ball", Sphere(0.1), at(-0.5, 0.2, 0.5), margin=0.0)
+SCAN = Obstacle(
+    "scan", Points(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), 0.01), at(0.5, -0.4, 0.4)
+)
+
+
+def test_obstacles_are_compared_with_hulls_and_clouds_with_capsules() -> None:
+    model = CollisionModel(Arm(robot=ROBOT, scene=Scene([POST, BALL, SCAN])))
+    pairs = [(model.bodies[i], model.bodies[k]) for i, k in model.pairs.tolist()]
+    of = {
+        name: {k.is_hull for i, k in pairs if i.name == name} for name in ("post", "ball", "scan")
+    }
+    assert of == {"post": {True}, "ball": {True}, "scan": {False}}
+    assert sum(i.name == "post" for i, _ in pairs) == 6
+    assert not any(i.is_hull for i, _ in pairs)
+
+
+def test_without_obstacles_there_are_no_hulls() -> None:
+    """The links are compared with each other by the same capsules as without hulls."""
+    with_hulls, without = (
+        CollisionModel(Arm(robot=robot)) for robot in (ROBOT, replace(ROBOT, hulls=()))
+    )
+    assert [each.name for each in with_hulls.bodies] == [each.name for each in without.bodies]
+    np.testing.assert_array_equal(with_hulls.pairs, without.pairs)
+
+
+def test_distances_are_those_of_the_meshes_or_a_little_less() -> None:
+    """Against the convex hulls of both of the maker's meshes of every link, by Coal."""
+    model = CollisionModel(Arm(robot=ROBOT, scene=Scene([POST, BALL])))
+    q = np.random.default_rng(2).uniform(-3, 3, (60, 6))
+    frames = model.frames(q)
+    distance = model.pair_distances(frames).distance
+    request = coal.DistanceRequest(True, True)
+    request.gjk_tolerance = SEARCHED / 10
+    shapes = {}
+    for link in range(1, 7):
+        points = np.concatenate(
+            [each.reshape(-1, 3) for each in link_surfaces(meshes("ur5e"), "ur5e", link).values()]
+        )
+        shapes[link] = coal_shape(Core(points[ConvexHull(points).vertices]))[0]
+    compared = 0
+    for column, (i, k) in enumerate(model.pairs.tolist()):
+        obstacle, body = model.bodies[i], model.bodies[k]
+        if not body.is_hull:
+            continue
+        shape, skin, local = coal_shape(obstacle.core)
+        T = obstacle.T_link_core
+        pose = coal.Transform3s(T[:3, :3].copy(), T[:3, 3].copy()) * local
+        for n, own in enumerate(frames[:, body.link]):
+            placed = coal.Transform3s(own[:3, :3].copy(), own[:3, 3].copy())
+            true = (
+                coal.distance(
+                    shape, pose, shapes[body.link], placed, request, coal.DistanceResult()
+                )
+                + skin
+                - obstacle.core.radius
+            )
+            if true > 0.01:
+                assert true - EXCESS <= distance[n, column] <= true + SEARCHED
+                compared += 1
+    assert compared > 500
+
+
+def test_a_proven_clearance_is_below_every_sample() -> None:
+    """Of a motion whose closest pair is an obstacle and the hull of a link."""
+    model = CollisionModel(Arm(robot=ROBOT, scene=Scene([POST, BALL])))
+    line = wander(2, duration=1.5)
+    proven = proven_clearance(model, line)
+    assert proven is not None
+    sampled = model.pair_distances(model.frames(line.curve(np.linspace(0, 1.5, 15_001)))).distance
+    assert proven.min_clearance <= sampled.min() <= proven.min_clearance + 2e-3
+    assert proven.pair[0] in ("post", "ball")
