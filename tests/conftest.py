@@ -4,6 +4,7 @@ alone runs; a database for each test, and the service in this process for all.
 
 from __future__ import annotations
 
+import atexit
 import gc
 import itertools
 import os
@@ -62,11 +63,11 @@ def pytest_collection() -> Iterator[None]:
     finally:
         gc.freeze()
         gc.enable()
+        # at the exit, where libraries warn of objects that nobody could free
+        atexit.register(gc.unfreeze)
 
 
 def pytest_unconfigure() -> None:
-    """Libraries warn of objects that nobody could free."""
-    gc.unfreeze()
     DATABASES.cleanup()
 
 
