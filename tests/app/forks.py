@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import functools
+import gc
 import json
 import os
 import runpy
@@ -18,6 +19,9 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
+from importlib import import_module
+from itertools import pairwise
+from multiprocessing import util
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -92,7 +96,9 @@ def _origin() -> socket.socket:
     way, end = socket.socketpair(type=socket.SOCK_SEQPACKET)
     with end:
         command = [sys.executable, "-m", "tests.app.forks"]
-        process = subprocess.Popen(command, cwd=ROOT, stdin=end)
+        # as workers have it
+        one_thread = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+        process = subprocess.Popen(command, cwd=ROOT, stdin=end, env=one_thread)
     atexit.register(process.wait)
     atexit.register(way.close)
     return way
@@ -132,8 +138,34 @@ def _asked() -> list[str]:
     return arguments  # type: ignore[no-any-return]
 
 
-if __name__ == "__main__":
-    import joulepath.app.main  # noqa: F401 (what every program imports)
+def _fork_forkserver() -> None:
+    """Workers of a service are forked from a process that `multiprocessing` starts: here it is a
+    fork of the service, which has imported all that it would import."""
+    start = util.spawnv_passfds  # type: ignore[attr-defined]
 
+    def started(path: str, arguments: list[str], passed: list[int]) -> int:
+        code = arguments[-1]
+        if "multiprocessing.forkserver" not in code:
+            return int(start(path, arguments, passed))
+        process = os.fork()
+        if process == 0:
+            kept = sorted({2, *passed, os.sysconf("SC_OPEN_MAX")})
+            for one, next_ in pairwise(kept):
+                os.closerange(one + 1, next_)
+            try:
+                exec(code, {})
+            finally:
+                os._exit(0)
+        return process
+
+    util.spawnv_passfds = started  # type: ignore[attr-defined]
+
+
+if __name__ == "__main__":
+    for each in ("joulepath.app.main", "toppra"):  # what services, workers and commands import
+        import_module(each)
+    # forks need not look at what they have in common
+    gc.freeze()
     sys.argv = _asked()
+    _fork_forkserver()
     runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
