@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import atexit
 import functools
-import gc
 import json
 import os
 import runpy
@@ -23,6 +22,7 @@ from importlib import import_module
 from itertools import pairwise
 from multiprocessing import util
 from pathlib import Path
+from tempfile import TemporaryFile
 
 ROOT = Path(__file__).parents[2]
 LONGEST = 1 << 17
@@ -83,6 +83,24 @@ class Fork:
 
     def kill(self) -> None:
         self.send_signal(signal.SIGKILL)
+
+
+def run(
+    arguments: tuple[str, ...],
+    environment: Mapping[str, str],
+    patience: float,
+    stdin: bytes = b"",
+    folder: Path = ROOT,
+) -> subprocess.CompletedProcess[bytes]:
+    """A program that has ended within `patience` [s], with what it wrote."""
+    with TemporaryFile() as given, TemporaryFile() as out, TemporaryFile() as err:
+        given.write(stdin)
+        given.seek(0)
+        streams = given.fileno(), out.fileno(), err.fileno()
+        code = Fork(arguments, environment, streams, folder).wait(patience)
+        out.seek(0)
+        err.seek(0)
+        return subprocess.CompletedProcess(arguments, code, out.read(), err.read())
 
 
 def _number(told: socket.socket) -> int:
@@ -164,8 +182,6 @@ def _fork_forkserver() -> None:
 if __name__ == "__main__":
     for each in ("joulepath.app.main", "toppra"):  # what services, workers and commands import
         import_module(each)
-    # forks need not look at what they have in common
-    gc.freeze()
     sys.argv = _asked()
     _fork_forkserver()
     runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

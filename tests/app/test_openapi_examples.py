@@ -14,17 +14,13 @@ import jsonschema_rs
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.main import create_app
 from joulepath.app.schemas.common import KEY_HEADER
 from joulepath.app.schemas.examples.figures import FIGURES, FIGURES_ID
 from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
-from tests.app.live import LOCAL
+from tests.app.documents import open_document
 from tests.app.requests import HOME, NEAR, move
 
-# the document is served before the workers run
-DOCUMENT: dict[str, Any] = json.loads(
-    TestClient(create_app(), base_url=LOCAL).get("/openapi.json").content
-)
+DOCUMENT = open_document()
 CSV = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
 
 

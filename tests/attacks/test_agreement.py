@@ -107,7 +107,12 @@ def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> No
 
 
 @pytest.mark.parametrize(
-    "index", [73, 3, 7], ids=["a stretched wrist", "a redundant arm", "two near branches"]
+    "index",
+    [
+        pytest.param(73, id="a stretched wrist"),
+        pytest.param(3, id="a redundant arm"),
+        pytest.param(7, id="two near branches", marks=pytest.mark.long),
+    ],
 )
 def test_a_cycle_of_one_stop_gives_the_same_energy(index: int) -> None:
     _, body = request(0, index)

@@ -9,19 +9,18 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 import pytest
 
 from joulepath.app.cli.main import main
-from tests.app.forks import Fork
+from tests.app import forks
 from tests.app.requests import move
 
 ROOT = Path(__file__).parents[3]
 
 
-COMMAND = [sys.executable, "-c", "from joulepath.app.cli.main import main; main()"]
+COMMAND = "joulepath.app.cli"
 
 
 CSV = ROOT / "examples" / "evaluate" / "paper_motion_1.csv"
@@ -40,15 +39,7 @@ def environment(**others: str) -> dict[str, str]:
 
 def run(*arguments: str, stdin: str = "", cwd: Path = ROOT) -> subprocess.CompletedProcess[bytes]:
     """The command in a process of its own."""
-    with TemporaryFile() as given, TemporaryFile() as out, TemporaryFile() as err:
-        given.write(stdin.encode())
-        given.seek(0)
-        streams = given.fileno(), out.fileno(), err.fileno()
-        started = Fork(("joulepath.app.cli", *arguments), environment(), streams, cwd)
-        code = started.wait(PATIENCE)
-        out.seek(0)
-        err.seek(0)
-        return subprocess.CompletedProcess(arguments, code, out.read(), err.read())
+    return forks.run((COMMAND, *arguments), environment(), PATIENCE, stdin.encode(), cwd)
 
 
 @dataclass

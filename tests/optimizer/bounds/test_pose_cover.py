@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -73,9 +74,11 @@ def within(q: Array, limits_of: Arm) -> Array:
     return np.asarray(((q >= limits.q_min) & (q <= limits.q_max)).all(axis=1))
 
 
-@pytest.mark.parametrize("count", long_but((1,), (1, 30)))
-@pytest.mark.parametrize("T", [np.eye(4), T_FLANGE_TCP.homogeneous], ids=["flange", "tilted"])
-def test_every_configuration_is_in_a_box(T: Array, count: int) -> None:
+@pytest.mark.parametrize(
+    ("tool", "count"), long_but([("tilted", 1)], product(["tilted", "flange"], [1, 30]))
+)
+def test_every_configuration_is_in_a_box(tool: str, count: int) -> None:
+    T = T_FLANGE_TCP.homogeneous if tool == "tilted" else np.eye(4)
     rng = np.random.default_rng(4)
     relations = ("square", "parallel", "square meeting", "oblique", "square")
     robots = [*COMMON, *(robot_of(random_axes(relations, rng)) for _ in range(3))]

@@ -188,7 +188,7 @@ def test_orientations_at_stops_are_chosen_for_the_whole_cycle(windings: bool) ->
     # cycles at orientations that are given, the attack: none is below the bound, and the answer is
     # no worse
     rng = np.random.default_rng(3)
-    for _ in range(2):
+    for _ in range(1 + windings):
         turns = rng.uniform([-np.pi, -TILT / 2, -TILT / 2], [np.pi, TILT / 2, TILT / 2])
         pick, place = (
             Pose.from_rotation(
