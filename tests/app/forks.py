@@ -130,7 +130,7 @@ def _asked() -> list[str]:
         request, given, _, _ = socket.recv_fds(requests, LONGEST, 4)
         with suppress(ChildProcessError):
             while os.waitpid(-1, os.WNOHANG)[0]:
-                """Those that have ended."""
+                pass  # one that has ended
         if not request:
             os._exit(0)
         if os.fork() == 0:
@@ -168,8 +168,8 @@ def _fork_forkserver() -> None:
         process = os.fork()
         if process == 0:
             kept = sorted({2, *passed, os.sysconf("SC_OPEN_MAX")})
-            for one, next_ in pairwise(kept):
-                os.closerange(one + 1, next_)
+            for one, other in pairwise(kept):
+                os.closerange(one + 1, other)
             try:
                 exec(code, {})
             finally:

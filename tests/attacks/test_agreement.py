@@ -79,6 +79,7 @@ def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> No
         assert energy(solved(ISOLATED, duration=duration)) > (1 - AGREED) * energy(free)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("index", "known"), long_but([(48, 188.948)], [(39, 386.322), (48, 188.948)])
 )
@@ -133,6 +134,7 @@ def test_a_front_ends_with_the_answer_of_optimize() -> None:
     assert least < 29.63
 
 
+@pytest.mark.long
 def test_short_peaks_of_the_tools_speed_are_no_refusal() -> None:
     found = solved(SLOW_TOOL)
     assert found.certificate.valid
@@ -148,6 +150,7 @@ def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_li
     assert found.certificate.valid and found.certificate.worst_ratio["tcp_speed"] <= 1
 
 
+@pytest.mark.long
 def test_what_is_rejected_twice_is_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sqp_stages, "path_excess", lambda *_: np.zeros(2))
     monkeypatch.setattr("joulepath.optimizer.search.tightened_limits.LIMIT_RESERVE", -0.02)

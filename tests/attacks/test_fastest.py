@@ -87,6 +87,7 @@ def assert_answered(
     assert answer.certificate.valid and answer.duration <= error.shortest
 
 
+@pytest.mark.long
 def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     asked = local()
     error = refused(asked, 0.7301)
@@ -187,6 +188,7 @@ def test_what_is_named_is_answered(name: str) -> None:
     assert_answered(MOVES[name], refused(MOVES[name]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", long_but(["panda"], ["panda", "ur20", "kr10_r1100", "xarm7", "ur3e", "fr3"])
 )

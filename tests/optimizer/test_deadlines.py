@@ -132,7 +132,7 @@ def due(asked: Problem, deadline: float) -> Problem:
     return replace(asked, deadline=deadline)
 
 
-@pytest.mark.parametrize("kind", ["slow TCP", "ten minutes", "crowded"])
+@pytest.mark.parametrize("kind", long_but(["crowded"], ["slow TCP", "ten minutes", "crowded"]))
 def test_a_front_does_not_overrun(clock: WorkClock, kind: str) -> None:
     asked = HARD["slow TCP" if kind == "ten minutes" else kind]
     try:

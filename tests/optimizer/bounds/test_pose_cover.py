@@ -137,7 +137,13 @@ def known(prepared: PreparedProblem) -> list[Candidate]:
 
 
 @pytest.mark.parametrize("count", long_but((1,), (1, 40)))
-@pytest.mark.parametrize("robot", COMMON, ids=["beside", "bent", "kuka"])
+@pytest.mark.parametrize(
+    "robot",
+    [
+        pytest.param(each, id=name, marks=() if name == "kuka" else pytest.mark.long)
+        for name, each in zip(("beside", "bent", "kuka"), COMMON, strict=True)
+    ],
+)
 def test_no_pair_of_configurations_is_below(robot: Robot, count: int) -> None:
     rng, ratios = np.random.default_rng(8), list[float]()
     for k in range(count):
