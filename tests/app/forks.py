@@ -1,7 +1,8 @@
 """Programs of the package as forks of a process that has imported it: each import of its own would
 take two seconds of processor time.
 
-A fork has its own environment, folder and standard streams, and runs a module as `python -m` does.
+A fork has its own environment, folder and standard streams. It runs a module as `python -m` does,
+or code as `python -c` does.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Fork:
         """Starts a program.
 
         Args:
-            arguments: name of its module, and its own arguments.
+            arguments: name of its module, or `-c` and its code; and its own arguments.
             environment: all its variables.
             streams: file descriptors of its standard input, output and error.
             folder: its working directory.
@@ -184,4 +185,7 @@ if __name__ == "__main__":
         import_module(each)
     sys.argv = _asked()
     _fork_forkserver()
-    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
+    if sys.argv[0] == "-c":
+        exec(sys.argv.pop(1), {"__name__": "__main__"})
+    else:
+        runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

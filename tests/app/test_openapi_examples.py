@@ -121,6 +121,7 @@ SLOW = (
     "post /compare application/json all_methods",
     "post /cycle application/json pick_and_place",
     "post /cycle application/json press_tending",
+    "post /placement application/json ceiling",
     "post /placement application/json conveyor",
     "post /placement application/json two_tables",
 )

@@ -89,6 +89,7 @@ def test_sharp_corners_hold_no_motion_in_a_poor_optimum(index: int, known: float
     assert energy(solved(body)) <= known * (1 + MOST)
 
 
+@pytest.mark.long
 def test_near_the_fastest_motion_knots_follow_the_switches_of_jerk() -> None:
     """On an isolated bus, a move that ends 0.15 % slower than its fastest motion: a front found
     769.52 J.

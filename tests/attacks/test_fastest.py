@@ -237,6 +237,7 @@ def test_phases_of_milliseconds_in_minutes() -> None:
     assert_answered(asked, error, (1.0,))
 
 
+@pytest.mark.long
 def test_without_a_limit_on_jerk() -> None:
     """Acceleration may jump there, which no spline's does: 2 ms more than the joints need."""
     robot = replace(ROBOT, limits=replace(ROBOT.limits, j_max=np.full(6, np.inf)))

@@ -180,6 +180,7 @@ def test_what_the_deadline_left_coarse_is_not_optimal() -> None:
     assert max(optimal) == pytest.approx(least, rel=ROUNDING)
 
 
+@pytest.mark.long
 def test_the_request_that_was_killed_is_answered(clock: WorkClock) -> None:
     """A TCP at 1 mm/s: three minutes of motion, certified at 180,000 instants, within two seconds
     of work.

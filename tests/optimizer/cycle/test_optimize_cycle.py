@@ -248,7 +248,8 @@ def test_one_of_several_targets_is_chosen_for_the_whole_cycle() -> None:
     assert least == 1  # the first one is what a motion between joint positions would tell
 
 
-@pytest.mark.parametrize("others", [pytest.param(8, marks=pytest.mark.long), 0])
+@pytest.mark.long
+@pytest.mark.parametrize("others", [8])
 def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others: int) -> None:
     """Its configurations are samples: never `optimal`, and what fixed postures need is above the
     bound.

@@ -6,6 +6,7 @@ each of its calls.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -36,6 +37,7 @@ from joulepath.optimizer.dynamics.kernel_source import AVX2, PORTABLE, source
 from joulepath.optimizer.native.build import compiler
 from joulepath.optimizer.native.library_cache import work_folder
 from joulepath.optimizer.optimize import optimize
+from tests.app.forks import run
 from tests.optimizer.dynamics.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
 from tests.selection import long_but
@@ -284,8 +286,8 @@ def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> Non
         "print(optimize(Problem(arm=arm, start=start, goal=goal, "
         "deadline=100)).certificate.valid)\n"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "True", "")
+    ended = run(("-c", code), os.environ, patience=120.0)
+    assert (ended.returncode, ended.stdout.strip(), ended.stderr) == (0, b"True", b"")
 
 
 def test_without_a_compiler_the_virtual_machine_serves(
