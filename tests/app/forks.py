@@ -17,13 +17,14 @@ import socket
 import struct
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from itertools import pairwise
 from multiprocessing import util
 from pathlib import Path
 from tempfile import TemporaryFile
+from typing import Any
 
 ROOT = Path(__file__).parents[2]
 LONGEST = 1 << 17
@@ -117,7 +118,7 @@ def _origin() -> socket.socket:
         command = [sys.executable, "-m", "tests.app.forks"]
         # as workers have it
         one_thread = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-        process = subprocess.Popen(command, cwd=ROOT, stdin=end, env=one_thread)
+        process = subprocess.Popen(command, cwd=ROOT, stdin=end.fileno(), env=one_thread)
     atexit.register(process.wait)
     atexit.register(way.close)
     return way
@@ -160,12 +161,12 @@ def _asked() -> list[str]:
 def _fork_forkserver() -> None:
     """Workers of a service are forked from a process that `multiprocessing` starts: here it is a
     fork of the service, which has imported all that it would import."""
-    start = util.spawnv_passfds  # type: ignore[attr-defined]
+    start = util.spawnv_passfds
 
-    def started(path: str, arguments: list[str], passed: list[int]) -> int:
+    def started(path: bytes, arguments: Sequence[Any], passed: Sequence[int]) -> int:
         code = arguments[-1]
         if "multiprocessing.forkserver" not in code:
-            return int(start(path, arguments, passed))
+            return start(path, arguments, passed)
         process = os.fork()
         if process == 0:
             kept = sorted({2, *passed, os.sysconf("SC_OPEN_MAX")})
@@ -177,7 +178,7 @@ def _fork_forkserver() -> None:
                 os._exit(0)
         return process
 
-    util.spawnv_passfds = started  # type: ignore[attr-defined]
+    util.spawnv_passfds = started  # type: ignore[assignment]
 
 
 if __name__ == "__main__":
