@@ -265,7 +265,8 @@ def test_sigterm_answers_or_refuses_all_in_flight(
         ThreadPoolExecutor(count) as pool,
     ):
         body = long_search(deadline)
-        found = start_work(server, lambda: in_background(pool, server, body, count), workers=1)
+        found = in_background(pool, server, body, count)
+        until(lambda: found[0].done() or not server.is_idle())
         everyone = server.descendants()
         # a service manager signals every process
         for pid in everyone:
