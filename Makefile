@@ -55,9 +55,13 @@ test-long: ready
 	@$(MAKE) --no-print-directory --jobs=2 lint
 	@$(MAKE) --no-print-directory vitest pytest-long
 
-# `worksteal`: a process that has run its share of the tests takes some of another one's.
+# Every process loads all tests: their bytecode is kept, even where Python may write none.
+pytest pytest-long: export PYTHONDONTWRITEBYTECODE :=
+
+# `worksteal`: a process that has run its share of the tests takes some of another one's. Only long tests need
+# schemathesis, which takes a second to load.
 pytest:
-	$(PY) -m pytest -n auto --dist worksteal $(PYTEST_ARGS)
+	$(PY) -m pytest -n auto --dist worksteal -p no:schemathesis $(PYTEST_ARGS)
 
 # An empty marker expression takes back the deselection in pyproject.toml.
 pytest-long:

@@ -33,6 +33,8 @@ class ServerSettings:
     """Time [s] of `shutting-down` responses, until load balancers know of the shutdown."""
     settling_time: float = 0.05
     """Time [s] to read arrived requests before idle connections are closed."""
+    sending_time: float = 0.75
+    """Time [s] after the grace in which the last responses are sent, also by a busy machine."""
     large_block: int = 1 << 20
     """Least size of separately mapped blocks [byte], above the pieces of bodies."""
     document_delay: float = 5.0
@@ -81,7 +83,7 @@ class _Server(uvicorn.Server):
         self._state.jobs.dispatcher.drain()
         self._state.bodies.drain()
         # The engine has ended its tasks by then; remaining connections do not read.
-        end = self._state.settings.shutdown_grace + SERVER.settling_time
+        end = self._state.settings.shutdown_grace + SERVER.sending_time
         asyncio.get_running_loop().call_later(end, self._connections.reset)
         await asyncio.sleep(SERVER.refusing_time)
         for server in self.servers:

@@ -1,22 +1,32 @@
-"""How many processes run the tests, which files they begin with, and which folders `make test-long`
-alone runs.
+"""How many processes run the tests, which files they begin with, which folders `make test-long`
+alone runs; a database for each test, and the service in this process for all.
 """
 
 from __future__ import annotations
 
+import atexit
 import gc
+import itertools
 import os
+import tempfile
+import time
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from starlette.testclient import TestClient
 
 TESTS = Path(__file__).parent
 LONG_FOLDERS = (TESTS / "browser", TESTS / "fuzzing")
 """Folders whose tests are all `long`. Otherwise they are not even imported: their libraries take
 seconds to load.
 """
+DATABASES = tempfile.TemporaryDirectory(prefix="joulepath-tests-")
+_count = itertools.count()
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -53,8 +63,38 @@ def pytest_collection() -> Iterator[None]:
     finally:
         gc.freeze()
         gc.enable()
+        # at the exit, where libraries warn of objects that nobody could free
+        atexit.register(gc.unfreeze)
 
 
 def pytest_unconfigure() -> None:
-    """Libraries warn of objects that nobody could free."""
-    gc.unfreeze()
+    DATABASES.cleanup()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Gives each test a database of its own, also for the commands and programs that it starts: not
+    the user's, and none that another test has written to."""
+    os.environ["JOULEPATH_DATABASE_URL"] = f"sqlite:///{DATABASES.name}/{next(_count)}.db"
+
+
+@pytest.fixture(scope="session")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """The service in this process with a database of its own, its two workers warm."""
+    # tests of the library alone do not wait until the service is imported
+    from starlette.testclient import TestClient
+
+    from joulepath.app.main import create_app
+    from joulepath.app.settings import Settings
+    from tests.app.live import COMPUTED, GRACE, LOCAL, WARM_UP
+
+    database = f"sqlite:///{tmp_path_factory.mktemp('service')}/joulepath.db"
+    settings = Settings(workers=2, queue_size=4, deadline_grace=GRACE, database_url=database)
+    with TestClient(
+        create_app(settings), base_url=LOCAL, raise_server_exceptions=False, headers=COMPUTED
+    ) as client:
+        end = time.monotonic() + WARM_UP
+        while client.get("/readyz").status_code != 200:
+            assert time.monotonic() < end, "the workers do not warm up"
+            time.sleep(0.05)
+        yield client

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
-from typing import Any
-
-import pytest
 
 from joulepath.app.exceptions.error_types import types_of_error
-from joulepath.app.main import create_app
-from joulepath.app.settings import Settings
 from scripts.reference import ERRORS, PAGE, errors, reference
+from tests.app.documents import open_document
 
 
-@pytest.fixture(scope="module")
-def document() -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(json.dumps(create_app(Settings()).openapi()))
-    return content
-
-
-def test_the_pages_are_current(document: dict[str, Any]) -> None:
+def test_the_pages_are_current() -> None:
+    document = open_document()
     for page, made in ((PAGE, reference(document)), (ERRORS, errors(document))):
         assert page.read_text(encoding="utf-8") == made, "run `python -m scripts.reference`"
 

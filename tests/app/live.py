@@ -1,4 +1,4 @@
-"""`python -m joulepath.app` as a subprocess, talked to over a real socket."""
+"""`python -m joulepath.app` as a process, talked to over a real socket."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import os
 import select
 import signal
 import socket
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -19,9 +17,11 @@ from typing import Any
 
 import httpx2
 
+from tests.app.forks import ROOT as ROOT
+from tests.app.forks import Fork
+
 LOCAL = "http://localhost"
 """Where a client in the same process finds the service: a name that it is always known by."""
-ROOT = Path(__file__).parents[2]
 WARM_UP = 150.0
 """Most that a cold start may take on a busy machine [s]: imports, loading the kernels, a first
 solve. Alone: 3 s.
@@ -70,7 +70,7 @@ class OpenRequest:
 class Server:
     """A running service."""
 
-    process: subprocess.Popen[bytes]
+    process: Fork
     url: str
     log: Path
 
@@ -192,12 +192,7 @@ def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Itera
         environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "PORT": str(port)}
         with log.open("ab") as appended:
-            process = subprocess.Popen(
-                [sys.executable, "-m", module],
-                cwd=ROOT,
-                env=os.environ | environment,
-                stderr=appended,
-            )
+            process = Fork((module,), os.environ | environment, (0, 1, appended.fileno()))
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:
             if warm:

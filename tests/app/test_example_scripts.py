@@ -5,13 +5,13 @@ name.
 from __future__ import annotations
 
 import json
+import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests.app import forks
 from tests.app.live import ANSWER, ROOT, Server
 
 EXAMPLES = ROOT / "examples"
@@ -44,13 +44,11 @@ PICTURES = [
 ]
 
 
-def run(*command: str) -> str:
-    """What a program prints that ends without an error."""
-    done = subprocess.run(
-        [sys.executable, *command], cwd=ROOT, capture_output=True, text=True, timeout=5 * ANSWER
-    )
+def run(name: str, *arguments: str) -> str:
+    """What an example prints that ends without an error."""
+    done = forks.run((f"examples.{name}", *arguments), os.environ, 5 * ANSWER)
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return done.stdout.decode()
 
 
 def test_every_program_has_a_test() -> None:
@@ -67,7 +65,7 @@ def test_program_draws_a_picture(name: str, server: Server, tmp_path: Path) -> N
         request, more = ASKING[name]
         file = f"examples/{request}.json"
         arguments = [file, *more, "--service", server.url, "--output", str(picture)]
-    run("-m", f"examples.{name}", *arguments)
+    run(name, *arguments)
     assert picture.read_bytes().startswith(PNG)
 
 
@@ -88,7 +86,7 @@ def test_only_programs_without_imports_from_the_repository_are_run_as_files() ->
 
 def test_first_saving_prints_what_can_be_saved(server: Server) -> None:
     asked = "examples/optimize/pick_to_place.json"
-    told = run("examples/first_saving.py", asked, server.url)
+    told = run("first_saving", asked, server.url)
     answer = server.post("/optimize", json.loads((ROOT / asked).read_text())).json()
     assert f"{answer['energy']['electrical']['total']:.0f} J in {answer['duration']:.2f} s" in told
     assert "controller_default" in told and "% saved" in told

@@ -14,17 +14,13 @@ import jsonschema_rs
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.main import create_app
 from joulepath.app.schemas.common import KEY_HEADER
 from joulepath.app.schemas.examples.figures import FIGURES, FIGURES_ID
 from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
-from tests.app.live import LOCAL
+from tests.app.documents import open_document
 from tests.app.requests import HOME, NEAR, move
 
-# the document is served before the workers run
-DOCUMENT: dict[str, Any] = json.loads(
-    TestClient(create_app(), base_url=LOCAL).get("/openapi.json").content
-)
+DOCUMENT = open_document()
 CSV = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
 
 
@@ -84,17 +80,21 @@ EVALUATE, LOGS = (
 )
 
 
-@pytest.fixture
-def study(client: TestClient) -> str:
-    """The id of a new study."""
+def new_study(client: TestClient) -> str:
     answer = client.post("/studies", json={"name": "examples", "threshold": 10.0})
     assert answer.status_code == 201, answer.text
     return str(answer.json()["id"])
 
 
 @pytest.fixture
+def study(client: TestClient) -> str:
+    """The id of a new study."""
+    return new_study(client)
+
+
+@pytest.fixture(scope="module")
 def job(client: TestClient) -> str:
-    """The id of a new job."""
+    """The id of a job."""
     answer = client.post(
         "/jobs",
         json={
@@ -121,6 +121,7 @@ SLOW = (
     "post /compare application/json all_methods",
     "post /cycle application/json pick_and_place",
     "post /cycle application/json press_tending",
+    "post /placement application/json ceiling",
     "post /placement application/json conveyor",
     "post /placement application/json two_tables",
 )
@@ -149,25 +150,23 @@ def log(client: TestClient) -> str:
     return str(answer.json()["id"])
 
 
-@pytest.fixture
-def made(client: TestClient, study: str, kept: str, log: str, job: str) -> dict[str, str]:
-    """Ids of what the service keeps, by the list that has it."""
+@pytest.fixture(scope="module")
+def made(client: TestClient, kept: str, log: str, job: str) -> dict[str, str]:
+    """Ids of what the service keeps, by the list that has it. Nothing is deleted from them."""
     answer = client.post("/identifications", json={"logs": [log]})
     assert answer.status_code == 202, answer.text
     identification = str(answer.json()["id"])
-    ids = {"studies": study, "answers": kept, "logs": log, "jobs": job}
+    ids = {"studies": new_study(client), "answers": kept, "logs": log, "jobs": job}
     return ids | {"identifications": identification}
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES]
 )
-def test_body_is_answered(
-    name: str, client: TestClient, made: dict[str, str], robot: str, log: str
-) -> None:
+def test_body_is_answered(name: str, client: TestClient, made: dict[str, str], log: str) -> None:
     operation, media_type, example = BODIES[name]
     id = made.get(operation.path.split("/")[1], "")
-    url = operation.path.format(id=id, name=robot, format=name.split()[-1])
+    url = operation.path.format(id=id, name="put", format=name.split()[-1])
     content = example["value"]
     if media_type == "text/csv":
         # the settings of a CSV file are query parameters, which the example's summary names

@@ -79,6 +79,7 @@ def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> No
         assert energy(solved(ISOLATED, duration=duration)) > (1 - AGREED) * energy(free)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("index", "known"), long_but([(48, 188.948)], [(39, 386.322), (48, 188.948)])
 )
@@ -88,6 +89,7 @@ def test_sharp_corners_hold_no_motion_in_a_poor_optimum(index: int, known: float
     assert energy(solved(body)) <= known * (1 + MOST)
 
 
+@pytest.mark.long
 def test_near_the_fastest_motion_knots_follow_the_switches_of_jerk() -> None:
     """On an isolated bus, a move that ends 0.15 % slower than its fastest motion: a front found
     769.52 J.
@@ -107,7 +109,12 @@ def test_its_own_duration_as_a_fixed_one_gives_the_same_energy(index: int) -> No
 
 
 @pytest.mark.parametrize(
-    "index", [73, 3, 7], ids=["a stretched wrist", "a redundant arm", "two near branches"]
+    "index",
+    [
+        pytest.param(73, id="a stretched wrist"),
+        pytest.param(3, id="a redundant arm"),
+        pytest.param(7, id="two near branches", marks=pytest.mark.long),
+    ],
 )
 def test_a_cycle_of_one_stop_gives_the_same_energy(index: int) -> None:
     _, body = request(0, index)
@@ -128,6 +135,7 @@ def test_a_front_ends_with_the_answer_of_optimize() -> None:
     assert least < 29.63
 
 
+@pytest.mark.long
 def test_short_peaks_of_the_tools_speed_are_no_refusal() -> None:
     found = solved(SLOW_TOOL)
     assert found.certificate.valid
@@ -143,6 +151,7 @@ def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_li
     assert found.certificate.valid and found.certificate.worst_ratio["tcp_speed"] <= 1
 
 
+@pytest.mark.long
 def test_what_is_rejected_twice_is_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sqp_stages, "path_excess", lambda *_: np.zeros(2))
     monkeypatch.setattr("joulepath.optimizer.search.tightened_limits.LIMIT_RESERVE", -0.02)

@@ -95,6 +95,7 @@ def test_the_motion_to_a_stretched_pose_is_the_same_a_nanometre_out_of_reach() -
     assert energies == pytest.approx([energies[0]] * 3, rel=SAME)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([0], range(4)))
 def test_mechanical_work_is_optimal_only_below_its_stated_gap(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -104,6 +104,7 @@ def assert_no_dearer_than_its_baselines(found: CycleSolution) -> None:
             assert energy(found) <= each.electrical * (1 + ROUNDING), each.name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("duration", long_but([2.5], [1.9, 2.5, 5.0]))
 def test_a_cycle_whose_fastest_move_is_hard_to_find_has_its_time_shared(duration: float) -> None:
     """The right value is that of its two moves in all shares of the time, each by `optimize`."""
@@ -168,6 +169,7 @@ def test_wherever_the_deadline_ends_it_what_is_in_hand_counts(
     assert all(energy(found) <= each * (1 + ROUNDING) for each in cheapest_known(asked))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([1], range(20)))
 def test_cycles_need_no_more_than_any_simpler_one_at_any_time(seed: int) -> None:
     """Nor than a faster cycle of ours that waits: slower cycles may wait, too."""
@@ -209,6 +211,7 @@ def test_more_time_does_no_more_mechanical_work(seed: int) -> None:
         assert slower.energy.mechanical.total <= faster.energy.mechanical.total * (1 + CONVERGED)
 
 
+@pytest.mark.long
 def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
     """Sped up by half, the moves in their own time break limits; as they are, with a wait, they do
     not.
@@ -222,6 +225,7 @@ def test_simple_cycles_that_are_not_confirmed_are_no_answer() -> None:
         assert len(cycles) == 1 + confirmed and alike.wait_time == 0
 
 
+@pytest.mark.long
 def test_a_chain_that_is_finished_is_the_answer_once_the_time_is_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

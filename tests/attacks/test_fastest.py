@@ -87,6 +87,7 @@ def assert_answered(
     assert answer.certificate.valid and answer.duration <= error.shortest
 
 
+@pytest.mark.long
 def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     asked = local()
     error = refused(asked, 0.7301)
@@ -187,6 +188,7 @@ def test_what_is_named_is_answered(name: str) -> None:
     assert_answered(MOVES[name], refused(MOVES[name]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", long_but(["panda"], ["panda", "ur20", "kr10_r1100", "xarm7", "ur3e", "fr3"])
 )
@@ -235,6 +237,7 @@ def test_phases_of_milliseconds_in_minutes() -> None:
     assert_answered(asked, error, (1.0,))
 
 
+@pytest.mark.long
 def test_without_a_limit_on_jerk() -> None:
     """Acceleration may jump there, which no spline's does: 2 ms more than the joints need."""
     robot = replace(ROBOT, limits=replace(ROBOT.limits, j_max=np.full(6, np.inf)))

@@ -30,6 +30,7 @@ from joulepath.app.exceptions.queue import ClusterUnavailable
 from joulepath.optimizer.native import library_cache
 from joulepath.optimizer.native.library_cache import CacheSettings
 from tests.app.cluster.test_link import scheduler_process
+from tests.app.forks import run
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import ROOT, WARM_UP, serving, until
 from tests.app.problems import checked
@@ -319,18 +320,10 @@ def test_a_busy_port_is_told_with_its_remedy(tmp_path: Path, host: str) -> None:
             "PORT": str(other.getsockname()[1]),
             "JOULEPATH_DATABASE_URL": f"sqlite:///{tmp_path}/joulepath.db",
         }
-        done = subprocess.run(
-            [sys.executable, "-m", "joulepath.app"],
-            cwd=ROOT,
-            env=os.environ | settings,
-            capture_output=True,
-            text=True,
-            timeout=WARM_UP,
-        )
+        done = run(("joulepath.app",), os.environ | settings, WARM_UP)
     assert done.returncode == 1
-    assert (
-        "Address already in use" in done.stderr and "choose another port by --port" in done.stderr
-    )
+    assert b"Address already in use" in done.stderr
+    assert b"choose another port by --port" in done.stderr
     # it has not begun anything: no log, no database
     assert len(done.stderr.splitlines()) == 1 and not list(tmp_path.iterdir())
 

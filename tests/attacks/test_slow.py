@@ -68,6 +68,7 @@ def test_a_slow_joint_ramps_as_fast_as_it_can(speed: float) -> None:
     assert found.status == "optimal" and found.certificate.valid
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("index", long_but([1], range(3)))
 def test_no_duration_near_the_answers_needs_less(index: int) -> None:
     """One move of each kind: all joints slow, one joint slow, a tenth of all limits of speed."""

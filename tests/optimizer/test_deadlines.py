@@ -132,7 +132,7 @@ def due(asked: Problem, deadline: float) -> Problem:
     return replace(asked, deadline=deadline)
 
 
-@pytest.mark.parametrize("kind", ["slow TCP", "ten minutes", "crowded"])
+@pytest.mark.parametrize("kind", long_but(["crowded"], ["slow TCP", "ten minutes", "crowded"]))
 def test_a_front_does_not_overrun(clock: WorkClock, kind: str) -> None:
     asked = HARD["slow TCP" if kind == "ten minutes" else kind]
     try:
@@ -180,6 +180,7 @@ def test_what_the_deadline_left_coarse_is_not_optimal() -> None:
     assert max(optimal) == pytest.approx(least, rel=ROUNDING)
 
 
+@pytest.mark.long
 def test_the_request_that_was_killed_is_answered(clock: WorkClock) -> None:
     """A TCP at 1 mm/s: three minutes of motion, certified at 180,000 instants, within two seconds
     of work.

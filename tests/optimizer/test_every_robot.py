@@ -34,7 +34,7 @@ EVERYDAY: dict[int | str, tuple[list[float], ...]] = {
 }
 # robots that every run tries: their kernels take ten seconds each to compile; one has no figures of
 # drives of its own
-QUICK = ("ur3e", "ur5e", "ur20")
+QUICK = ("ur3e", "ur5e")
 
 
 @pytest.fixture(params=long_but(QUICK, robot_names()), scope="module")

@@ -137,7 +137,8 @@ def test_three_poses_on_a_line_are_no_arc() -> None:
         assert refusal.value.field == "path.via.0"
 
 
-@pytest.mark.parametrize("corners", long_but([5], [5, 10]))
+@pytest.mark.long
+@pytest.mark.parametrize("corners", [5, 10])
 def test_many_tight_corners_are_followed(corners: int) -> None:
     """A zigzag of lines of 0.1 m and more, with corners of 5 mm."""
     turns = [

@@ -97,7 +97,7 @@ def test_the_certificate_allows_turns_about_this_axis_alone(crossed: Solution) -
     assert all(ratio > 10 for ratio in ratios.values())
 
 
-@pytest.mark.parametrize("seed", long_but(range(2), range(30)))
+@pytest.mark.parametrize("seed", long_but(range(1), range(30)))
 def test_it_never_needs_more_than_without_turns(seed: int) -> None:
     rng = np.random.default_rng(seed)
     turn = Rotation.from_rotvec(rng.uniform(-0.4, 0.4, 3))

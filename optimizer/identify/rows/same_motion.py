@@ -77,6 +77,9 @@ def _pairs_with_same_ends(q: Array, move: IntArray) -> list[tuple[int, int]]:
 
 def _pairs_with_same_states(q: Array, v: Array, move: IntArray) -> list[tuple[int, int]]:
     """Pairs of moves, one of them in motion at an end, with mostly the same states."""
+    cut = _cut_in_motion(v, move)
+    if not cut.any():
+        return []
     thinned = slice(None, None, max(1, len(q) // SAME_MOTION.max_states))
     move_of_state = move[thinned]
     states = np.hstack([q, SAME_MOTION.speed_scale * v])[thinned]
@@ -86,7 +89,6 @@ def _pairs_with_same_states(q: Array, v: Array, move: IntArray) -> list[tuple[in
     for own, others in zip(move_of_state, close, strict=True):
         shared_states[own, np.unique(move_of_state[others])] += 1
     same = np.argwhere(shared_states > SAME_MOTION.min_state_share * np.maximum(size, 1)[:, None])
-    cut = _cut_in_motion(v, move)
     return [
         (int(one), int(other)) for one, other in same if one != other and (cut[one] or cut[other])
     ]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +11,7 @@ import pytest
 from joulepath.app.access.start import check_access, is_loopback, log_access
 from joulepath.app.settings import Settings, WrongSettings, read_settings
 from tests.app.access.test_key_file import add
+from tests.app.forks import run
 from tests.app.live import EXIT, ROOT
 
 
@@ -44,16 +43,10 @@ def test_a_file_that_is_not_there_never_means_open(tmp_path: Path) -> None:
 
 
 def test_the_process_ends_with_the_remedies() -> None:
-    run = subprocess.run(
-        [sys.executable, "-m", "joulepath.app"],
-        cwd=ROOT,
-        env=os.environ | {"JOULEPATH_HOST": "0.0.0.0", "PORT": "0"},
-        capture_output=True,
-        timeout=EXIT,
-    )
-    assert run.returncode == 1
-    assert b"joulepath keys add" in run.stderr and b"JOULEPATH_OPEN=1" in run.stderr
-    assert b"Traceback" not in run.stderr
+    ended = run(("joulepath.app",), os.environ | {"JOULEPATH_HOST": "0.0.0.0", "PORT": "0"}, EXIT)
+    assert ended.returncode == 1
+    assert b"joulepath keys add" in ended.stderr and b"JOULEPATH_OPEN=1" in ended.stderr
+    assert b"Traceback" not in ended.stderr
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,13 @@ from typing import Any
 import pytest
 
 from joulepath.app.cli.main import main
+from tests.app import forks
 from tests.app.requests import move
 
 ROOT = Path(__file__).parents[3]
 
 
-COMMAND = [sys.executable, "-c", "from joulepath.app.cli.main import main; main()"]
+COMMAND = "joulepath.app.cli"
 
 
 CSV = ROOT / "examples" / "evaluate" / "paper_motion_1.csv"
@@ -38,14 +39,7 @@ def environment(**others: str) -> dict[str, str]:
 
 def run(*arguments: str, stdin: str = "", cwd: Path = ROOT) -> subprocess.CompletedProcess[bytes]:
     """The command in a process of its own."""
-    return subprocess.run(
-        [*COMMAND, *arguments],
-        input=stdin.encode(),
-        capture_output=True,
-        cwd=cwd,
-        env=environment(),
-        timeout=PATIENCE,
-    )
+    return forks.run((COMMAND, *arguments), environment(), PATIENCE, stdin.encode(), cwd)
 
 
 @dataclass

@@ -103,6 +103,7 @@ def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path
     }
 
 
+@pytest.mark.long
 def test_a_payload_is_that_of_the_last_log(here: Here, tmp_path: Path) -> None:
     files = list[str]()
     for name, carried in (

@@ -6,34 +6,33 @@ import json
 import os
 import pty
 import re
-import select
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import pytest
 
 from joulepath.app.cli.interrupts import interruptible
 from tests.app.cli.console import COMMAND, PATIENCE, ROOT, Here, environment, request
+from tests.app.forks import Fork
 from tests.app.requests import AMPLE, long_search
 
 
 def test_a_reader_that_has_gone_leaves_no_traceback() -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    finished = subprocess.run(
-        [*COMMAND, "optimize", "-"],
-        input=request().encode(),
-        stdout=writing,
-        stderr=subprocess.PIPE,
-        cwd=ROOT,
-        env=environment(),
-        timeout=PATIENCE,
-    )
-    os.close(writing)
-    assert (finished.returncode, finished.stderr) == (-signal.SIGPIPE, b"")
+    with TemporaryFile() as asked, TemporaryFile() as err:
+        asked.write(request().encode())
+        asked.seek(0)
+        streams = asked.fileno(), writing, err.fileno()
+        code = Fork((COMMAND, "optimize", "-"), environment(), streams).wait(PATIENCE)
+        os.close(writing)
+        err.seek(0)
+        assert (code, err.read()) == (-signal.SIGPIPE, b"")
 
 
 def test_a_broken_connection_later_on_is_an_error_like_any_other(here: Here) -> None:
@@ -70,7 +69,7 @@ def test_an_interrupt_that_is_dropped_is_raised_again(monkeypatch: pytest.Monkey
 @pytest.mark.long
 def test_ctrl_c_ends_a_search_with_130() -> None:
     process = subprocess.Popen(
-        [*COMMAND, "optimize", "-"],
+        [sys.executable, "-m", COMMAND, "optimize", "-"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -103,37 +102,20 @@ def wait_for_work(pid: int) -> None:
 def on_a_terminal(*arguments: str, stdin: str) -> tuple[int, str, str]:
     """Exit code, standard output and what a terminal shows as standard error."""
     terminal, other = pty.openpty()
-    process = subprocess.Popen(
-        [*COMMAND, *arguments],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=other,
-        cwd=ROOT,
-        env=environment(TERM="xterm", COLUMNS="100"),
-    )
-    os.close(other)
-    assert process.stdin is not None
-    assert process.stdout is not None
-    process.stdin.write(stdin.encode())
-    process.stdin.close()
-    shown, answer, end = b"", b"", time.monotonic() + PATIENCE
-    pipes = [terminal, process.stdout.fileno()]
-    while pipes:
-        assert time.monotonic() < end
-        for pipe in select.select(pipes, [], [], 1.0)[0]:
-            try:
-                part = os.read(pipe, 1 << 16)
-            except OSError:  # how a terminal says that nobody writes to it any more
-                part = b""
-            if not part:
-                pipes.remove(pipe)
-            elif pipe == terminal:
+    with TemporaryFile() as asked, TemporaryFile() as answer:
+        asked.write(stdin.encode())
+        asked.seek(0)
+        streams = asked.fileno(), answer.fileno(), other
+        process = Fork((COMMAND, *arguments), environment(TERM="xterm", COLUMNS="100"), streams)
+        os.close(other)
+        shown = b""
+        with suppress(OSError):  # how a terminal says that nobody writes to it any more
+            while part := os.read(terminal, 1 << 16):
                 shown += part
-            else:
-                answer += part
-    os.close(terminal)
-    process.stdout.close()
-    return process.wait(PATIENCE), answer.decode(), shown.decode()
+        os.close(terminal)
+        code = process.wait(PATIENCE)
+        answer.seek(0)
+        return code, answer.read().decode(), shown.decode()
 
 
 def test_a_terminal_shows_progress_and_a_summary() -> None:

@@ -325,7 +325,7 @@ def run_machine(steps: int) -> None:
 
 
 def test_no_order_of_events_confuses_the_queue() -> None:
-    run_machine(3_000)
+    run_machine(1_500)
 
 
 @pytest.mark.long

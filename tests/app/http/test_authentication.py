@@ -13,7 +13,6 @@ from typing import Any
 
 import httpx2
 import pytest
-from starlette.testclient import TestClient
 
 from joulepath.app.access.key_file import changing, hash_of
 from joulepath.app.exceptions.access import NotOwner, RoleTooLow, Unauthenticated
@@ -23,7 +22,8 @@ from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
 from joulepath.app.schemas.examples.values import STUDY_ID
 from joulepath.app.settings import Settings
 from tests.app.access.test_key_file import add
-from tests.app.live import ANSWER, CLIENT, LOCAL, Server, serving
+from tests.app.documents import open_document
+from tests.app.live import ANSWER, CLIENT, Server, serving
 from tests.app.routes.test_problems import refused
 from tests.app.store.test_store import put, with_store
 
@@ -325,6 +325,6 @@ def test_the_document_declares_the_keys(document: dict[str, Any]) -> None:
 
 
 def test_an_open_service_declares_none() -> None:
-    open_document = TestClient(create_app(), base_url=LOCAL).get("/openapi.json").json()
-    assert "securitySchemes" not in open_document["components"]
-    assert "401" not in open_document["paths"]["/studies"]["get"]["responses"]
+    document = open_document()
+    assert "securitySchemes" not in document["components"]
+    assert "401" not in document["paths"]["/studies"]["get"]["responses"]

@@ -28,7 +28,6 @@ from tests.app.requests import EXAMPLES, HOME, move
 from tests.app.routes.test_examples import EXAMPLES as FILES
 from tests.app.routes.test_problems import DOWN, refused
 from tests.optimizer.moves import ROBOT
-from tests.selection import long_but
 
 # forearm folded onto the upper arm
 FOLDED = [0.3, -1.4, 3.0, -1.5, -1.57, 0.2]
@@ -163,7 +162,8 @@ def test_no_way(client: TestClient) -> None:
     assert content["start"] == content["candidates"][0]["start"]
 
 
-@pytest.mark.parametrize("methods", long_but([["uniform_scaling"]], [["uniform_scaling"], FAST]))
+@pytest.mark.long
+@pytest.mark.parametrize("methods", [["uniform_scaling"], FAST])
 def test_a_scan_voxels_and_a_mesh_file_are_obstacles(
     client: TestClient, methods: list[str]
 ) -> None:

@@ -170,14 +170,11 @@ def test_other_media_types(client: TestClient) -> None:
     )
 
 
-def test_limits_of_size_and_number(recording: Recording, tmp_path: Path) -> None:
+def test_limits_of_size_and_number(recording: Recording) -> None:
     body = csv_of(recording)
     packed = gzip.compress(body)
     most = len(body) // 2
-    # a database of its own: logs of other tests would fill it
-    database = f"sqlite:///{tmp_path}/logs.db"
-    settings = {"max_upload_bytes": most, "logs_max_bytes": 10_000, "database_url": database}
-    with recorded_service(**settings) as client:
+    with recorded_service(max_upload_bytes=most, logs_max_bytes=10_000) as client:
         refused(client.post("/logs", content=body, headers=CSV), BodyTooLarge)
         refused(
             client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), BodyTooLarge
@@ -204,9 +201,7 @@ def test_only_owners_and_admins_name_and_delete(tmp_path: Path) -> None:
         ("boss", "admin"),
     )
     keys = {name: add(file, name, role) for name, role in roles}
-    with recorded_service(
-        api_keys_file=file, database_url=f"sqlite:///{tmp_path / 'logs.db'}"
-    ) as client:
+    with recorded_service(api_keys_file=file) as client:
 
         def as_(name: str) -> dict[str, str]:
             return CSV | {"Authorization": f"Bearer {keys[name]}"}

@@ -63,8 +63,13 @@ def placed(client: TestClient, body: Json) -> Json:
     return content
 
 
-def test_a_place_is_accepted_by_its_own_request(client: TestClient) -> None:
-    found = placed(client, ASKED)
+@pytest.fixture(scope="module")
+def found(client: TestClient) -> Json:
+    """What `ASKED` comes to."""
+    return placed(client, ASKED)
+
+
+def test_a_place_is_accepted_by_its_own_request(client: TestClient, found: Json) -> None:
     assert found["nominal"] is not None
     for place in (found["best"], found["nominal"]):
         (cycle,) = place["cycles"]
@@ -199,12 +204,11 @@ def test_no_place_is_a_problem(client: TestClient) -> None:
     assert problem["reasons"]["reach"] == 2
 
 
-def test_a_job_answers_as_the_endpoint_does(client: TestClient) -> None:
-    alone = placed(client, ASKED)
+def test_a_job_answers_as_the_endpoint_does(client: TestClient, found: Json) -> None:
     job = ended(client, sent(client, [{"placement": ASKED}]))
     (request,) = job["requests"]
     assert request["state"] == "done", request
-    assert request["energy"] == pytest.approx(alone["best"]["energy"], rel=ROUNDED)
+    assert request["energy"] == pytest.approx(found["best"]["energy"], rel=ROUNDED)
     kept = client.get(request["answer"]).json()
     assert kept["kind"] == "placement"
     cycle = client.get(kept["answer"]["best"]["cycles"][0]["answer"]).json()

@@ -220,10 +220,10 @@ def test_what_cannot_be_is_listed(client: TestClient) -> None:
     ]
 
 
-def test_a_shutdown_is_told_as_one(client: TestClient) -> None:
-    path = begin(client)
-    added(client, path, {"optimize": move()})
+def test_a_shutdown_is_told_as_one() -> None:
     with recorded_service() as stopping:
+        path = begin(stopping)
+        added(stopping, path, {"optimize": move()})
         assert stopping.portal is not None
         stopping.portal.call(stopping.app.state.engine.drain)  # type: ignore[attr-defined]
         answer = stopping.get(f"{path}/suggest")

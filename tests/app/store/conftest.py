@@ -14,7 +14,7 @@ from tests.app.databases import Postgres, postgres, why_no_postgres
 MISSING = why_no_postgres()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def server() -> Iterator[Postgres]:
     with postgres() as server:
         yield server

@@ -7,9 +7,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import sqlite3
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Awaitable, Callable
@@ -37,6 +36,7 @@ from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import store_answers
 from joulepath.app.store.tables import Answer, Table, new_id, now
 from tests.app.databases import Postgres, why_no_postgres
+from tests.app.forks import Fork
 from tests.app.live import ROOT, WARM_UP, Server, serving
 from tests.app.problems import checked
 from tests.app.requests import move
@@ -122,7 +122,7 @@ def test_several_processes_may_migrate_at_once(url: str) -> None:
         "import sys; from joulepath.app.store.database import *; "
         "migrate(create_database_engine(sys.argv[1]))"
     )
-    processes = [subprocess.Popen([sys.executable, "-c", code, url], cwd=ROOT) for _ in range(2)]
+    processes = [Fork(("-c", code, url), os.environ, (0, 1, 2)) for _ in range(2)]
     assert [process.wait(60) for process in processes] == [0] * 2
     assert tables(url) == []
 

@@ -60,7 +60,7 @@ def test_rounded_figures_are_the_arm_that_they_stand_for(
     arm: Robot, figure: Callable[[float], str]
 ) -> None:
     rng = np.random.default_rng(22)
-    for drawing in (right_angled, inclined) * 3:
+    for drawing in (right_angled, inclined) * 2:
         convention = drawing(6, rng)
         made = robot(described(drawn(arm, convention, figure)))
         assert required_inverse_kinematics(made, "goal").complete

@@ -91,7 +91,12 @@ def attacked(start: Array, goal: Array, seed: int) -> float:
 
 
 @pytest.mark.parametrize(
-    "given", [{}, {"duration_min": 6.0}, {"dwell": Dwell(8.0)}], ids=["free", "slow", "dwell"]
+    "given",
+    [
+        pytest.param({}, id="free"),
+        pytest.param({"duration_min": 6.0}, id="slow", marks=pytest.mark.long),
+        pytest.param({"dwell": Dwell(8.0)}, id="dwell", marks=pytest.mark.long),
+    ],
 )
 def test_no_configuration_of_the_pose_is_below(given: dict[str, Any]) -> None:
     ratios = []
@@ -119,6 +124,7 @@ def test_an_attack_without_curves_finds_none_below(
     assert max(ratios) > NEAR
 
 
+@pytest.mark.long
 def test_between_poses_and_among_several_targets() -> None:
     (start, goal), (other, _) = tasks("gen3", 2)
     one, two = pose_of(GEN3, start), pose_of(GEN3, goal)

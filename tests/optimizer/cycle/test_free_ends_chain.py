@@ -223,7 +223,7 @@ def _dense(points: Array) -> Array:
     return np.stack([np.interp(at, np.arange(len(points)), each) for each in points.T], axis=1)
 
 
-@pytest.mark.parametrize("seed", long_but([0, 1], range(8)))
+@pytest.mark.parametrize("seed", long_but([0], range(8)))
 def test_no_chain_through_free_stops_has_less(seed: int) -> None:
     """Two stops that leave the angle free, with a payload between them: all configurations at many
     angles, with any full turns."""

@@ -176,8 +176,9 @@ def assert_reached(found: CycleSolution, arm: Arm, name: str, at: Any, tilt: flo
     )
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_angles")
-@pytest.mark.parametrize("windings", long_but([False], [False, True]))
+@pytest.mark.parametrize("windings", [False, True])
 def test_orientations_at_stops_are_chosen_for_the_whole_cycle(windings: bool) -> None:
     asked = free_stops(windings=windings)
     found = plan_cycle(asked)

@@ -58,6 +58,7 @@ def test_a_long_cycle_tells_what_it_finds_on_the_way(whole: Whole) -> None:
     assert all(each.bound == pytest.approx(found.lower_bound) for each in told)
 
 
+@pytest.mark.long
 def test_a_deadline_gives_the_best_long_cycle_so_far(whole: Whole) -> None:
     best, _, readings = whole
     found = plan_cycle(long_cycle(ENOUGH * readings), CountingClock())

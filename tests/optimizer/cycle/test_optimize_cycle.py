@@ -138,7 +138,13 @@ def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> No
         assert whole.within_limits == all(each.within_limits for each in parts)
 
 
-@pytest.mark.parametrize("start", [HOME, poses(1, 4)[3]], ids=["joint positions", "pose"])
+@pytest.mark.parametrize(
+    "start",
+    [
+        pytest.param(HOME, id="joint positions"),
+        pytest.param(poses(1, 4)[3], id="pose", marks=pytest.mark.long),
+    ],
+)
 def test_move_by_move_is_what_successive_calls_of_optimize_give(start: Array | Pose) -> None:
     """From a pose, the first of them takes the configuration at the start that is best for
     itself."""
@@ -242,7 +248,8 @@ def test_one_of_several_targets_is_chosen_for_the_whole_cycle() -> None:
     assert least == 1  # the first one is what a motion between joint positions would tell
 
 
-@pytest.mark.parametrize("others", [pytest.param(8, marks=pytest.mark.long), 0])
+@pytest.mark.long
+@pytest.mark.parametrize("others", [8])
 def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others: int) -> None:
     """Its configurations are samples: never `optimal`, and what fixed postures need is above the
     bound.

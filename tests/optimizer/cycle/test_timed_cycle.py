@@ -323,7 +323,7 @@ REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
 @pytest.mark.parametrize(
     ("where", "problem"),
     long_but(
-        [("sharing", "no time"), ("motions", "no motion")],
+        [("sharing", "no time")],
         product(["sharing", "motions"], REFUSALS),
     ),
 )

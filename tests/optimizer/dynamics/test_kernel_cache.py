@@ -6,6 +6,7 @@ each of its calls.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -36,6 +37,7 @@ from joulepath.optimizer.dynamics.kernel_source import AVX2, PORTABLE, source
 from joulepath.optimizer.native.build import compiler
 from joulepath.optimizer.native.library_cache import work_folder
 from joulepath.optimizer.optimize import optimize
+from tests.app.forks import run
 from tests.optimizer.dynamics.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
 from tests.selection import long_but
@@ -72,10 +74,10 @@ def test_the_digest_tells_chains_apart() -> None:
 
 
 def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> None:
-    ours, ran = Path(joulepath.__file__).parent, set()
+    ours, ran = Path(joulepath.__file__).parent, set[str]()
 
     def note(frame: FrameType, event: str, argument: object) -> None:
-        ran.add(Path(frame.f_code.co_filename))
+        ran.add(frame.f_code.co_filename)
 
     sys.setprofile(note)
     try:
@@ -84,9 +86,8 @@ def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> No
         sys.setprofile(None)
     sources = {Path(str(module.__file__)).resolve() for module in SOURCE_MODULES}
     rooms = [(ours / part).resolve() for part in ("optimizer", "models")]
-    assert {
-        path.resolve() for path in ran if any(path.resolve().is_relative_to(room) for room in rooms)
-    } == sources
+    files = {Path(file).resolve() for file in ran}
+    assert {file for file in files if any(map(file.is_relative_to, rooms))} == sources
 
 
 @dataclass
@@ -285,8 +286,8 @@ def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> Non
         "print(optimize(Problem(arm=arm, start=start, goal=goal, "
         "deadline=100)).certificate.valid)\n"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "True", "")
+    ended = run(("-c", code), os.environ, patience=120.0)
+    assert (ended.returncode, ended.stdout.strip(), ended.stderr) == (0, b"True", b"")
 
 
 def test_without_a_compiler_the_virtual_machine_serves(

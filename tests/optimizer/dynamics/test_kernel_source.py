@@ -18,6 +18,7 @@ from joulepath.optimizer.dynamics.kernel_source import source, widest_vectors
 from joulepath.optimizer.native.build import compiler
 from tests.optimizer.dynamics.kernel_states import states
 from tests.optimizer.moves import ROBOT
+from tests.selection import long_but
 
 PARAMETERS = sizes(ROBOT.nq)["torque"][0][1]
 
@@ -36,7 +37,7 @@ def library(functions: list[ca.Function], lanes: int, folder: Path) -> Path:
     return target
 
 
-@pytest.mark.parametrize("lanes", [1, 2, 4, 8])
+@pytest.mark.parametrize("lanes", long_but([1, 4], [1, 2, 4, 8]))
 def test_any_number_of_nodes_is_as_in_the_virtual_machine(lanes: int, tmp_path: Path) -> None:
     functions = [each for each in build(ROBOT) if each.name() in ("torque", "value")]
     compiled, interpreted = (

@@ -17,8 +17,14 @@ from tests.identification_logs import Form, csv_of, recorded, truth_of
 ROOT = Path(__file__).parents[3]
 # of the rows and columns of a fit with the links' inertials, beside the log
 MOST_MEMORY = 100e6
-SCRIPT = """
-import resource
+PEAK = """
+def peak():
+    with open("/proc/self/status") as status:
+        return 1024 * int(next(line for line in status if line.startswith("VmHWM")).split()[1])
+
+"""
+"""Of this process alone [byte]: `ru_maxrss` may be that of the process that started it."""
+SCRIPT = f"""{PEAK}
 from dataclasses import replace
 import numpy as np
 from joulepath.models.registry import load_robot
@@ -30,19 +36,19 @@ robot = load_robot("ur10e")
 short = recorded(robot, truth_of(robot), moves=30, rate=500.0).log()
 rows, times = len(short.q), -(-1_000_000 // len(short.q))
 moves = tuple(LogMove(k * rows + m.start, k * rows + m.end, m.at_rest) for k in range(times) for m in short.moves)
-again = {name: np.concatenate([getattr(short, name)] * times) for name in ("q", "v", "a", "effort", "power")}
+again = {{name: np.concatenate([getattr(short, name)] * times) for name in ("q", "v", "a", "effort", "power")}}
 log = replace(short, **again, time=np.arange(rows * times) / short.rate, temperature=None, moves=moves)
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+before = peak()
 identify(robot, [log], IdentificationOptions(refit=True))
-print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
+print(len(log.time), peak() - before)
 """  # noqa: E501
 
 # bytes of the whole process, from the file to the figures: with 26 columns on a uniform grid, and
 # with 33 whose times jitter, so that they are interpolated
 MOST_OF_ALL = {"own": 480e6, "rtde": 500e6}
 ROWS = 1_000_000
-FROM_FILE = """
-import resource, sys
+FROM_FILE = f"""{PEAK}
+import sys
 from pathlib import Path
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.identify.identify import identify
@@ -51,7 +57,7 @@ from joulepath.optimizer.identify.logs.reading import read_log
 robot = load_robot("ur10e")
 log = read_log(Path(sys.argv[1]), robot).log
 identify(robot, [log], IdentificationOptions(refit=True))
-print(len(log.time), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+print(len(log.time), peak())
 """
 
 

@@ -70,6 +70,7 @@ def test_one_of_other_sources_is_never_called(sources: Path) -> None:
         load(build.build(changed))
 
 
+@pytest.mark.long
 def test_a_clone_that_was_not_set_up_cannot_be_imported(tmp_path: Path) -> None:
     """The error is that of the library, and what it says to do helps."""
     library = build.__name__.removesuffix(".native.build")

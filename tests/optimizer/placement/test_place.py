@@ -78,6 +78,7 @@ def test_a_symmetric_cell_is_served_as_well_from_either_side() -> None:
     assert energies[1] == pytest.approx(energies[0], rel=0.1)
 
 
+@pytest.mark.long
 def test_the_base_at_the_same_place_in_another_world_costs_the_same() -> None:
     """All stops moved to one side are the base moved to the other."""
     cycle = two_stops()

@@ -128,7 +128,7 @@ CYCLES: dict[str, dict[str, Any]] = {
 }
 
 
-QUICK = ("free time", "fast", "open", "home", "recuperating", "via")
+QUICK = ("fast", "open", "home", "recuperating")
 
 
 @pytest.mark.parametrize("name", long_but(QUICK, CYCLES))

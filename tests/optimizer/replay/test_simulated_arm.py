@@ -4,8 +4,7 @@ its bodies.
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import os
 from dataclasses import replace
 from typing import Any
 
@@ -35,6 +34,7 @@ from joulepath.optimizer.problem.scene import (
 from joulepath.optimizer.replay.shapes import unsimulated
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.replay.simulator import mujoco
+from tests.app.forks import run
 from tests.impossible_links import with_impossible_link
 from tests.models.own_arm.arms import RICH_ARM
 from tests.models.own_arm.arms import robot as own_arm
@@ -243,5 +243,5 @@ def test_only_a_replay_imports_mujoco() -> None:
         "from joulepath.optimizer.replay.simulator import mujoco; mujoco(); print('mujoco' in "
         "sys.modules)\n"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert (run.stdout.split(), run.stderr) == (["False", "True"], "")
+    ended = run(("-c", code), os.environ, patience=120.0)
+    assert (ended.stdout.split(), ended.stderr) == ([b"False", b"True"], b"")

@@ -34,6 +34,7 @@ from tests.optimizer.moves import (
 from tests.selection import long_but
 
 TURN = 2 * np.pi
+TURNS = TURN * np.array(list(product((-2, -1, 0, 1, 2), repeat=6)))
 SAME = 1e-6  # rad; inverse kinematics agrees with itself to 1e-9
 NARROW = limits(
     q_min=[-3.6, -3.6, -np.pi, -3.6, -3.6, -3.6], q_max=[3.6, 3.6, np.pi, 3.6, 3.6, 3.6]
@@ -51,10 +52,9 @@ def every_configuration(q: Array, task: Problem) -> list[Array]:
     """
     own, found = task.arm.active_limits, []
     for branch in inverse_kinematics_for(task.arm.robot).branches(tcp_pose(q).T):
-        for k in product((-2, -1, 0, 1, 2), repeat=6):
-            turned = branch.q + TURN * np.array(k)
-            if (turned >= own.q_min - 1e-9).all() and (turned <= own.q_max + 1e-9).all():
-                found.append(turned)
+        turned = branch.q + TURNS
+        inside = (turned >= own.q_min - 1e-9) & (turned <= own.q_max + 1e-9)
+        found += list(turned[inside.all(axis=1)])
     return found
 
 

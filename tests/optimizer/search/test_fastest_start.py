@@ -22,6 +22,7 @@ from joulepath.optimizer.search.state import ENERGY_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from tests.optimizer.moves import AMPLE, problem
+from tests.selection import long_but
 
 # requests of the benchmark: two motions that a limit on the speed of the TCP holds back, and one
 # whose NLP costs 0.15 % less than the motion needs
@@ -58,7 +59,9 @@ def from_fastest(state: SearchState, best: Candidate) -> float:
     return min(state.prepared.cost_of(each.spline) for each in found if each.spline is not None)
 
 
-@pytest.mark.parametrize("index", [HELD_BACK_TO_POSE, HELD_BACK, ENDED_EARLY])
+@pytest.mark.parametrize(
+    "index", long_but([HELD_BACK, ENDED_EARLY], [HELD_BACK_TO_POSE, HELD_BACK, ENDED_EARLY])
+)
 def test_an_answer_needs_no_more_than_what_the_time_optimal_motion_leads_to(index: int) -> None:
     state, best = refined(asked(index))
     least = from_fastest(state, best)
@@ -85,7 +88,14 @@ def test_a_slowed_guess_lasts_as_long_as_asked() -> None:
         assert np.abs(guess.points[[0, -1]] - [best.q_start, best.q_goal]).max() < 1e-9
 
 
-@pytest.mark.parametrize("given", [{}, {"tcp_speed": 5.0}, {"bus": Bus(mode="isolated")}])
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"tcp_speed": 5.0},
+        pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
+    ],
+)
 def test_a_motion_that_nothing_holds_back_is_not_solved_again(given: dict[str, object]) -> None:
     state, best = refined(problem(**given))
     solves, energy = state.solves, best.energy

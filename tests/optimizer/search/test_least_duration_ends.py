@@ -62,6 +62,7 @@ def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
     assert helped > 3
 
 
+@pytest.mark.long
 def test_a_free_posture_is_no_slower_than_the_answer_of_least_energy() -> None:
     """By samples alone it was 1.9 % slower than this answer."""
     arm = Arm(robot=load_robot("panda"), collisions=False)

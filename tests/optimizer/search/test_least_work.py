@@ -21,6 +21,7 @@ from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.coarse_motions import COARSE, CoarseSolver, best_of_each
 from joulepath.optimizer.search.least_work import explore_least_work
 from joulepath.optimizer.search.run import Run
+from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, START, fixed, problem, tcp_pose
 
 DURATION = 3.0
@@ -29,8 +30,10 @@ LOCAL = 0.02
 
 
 def run(**given: Any) -> Run:
+    """A search that is prepared in no time: how long that takes decides when it must end."""
     found = Run(
-        problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given)
+        problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given),
+        clock=still,
     )
     found.prepare()
     return found
@@ -95,8 +98,7 @@ def test_others_are_explored_as_before(given: dict[str, Any]) -> None:
 def test_time_that_is_over_on_the_way() -> None:
     """Nothing is lost: every candidate can still be solved, or counts as not reached."""
     own = run()
-    instants = iter(np.arange(0.0, 1e3, 0.05).tolist())
-    own.state.end = Deadline.after(4.0, lambda: next(instants))
+    own.state.end = Deadline.after(4.0, CountingClock(0.05))
     assert not explore_least_work(own.state, lambda: None)
     assert own.state.cut_short
     statuses = {each.status for each in own.state.candidates if each.holdable}

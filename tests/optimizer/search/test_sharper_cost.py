@@ -37,6 +37,7 @@ def descent() -> Problem:
     return replace(given, goal=nearest.q_goal)
 
 
+@pytest.mark.long
 def test_a_shorter_duration_needs_no_less_where_little_energy_is_left() -> None:
     given = descent()
     free = optimize(given)

@@ -1,0 +1,192 @@
+"""Programs of the package as forks of a process that has imported it: each import of its own would
+take two seconds of processor time.
+
+A fork has its own environment, folder and standard streams. It runs a module as `python -m` does,
+or code as `python -c` does.
+"""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import json
+import os
+import runpy
+import signal
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from importlib import import_module
+from itertools import pairwise
+from multiprocessing import util
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+LONGEST = 1 << 17
+"""Most bytes of a request for a fork: the environment is the largest part of it."""
+NUMBER = struct.Struct("i")
+
+
+class Fork:
+    """A running program, with the methods of `subprocess.Popen` that tests need."""
+
+    def __init__(
+        self,
+        arguments: tuple[str, ...],
+        environment: Mapping[str, str],
+        streams: tuple[int, int, int],
+        folder: Path = ROOT,
+    ) -> None:
+        """Starts a program.
+
+        Args:
+            arguments: name of its module, or `-c` and its code; and its own arguments.
+            environment: all its variables.
+            streams: file descriptors of its standard input, output and error.
+            folder: its working directory.
+        """
+        self._told, told = socket.socketpair()
+        self._code: int | None = None
+        asked = json.dumps([arguments, dict(environment), str(folder)]).encode()
+        with told:
+            socket.send_fds(_origin(), [asked], [*streams, told.fileno()])
+        self.pid = _number(self._told)
+
+    def wait(self, timeout: float | None = None) -> int:
+        """The exit code, or minus the number of the signal that ended it.
+
+        Args:
+            timeout: most that it may take [s].
+
+        Raises:
+            TimeoutError: it still runs.
+        """
+        if self._code is None:
+            self._told.settimeout(timeout)
+            self._code = _number(self._told)
+            self._told.close()
+        return self._code
+
+    def poll(self) -> int | None:
+        """The exit code as `wait` returns it; None while it runs."""
+        try:
+            return self.wait(0.0)
+        except OSError:
+            return None
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+
+def run(
+    arguments: tuple[str, ...],
+    environment: Mapping[str, str],
+    patience: float,
+    stdin: bytes = b"",
+    folder: Path = ROOT,
+) -> subprocess.CompletedProcess[bytes]:
+    """A program that has ended within `patience` [s], with what it wrote."""
+    with TemporaryFile() as given, TemporaryFile() as out, TemporaryFile() as err:
+        given.write(stdin)
+        given.seek(0)
+        streams = given.fileno(), out.fileno(), err.fileno()
+        code = Fork(arguments, environment, streams, folder).wait(patience)
+        out.seek(0)
+        err.seek(0)
+        return subprocess.CompletedProcess(arguments, code, out.read(), err.read())
+
+
+def _number(told: socket.socket) -> int:
+    number: int = NUMBER.unpack(told.recv(NUMBER.size))[0]
+    return number
+
+
+@functools.cache
+def _origin() -> socket.socket:
+    """The way to the process that forks, which ends with this one."""
+    way, end = socket.socketpair(type=socket.SOCK_SEQPACKET)
+    with end:
+        command = [sys.executable, "-m", "tests.app.forks"]
+        # as workers have it
+        one_thread = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+        process = subprocess.Popen(command, cwd=ROOT, stdin=end.fileno(), env=one_thread)
+    atexit.register(process.wait)
+    atexit.register(way.close)
+    return way
+
+
+def _asked() -> list[str]:
+    """Forks at each request until there are no more. A fork returns the name of its module and its
+    arguments; a second one beside it tells of its end."""
+    requests = socket.socket(fileno=os.dup(0))
+    while True:
+        request, given, _, _ = socket.recv_fds(requests, LONGEST, 4)
+        with suppress(ChildProcessError):
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass  # one that has ended
+        if not request:
+            os._exit(0)
+        if os.fork() == 0:
+            break
+        for each in given:
+            os.close(each)
+    requests.close()
+    told = given.pop()
+    program = os.fork()
+    for number, stream in enumerate(given):
+        os.dup2(stream, number)
+        os.close(stream)
+    if program:
+        os.write(told, NUMBER.pack(program))
+        _, status = os.waitpid(program, 0)
+        os.write(told, NUMBER.pack(os.waitstatus_to_exitcode(status)))
+        os._exit(0)
+    os.close(told)
+    arguments, environment, folder = json.loads(request)
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(folder)
+    return arguments  # type: ignore[no-any-return]
+
+
+def _fork_forkserver() -> None:
+    """Workers of a service are forked from a process that `multiprocessing` starts: here it is a
+    fork of the service, which has imported all that it would import."""
+    start = util.spawnv_passfds
+
+    def started(path: bytes, arguments: Sequence[Any], passed: Sequence[int]) -> int:
+        code = arguments[-1]
+        if "multiprocessing.forkserver" not in code:
+            return start(path, arguments, passed)
+        process = os.fork()
+        if process == 0:
+            kept = sorted({2, *passed, os.sysconf("SC_OPEN_MAX")})
+            for one, other in pairwise(kept):
+                os.closerange(one + 1, other)
+            try:
+                exec(code, {})
+            finally:
+                os._exit(0)
+        return process
+
+    util.spawnv_passfds = started  # type: ignore[assignment]
+
+
+if __name__ == "__main__":
+    for each in ("joulepath.app.main", "toppra"):  # what services, workers and commands import
+        import_module(each)
+    sys.argv = _asked()
+    _fork_forkserver()
+    if sys.argv[0] == "-c":
+        exec(sys.argv.pop(1), {"__name__": "__main__"})
+    else:
+        runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
