@@ -115,17 +115,17 @@ def test_a_project_is_renamed_where_it_is_found(browser: Browser, service: Serve
 
 
 def test_the_time_left_of_an_identification_is_told(browser: Browser, service: Server) -> None:
-    """Each of twelve motions held out in its turn: thirteen fits, of which most are still ahead."""
-    log = add_log(service, moves=12)
+    """Each of twenty motions held out in its turn: twenty-one fits, of which most are still ahead."""
+    log = add_log(service, moves=20)
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
         body = {"logs": [log], "validate": "moves"}
         job = service.post("/identifications", body).json()["id"]
-        CLIENT.patch(f"{service.url}/identifications/{job}", json={"name": "Thirteen fits"})
+        CLIENT.patch(f"{service.url}/identifications/{job}", json={"name": "Twenty-one fits"})
         page.evaluate(NOTE_PROGRESS)
         go(page, "Logs")
-        page.get_by_role("button", name="Thirteen fits", exact=False).first.click()
-        expect(page.locator("#identification h2")).to_have_text("Thirteen fits")
+        page.get_by_role("button", name="Twenty-one fits", exact=False).first.click()
+        expect(page.locator("#identification h2")).to_have_text("Twenty-one fits")
         told = page.evaluate("() => told")
         assert any(re.search("of the fits, about .* s left", text) for text in told), told
         expect(page.locator("#identifying")).to_have_count(0)
