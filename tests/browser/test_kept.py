@@ -115,7 +115,7 @@ def test_a_project_is_renamed_where_it_is_found(browser: Browser, service: Serve
 
 
 def test_the_time_left_of_an_identification_is_told(browser: Browser, service: Server) -> None:
-    """Each of twenty motions held out in its turn: twenty-one fits, of which most are still ahead."""
+    """Each of twenty motions held out in its turn: of twenty-one fits, most are still ahead."""
     log = add_log(service, moves=20)
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
