@@ -89,7 +89,9 @@ class JointFacts:
 
 
 def _without_effect(root: Element) -> set[str]:
-    """Elements that are not read, such as `gazebo`, `calibration` or `second limit of elbow`."""
+    """Elements that are not read, such as `gazebo`, `calibration`, `second limit of elbow`, or soft
+    limits of a joint that turns without end.
+    """
     found = {part.tag for part in root if part.tag not in READ}
     for part in root:
         read, seen = READ.get(part.tag, ()), set[str]()
@@ -99,7 +101,14 @@ def _without_effect(root: Element) -> set[str]:
             elif tag in seen and tag not in REPEATED:
                 found.add(f"second {tag} of {name_of(part)}")
             seen.add(tag)
+        if part.get("type") == "continuous" and _has_soft_limits(part):
+            found.add(f"soft limits of {name_of(part)}")
     return found
+
+
+def _has_soft_limits(joint: Element) -> bool:
+    soft = joint.find("safety_controller")
+    return soft is not None and not {"soft_lower_limit", "soft_upper_limit"}.isdisjoint(soft.keys())
 
 
 def _is_softly_limited(joint: Element) -> bool:

@@ -154,3 +154,7 @@ def test_elements_without_effect_are_named() -> None:
         "Elements of the URDF without effect: calibration, second limit of elbow."
         in own_figures("mine", inside)[1]
     )
+    turning, soft_limit = '<axis xyz="0 0 -2"/>', '<safety_controller soft_upper_limit="1"/>'
+    endless = replace(RICH_ARM, urdf=RICH_ARM.urdf.replace(turning, turning + soft_limit))
+    assert any("soft limits of pan" in each for each in own_figures("mine", endless)[1])
+    assert not any("soft limits" in each for each in own_figures("mine", RICH_ARM)[1])
