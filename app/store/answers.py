@@ -143,13 +143,15 @@ def rename(
     """Gives an answer a name, or none, and the texts of its request's numbers, if there are any.
     Raises UnknownAnswer or NotOwner.
     """
-    query = select(Answer).where(Answer.id == answer_id).options(*_WITHOUT_DOCUMENTS)
+    documents = (defer(column, raiseload=True) for column in (Answer.body, Answer.request))
+    query = select(Answer).where(Answer.id == answer_id).options(*documents)
     answer = session.scalar(query) if is_id(answer_id) else None
     if answer is None:
         raise UnknownAnswer
     check_owner(client, answer.owner)
     answer.name = name
     if typed is not None:
+        answer.size += len(orjson.dumps(typed)) - len(orjson.dumps(answer.typed or {}))
         answer.typed = typed
     return answer
 

@@ -161,7 +161,7 @@ class Answer(Table):
     duration: Mapped[float | None]
     status: Mapped[str | None] = mapped_column(String(16))
     size: Mapped[int]
-    """Size of the compressed body and request [byte]."""
+    """Size of the compressed body and request, and of `typed` [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
     request: Mapped[bytes | None] = mapped_column(LargeBinary)
     """The request as it was sent: JSON, compressed. Those of jobs and studies are with these."""

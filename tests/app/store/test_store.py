@@ -25,6 +25,7 @@ from alembic.migration import MigrationContext
 from sqlalchemy import func, select, text, update
 from starlette.testclient import TestClient
 
+from joulepath.app.access.client import Client
 from joulepath.app.api.answers import models as schemas
 from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.exceptions.stored import StoreUnavailable, UnknownAnswer
@@ -217,6 +218,22 @@ def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
             assert body == answer.body
 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_typed_texts_take_room(url: str) -> None:
+    """Only the last ones that were told."""
+
+    async def test(store: Store) -> None:
+        kept = await store.write(put)
+        before = await store.read(lambda session: session.get_one(Answer, kept).size)
+        client = Client("127.0.0.1")
+        for typed in ({"/deadline": "9" * 60}, {"/deadline": "9,0"}, None):
+            tell = partial(answers.rename, answer_id=kept, name=None, typed=typed, client=client)
+            await store.write(tell)
+        size = await store.read(lambda session: session.get_one(Answer, kept).size)
+        assert size == before + len('{"/deadline":"9,0"}') - len("{}")
+
+    with_store(url, test)
 
 
 def test_the_oldest_answers_make_room(url: str) -> None:
