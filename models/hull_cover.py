@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
 from joulepath.models.robot import Array
+from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 BATCH = 4096
 """Points of one batch, which needs some hundred megabytes at a hundred faces."""
@@ -65,23 +65,35 @@ def _from_faces(points: Array, hull: ConvexHull) -> Array:
     return result
 
 
-def hull_around(points: Array) -> Array:
+def hull_around(points: Array, most: float = np.inf, checkpoint: Checkpoint = unwatched) -> Array:
     """Points (n, 3) [m] whose hull, grown by the radius, contains points (k, 3) [m].
 
-    The point that is the farthest outside is added until none is. Raises QhullError for flat
-    points.
+    The point that is the farthest outside is added until none is, or until there are more than
+    `most`: then the hull is too small. Raises QhullError for flat points.
     """
     points = points[ConvexHull(points).vertices]
     # Rounding moves a point, and with it the hull, by at most half of a cell's diagonal.
     reach = HULL_FIT.radius - np.sqrt(3) / 2 * HULL_FIT.digit
-    directions = np.array(list(product((-1.0, 1.0), repeat=3)))
-    chosen = list(dict.fromkeys((points @ directions.T).argmax(axis=0).tolist()))
+    chosen = _spanning(points)
     while True:
+        checkpoint()
         planes = ConvexHull(points[chosen]).equations
         # The height above a face is never more than the distance, and found much sooner.
         distance = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
         if distance.max() <= reach:
             distance = from_hull(points, points[chosen])
-        if distance.max() <= reach:
+        if distance.max() <= reach or len(chosen) > most:
             return np.round(points[chosen] / HULL_FIT.digit) * HULL_FIT.digit + 0.0
         chosen.append(int(distance.argmax()))
+
+
+def _spanning(points: Array) -> list[int]:
+    """Indices of four points: each is the farthest from the point, line or plane through those
+    before.
+    """
+    chosen, away = [0], points - points[0]
+    for _ in range(3):
+        chosen.append(int(np.linalg.norm(away, axis=1).argmax()))
+        axis = away[chosen[-1]] / np.linalg.norm(away[chosen[-1]])
+        away = away - np.outer(away @ axis, axis)
+    return chosen

@@ -89,7 +89,9 @@ class LinkShapes:
         self.checkpoint()
         T = self._frame(k, links[0]) * _origin(shapes[0].find("origin"), "A <collision> has")
         try:
-            points = hull_around(self._outermost[key] @ T.rotation.T + T.translation)
+            points = hull_around(
+                self._outermost[key] @ T.rotation.T + T.translation, MOST_POINTS, self.checkpoint
+            )
         except QhullError:
             return None
         return points.tolist() if len(points) <= MOST_POINTS else None

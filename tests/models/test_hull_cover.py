@@ -72,6 +72,21 @@ def test_a_fit_covers_and_exceeds_by_no_more_than_its_radius() -> None:
     assert len(hull_around(on_faces)) == 8
 
 
+@pytest.mark.parametrize("along", [[1.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
+def test_bodies_with_few_extremes_have_a_hull(along: list[float]) -> None:
+    """An octahedron, as it is and stretched along a diagonal."""
+    ends = np.vstack([np.eye(3), -np.eye(3)]) * 0.1
+    points = ends + np.outer(ends @ along, along) * 3.0
+    chosen = hull_around(points)
+    assert len(chosen) == 6 and from_hull(points, chosen).max() <= HULL_FIT.radius
+
+
+def test_a_fit_ends_where_too_many_points_are_needed() -> None:
+    around = np.random.default_rng(1).normal(size=(5_000, 3))
+    ball = around / np.linalg.norm(around, axis=1)[:, None]
+    assert len(hull_around(ball, most=40)) == 41
+
+
 def test_flat_points_have_no_hull() -> None:
     with pytest.raises(QhullError):
         hull_around(np.random.default_rng(0).normal(size=(20, 3)) * [1, 1, 0])
