@@ -59,10 +59,8 @@ def free_members(prepared: PreparedProblem, ends: list[EndConfiguration]) -> lis
     """Feasible members of the self-motions of ends, in the order of the self-motions."""
     limits = prepared.arm.active_limits
     found = list[EndConfiguration]()
-    of_motion = {id(end.self_motion): end for end in ends if end.self_motion is not None}
-    for end in of_motion.values():
-        motion = end.self_motion
-        assert motion is not None
+    of_motion = {end.self_motion: end for end in ends if end.self_motion is not None}
+    for motion, end in of_motion.items():
         members = motion.at(spread(motion, FREE_MEMBERS.members))
         q, held = nearest_turns(members, limits)
         q = q[np.array(held)]

@@ -8,11 +8,10 @@ self-motion are therefore initial guesses, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
+from operator import methodcaller
 
 import numpy as np
 
-from joulepath.models.robot import Array
 from joulepath.optimizer.collision.planner.joint_path import path_samples
 from joulepath.optimizer.collision.planner.path_planner import Effort
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
@@ -20,9 +19,6 @@ from joulepath.optimizer.search.attempts import improve
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import SearchState
-from joulepath.optimizer.solve.methods.method import Method
-from joulepath.optimizer.solve.methods.solve_result import SolveResult
-from joulepath.optimizer.solve.methods.sqp_method import SqpMethod
 
 
 @dataclass(frozen=True)
@@ -78,11 +74,5 @@ def _solve_along_paths(state: SearchState, candidate: Candidate) -> None:
     )
     for path in planned.ending_at(candidate.q_goal):
         q, t = path_samples(path, 1.0, state.problem.arm.active_limits.v_max)
-        improve(state, candidate, partial(_along_path, q, t))
+        improve(state, candidate, methodcaller("along_path", q, t))
     candidate.deferred &= candidate.energy is None
-
-
-def _along_path(q: Array, t: Array, solver: Method) -> SolveResult:
-    """The result of a solve from samples q (k, nq) [rad] of a path at times t (k,) in [0, 1]."""
-    assert isinstance(solver, SqpMethod)
-    return solver.along_path(q, t)

@@ -155,6 +155,15 @@ class Method(ABC):
         """
         return SolveResult(SolveStatus.FAILED, SolveReason.NO_FREE_CONTROL_POINTS)
 
+    def along_path(self, q: Array, t: Array) -> SolveResult:
+        """Solve from a collision-free path.
+
+        Args:
+            q: samples of the path, shape (k, nq) [rad].
+            t: times of the samples, shape (k,), from 0 to 1.
+        """
+        return SolveResult(SolveStatus.FAILED, SolveReason.NO_INITIAL_GUESS)
+
     def solve_at_switches(self, spline: Spline, progress: float) -> SolveResult:
         """Solve from a motion, with knots at the switches of jerk between the present ends.
 

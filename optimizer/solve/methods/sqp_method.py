@@ -236,12 +236,7 @@ class SqpMethod(StagedMethod):
 
     @abstractmethod
     def along_path(self, q: Array, t: Array) -> SolveResult:
-        """Solve from a collision-free path.
-
-        Args:
-            q: samples of the path, shape (k, nq) [rad].
-            t: times of the samples, shape (k,), from 0 to 1.
-        """
+        """Solve from a collision-free path, see `Method.along_path`."""
 
 
 def _failed(result: SolveResult, collision: Clearance | None) -> SolveResult:
