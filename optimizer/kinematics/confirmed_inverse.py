@@ -21,7 +21,13 @@ from joulepath.optimizer.kinematics.ik_solutions import (
 )
 from joulepath.optimizer.kinematics.isolated import distinct
 from joulepath.optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
-from joulepath.optimizer.kinematics.self_motion import SelfMotion, is_point, spread, without_gaps
+from joulepath.optimizer.kinematics.self_motion import (
+    SelfMotion,
+    is_point,
+    spread,
+    up_to_limits,
+    without_gaps,
+)
 from joulepath.optimizer.kinematics.seven import redundant_curve, traced_curve
 from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
@@ -198,6 +204,10 @@ class ConfirmedInverseKinematics:
             parameters = [spread(motion, count) for motion in motions]
             configurations = _members(motions, parameters)
             if members >= INVERSE.gapless_members:
+                if limits is not None:
+                    parameters, configurations = up_to_limits(
+                        motions, parameters, configurations, limits, _members
+                    )
                 found = zip(motions, parameters, configurations, strict=True)
                 configurations = [without_gaps(motion, u, q) for motion, u, q in found]
             for motion, of_motion in zip(motions, configurations, strict=True):

@@ -110,6 +110,27 @@ def test_a_pose_needs_no_more_than_any_of_its_configurations(
 
 
 @pytest.mark.parametrize(
+    ("name", "task", "member"),
+    [
+        # at another optimum, 0.3 % lower after the refinement and higher before
+        ("panda", 10, [-0.682, -0.514, 0.322, -1.434, 2.248, 3.442, -2.314]),
+        # between the last regular sample of the curve and a limit, 3 % lower
+        ("iiwa14", 16, [-0.963, -0.108, 0.473, 0.23, -2.834, 0.118, 0.025]),
+    ],
+)
+def test_optima_that_samples_hardly_show_are_found(
+    name: str, task: int, member: list[float]
+) -> None:
+    robot = load_robot(name)
+    start, goal = tasks(name, task + 1)[task]
+    pose, other = pose_of(robot, goal), pose_of(robot, np.array(member))
+    # a member is written with three digits
+    assert np.abs(pose.T - other.T).max() < 5e-3
+    needed = optimize(asked(robot, start, pose)).energy.electrical.total
+    assert needed <= optimize(asked(robot, start, member)).energy.electrical.total
+
+
+@pytest.mark.parametrize(
     ("name", "at_start"),
     long_but([("panda", False), ("iiwa14", True)], product(("panda", "iiwa14"), (False, True))),
 )
