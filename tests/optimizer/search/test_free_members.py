@@ -23,7 +23,7 @@ ROBOT = load_robot("panda")
 HOME = np.array([0, -0.785, 0, -2.356, 0, 1.571, 0.785])
 T = tcp_pose(Arm(robot=ROBOT), np.array([[0.3, 0.4, -0.2, -1.9, 0.3, 2.2, 0.6]]))[0]
 # found by a search for balls that all coarse samples touch and some others do not
-BALLS = ([0.494, 0.203, 0.424], [0.451, 0.005, 0.447], [0.207, -0.073, 0.575])
+BALLS = ([0.354, -0.104, 0.443], [0.559, 0.103, 0.41], [0.103, -0.2, 0.289], [0.023, -0.154, 0.3])
 
 
 def among(*centres: list[float]) -> Arm:
