@@ -21,13 +21,8 @@ from joulepath.optimizer.kinematics.ik_solutions import (
 )
 from joulepath.optimizer.kinematics.isolated import distinct
 from joulepath.optimizer.kinematics.reach import REACH, at_the_edge, out_of_reach
-from joulepath.optimizer.kinematics.self_motion import (
-    SelfMotion,
-    is_point,
-    spread,
-    up_to_limits,
-    without_gaps,
-)
+from joulepath.optimizer.kinematics.self_motion import SelfMotion, is_point, spread
+from joulepath.optimizer.kinematics.self_motion_members import up_to_limits, without_gaps
 from joulepath.optimizer.kinematics.seven import redundant_curve, traced_curve
 from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
 from joulepath.optimizer.kinematics.seven.traced_curve import TracedCurve
