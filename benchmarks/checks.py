@@ -124,8 +124,8 @@ def _energy_errors(body: dict[str, Any], answer: dict[str, Any]) -> Iterator[str
     total, bound, gap = objective(answer), energy["lower_bound"], energy["optimality_gap"]
     if not bound <= total * (1 + SLACK):
         yield f"lower bound {bound} above the energy {total}"
-    if not abs(gap - (1 - bound / total)) <= 1e-6:
-        yield f"optimality gap {gap} is not 1 - {bound} / {total}"
+    if (gap is None) != (bound <= 0) or not (gap is None or abs(gap - (total / bound - 1)) <= 1e-6):
+        yield f"optimality gap {gap} is not {total} / {bound} - 1"
     for baseline in answer["baselines"]:
         if beats(body, answer, baseline):
             less = 1 - baseline[answer["objective"]] / total

@@ -226,7 +226,7 @@ def main() -> None:
             if each.saving is not None
         }
         row[EXCESS] = excess(answer, own)
-        row["gap"] = 1 - answer.lower_bound / answer.energy.electrical.total
+        row["gap"] = answer.energy.electrical.total / answer.lower_bound - 1
         row["time [s]"] = time.perf_counter() - began
         row |= _sums(answer)
         row["distinct legs"] = sum(move.kinds for move in answer.moves)

@@ -19,6 +19,7 @@ a valid certificate. The memory is the resident one of the process after each pl
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import time
 from collections import Counter
@@ -166,7 +167,7 @@ def measured(placement: Placement, grid: bool) -> tuple[PlacementSolution, dict[
     found = place_robot(placement, clock=time.process_time, progress=False)
     own = {
         "saving": found.saving or 0.0,
-        "gap": found.optimality_gap or 1.0,
+        "gap": found.optimality_gap or math.inf,
         "time": time.process_time() - began,
         "wall_time": time.perf_counter() - wall,
         "points": len(found.map),

@@ -110,7 +110,7 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
             if gap["count"]:
                 yield _spread(
                     f"random feasible requests, {kind}{what}",
-                    "gap, 1 - lower bound / energy [%]",
+                    "gap, energy / lower bound - 1 [%]",
                     gap,
                     PERCENT,
                 )

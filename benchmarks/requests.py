@@ -13,6 +13,7 @@ duration.
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 from collections import Counter
@@ -71,7 +72,7 @@ def examine(task: RequestTask, answer: Answer) -> Outcome:
         return outcome
     outcome.errors = errors_found(task.body, content, task.T_start, task.T_goal)
     outcome.energy = objective(content)
-    outcome.gap = content["energy"]["optimality_gap"]
+    outcome.gap = content["energy"]["optimality_gap"] or math.inf
     outcome.balance_error = balance_error(content)
     outcome.candidates = sum(content["candidate_counts"].values())
     outcome.solves = content["solver"]["nlp_solves"]

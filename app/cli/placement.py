@@ -9,6 +9,7 @@ import click
 
 from joulepath.app.cli.answer import FILE, OUTPUT, content_of
 from joulepath.app.cli.search import ANSWERS, search
+from joulepath.optimizer.presentation.gap import gap_text
 
 
 @click.command(
@@ -46,5 +47,5 @@ def summary_of(answer: dict[str, Any]) -> dict[str, str]:
         lines["saved"] = f"{answer['saving']:.1%}"
     if answer["lower_bound"] is not None:
         lines["lower bound"] = f"{answer['lower_bound']:.4g} J"
-        lines["gap"] = f"{answer['optimality_gap']:.1%}"
+        lines["gap"] = gap_text(answer["optimality_gap"])
     return lines

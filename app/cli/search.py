@@ -17,6 +17,7 @@ from joulepath.app.cli.answer import (
     validated,
     write,
 )
+from joulepath.optimizer.presentation.gap import gap_text
 
 if TYPE_CHECKING:
     from joulepath.app.engine.result import TaskResult
@@ -107,5 +108,5 @@ def proof(answer: dict[str, Any]) -> dict[str, str]:
         "duration": f"{answer['duration']:.4g} s",
         "status": answer["status"],
         "lower bound": f"{energy['lower_bound']:.4g} J",
-        "gap": f"{energy['optimality_gap']:.1%}",
+        "gap": gap_text(energy["optimality_gap"]),
     }

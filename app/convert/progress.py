@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from joulepath.app.convert.fields import fields
+from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event
-from joulepath.optimizer.result.energy import optimality_gap
 
 
 def to_event(event: Event) -> tuple[str, dict[str, Any]]:

@@ -15,6 +15,7 @@ from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.declared import Internal, Joules, NotEmpty, Ratio, Seconds, Watts
 from joulepath.optimizer.dynamics.interval import MotionEnergy, with_interval
 from joulepath.optimizer.presentation.chart import Chart, joint_curves
+from joulepath.optimizer.presentation.gap import gap_text, optimality_gap
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.result.cycle import (
     CycleCertificate,
@@ -32,7 +33,6 @@ from joulepath.optimizer.result.energy import (
     SavingInterval,
     StorageUse,
     energy_text,
-    optimality_gap,
 )
 from joulepath.optimizer.result.solution import Solution
 
@@ -270,7 +270,7 @@ class CycleSolution(Result):
         gap = optimality_gap(self.lower_bound, self.energy.of(self.objective))
         return (
             f"{' → '.join(self.order)}, {energy_text(self.energy, self.objective)}, "
-            f"{self.duration:.4g} s, {self.status}, gap {gap:.1%}"
+            f"{self.duration:.4g} s, {self.status}, {gap_text(gap)}"
         )
 
     def _rows(self) -> Rows:

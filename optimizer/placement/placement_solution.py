@@ -13,9 +13,10 @@ from joulepath.optimizer.declared import Count, Internal, Joules, Metres, Ratio,
 from joulepath.optimizer.placement.region import Coordinate, Mount
 from joulepath.optimizer.placement.rounds import Reason
 from joulepath.optimizer.presentation.chart import Chart
+from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.presentation.result import Result, Rows
 from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.result.energy import Objective, optimality_gap
+from joulepath.optimizer.result.energy import Objective
 
 PlacementStatus = Literal["complete", "cut_short"]
 
@@ -110,8 +111,9 @@ class SolvedPlacement:
     """Lower bound of the objective: at no place of the region do the cycles need less, in any
     configurations. Null where no bound is known."""
     optimality_gap: Ratio | None
-    """1 - lower_bound / energy of the best place. For a six-joint arm of Universal Robots' form or
-    with a spherical wrist, and a cycle between poses or joint positions, the bound knows the
+    """energy of the best place / lower_bound - 1: its energy is at most by this share above the
+    least possible. Null if the bound is not positive. For a six-joint arm of Universal Robots' form
+    or with a spherical wrist, and a cycle between poses or joint positions, the bound knows the
     configurations at the stops for every place. In other cases it knows the lengths of the ways,
     the payloads and the rests alone, and the gap is wide."""
     tolerance: list[Tolerance]
@@ -175,7 +177,7 @@ class PlacementSolution(Result):
 
     @property
     def optimality_gap(self) -> float | None:
-        """1 - lower bound / energy of the best place; None without a bound."""
+        """See `optimality_gap` of an energy; None without a bound, too."""
         if self.lower_bound is None:
             return None
         return optimality_gap(self.lower_bound, self.best.energy)

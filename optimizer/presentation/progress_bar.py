@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from joulepath.optimizer.presentation.gap import gap_text, optimality_gap
 from joulepath.optimizer.progress import (
     CandidatesFound,
     CandidateTried,
@@ -104,8 +105,9 @@ class _Bar:
             self._shown.update(self._task, completed=self._tried)
         else:
             text = f"{self._title}: {event.energy:.4g} J"
-            if event.bound is not None and 0 < event.bound < event.energy:
-                text += f", gap {1.0 - event.bound / event.energy:.1%}"
+            gap = None if event.bound is None else optimality_gap(event.bound, event.energy)
+            if gap is not None:
+                text += f", {gap_text(gap)}"
             self._shown.update(self._task, description=text)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from joulepath.models.robot import Array
 from joulepath.optimizer.declared import Joules, PerJoint, Ratio, Unit, Watts
 from joulepath.optimizer.presentation.equality import Comparable
+from joulepath.optimizer.presentation.gap import optimality_gap
 
 # minimised quantity: energy drawn from the supply, or mechanical work
 Objective = Literal["electrical", "mechanical"]
@@ -191,11 +192,6 @@ class Energy:
         )
 
 
-def optimality_gap(bound: float, energy: float) -> float:
-    """1 - bound / energy; 0 if the energy is not positive."""
-    return 1 - bound / energy if energy > 0 else 0.0
-
-
 @dataclass(frozen=True, kw_only=True)
 class EnergyAndBound(Energy):
     """Energy and power of the motion, and the possible saving of other motions."""
@@ -203,8 +199,9 @@ class EnergyAndBound(Energy):
     lower_bound: Joules
     """Lower bound of the objective: no motion of any shape and any allowed duration between these
     targets needs less."""
-    optimality_gap: Ratio
-    """1 - lower_bound / energy of the objective; 0 if this energy is not positive."""
+    optimality_gap: Ratio | None
+    """energy of the objective / lower_bound - 1: the energy is at most by this share above the
+    least possible. Null if the bound is not positive."""
 
     @classmethod
     def bounded(cls, energy: Energy, lower_bound: float, objective: Objective) -> Self:

@@ -21,6 +21,7 @@ from joulepath.optimizer.declared import (
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.presentation.chart import Chart, joint_curves
 from joulepath.optimizer.presentation.equality import Comparable
+from joulepath.optimizer.presentation.gap import gap_text, optimality_gap
 from joulepath.optimizer.presentation.result import Result, Rows, per_joint
 from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.candidates import (
@@ -37,7 +38,6 @@ from joulepath.optimizer.result.energy import (
     Sensitivity,
     energy_rows,
     energy_text,
-    optimality_gap,
 )
 
 JointTorques = Annotated[PerSampleAndJoint, Unit("N·m")]
@@ -250,7 +250,7 @@ class Solution(Result):
         gap = optimality_gap(self.lower_bound, self.energy.of(self.objective))
         return (
             f"{energy_text(self.energy, self.objective)}, {self.duration:.4g} s, {self.status}, "
-            f"gap {gap:.1%}"
+            f"{gap_text(gap)}"
         )
 
     def _rows(self) -> Rows:

@@ -12,7 +12,7 @@ class OptimalitySettings:
     """Settings of the condition under which an answer is called `optimal`."""
 
     mechanical_gap: float = 0.01
-    """Greatest proven gap of mechanical work, (work - lower bound) / work.
+    """Greatest `optimality_gap` of mechanical work.
 
     A motion has many local optima of mechanical work. Of 47 answers whose other candidates were all
     ruled out or solved, 25 were more than 0.5 % above the best motion known and one was 13 % above
@@ -40,4 +40,4 @@ def may_be_optimal(
     """
     if objective == "electrical":
         return True
-    return energy - lower_bound <= settings.mechanical_gap * abs(energy)
+    return energy <= (1 + settings.mechanical_gap) * lower_bound

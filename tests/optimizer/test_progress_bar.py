@@ -57,7 +57,7 @@ def shown(delay: float, lasts: float, script: str = SEARCH) -> str:
 
 def test_a_terminal_shows_energy_and_gap_and_no_trace_is_left() -> None:
     text = shown(delay=0.0, lasts=0.6)
-    assert "Searching: 60 J, gap 16.7%" in text
+    assert "Searching: 60 J, at most 20.0% above the least possible" in text
     assert text.endswith("done\n")
 
 

@@ -21,9 +21,10 @@ from joulepath.app.schemas.request import MotionRequest, OptimizeRequest
 from joulepath.app.tasks.certified import certified
 from joulepath.optimizer.compare import Compared, Comparison, compare
 from joulepath.optimizer.declared import Count, Joules, NotEmpty, Ratio, Seconds
+from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.baseline import Baseline
-from joulepath.optimizer.result.energy import Objective, optimality_gap
+from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import Solution
 
 ALL: list[MethodName] = list(get_args(MethodName))
