@@ -45,9 +45,8 @@ class WholeFitSettings:
 
     load_passes: int = 2
     """Fits; load friction follows the rigid torque of the previous fit."""
-    weight_passes: int = 3
-    """Solutions per fit; the weights follow the residuals of the previous solution. Those of the
-    first are of the robot's own links, whose errors differ from joint to joint."""
+    weight_passes: int = 2
+    """Solutions per fit; the weights follow the residuals of the previous solution."""
     load_sd: float = 0.1
     """Prior standard deviation of load friction [1]."""
     offset_sd: float = 0.05

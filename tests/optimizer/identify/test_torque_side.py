@@ -162,7 +162,8 @@ def test_base_parameters_behind_the_gears_have_no_rotors(
     found = identify(PANDA, [heavier[1]], options)
     assert found.structure.base == 43
     assert not any("Ia" in each.figure for each in found.parameters)
-    assert "friction_laws" not in found.document("2026-01-31")
+    document = found.document("2026-01-31")
+    assert "friction_laws" not in document and "drives" not in document
 
 
 def test_the_reader_takes_the_side_of_the_robots_limits_or_as_told() -> None:
