@@ -17,7 +17,6 @@ from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
 from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.link_side import (
-    as_sensor_terms,
     kept_drives,
     seen_behind_gears,
     sensor_of,
@@ -125,13 +124,12 @@ def _with_torque(
     """The fit with torques, and the errors (k, p) of the parameters of its `prior_error_arms`."""
     own, noise = fitted.arm, None
     if rows.link_side:
-        robot, options = seen_behind_gears(robot), sensor_options(options)
+        robot, options = seen_behind_gears(robot), sensor_options(rows, torque, options)
     if options.method == "periodic":
         found, noise = fit_periodic(robot, rows, torque, fitted.clusters, options)
     else:
         fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
         found = fit(robot, rows, torque, fitted.clusters, options)
-    found = as_sensor_terms(found) if rows.link_side else found
     of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
     terms = tuple(
         name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link
@@ -140,7 +138,9 @@ def _with_torque(
 
     def arm(values: Array) -> FittedArm:
         if rows.link_side:
-            changed = replace(own, sensor=sensor_of(robot.nq, terms, values[~of_links]))
+            changed = replace(
+                own, sensor=sensor_of(robot.nq, terms, values[~of_links], options.reversal)
+            )
         else:
             changed = with_torques(own, terms, values[~of_links], tuple(options.couplings))
         if not of_links.any():
