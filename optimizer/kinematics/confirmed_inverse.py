@@ -199,12 +199,8 @@ class ConfirmedInverseKinematics:
             parameters = [spread(motion, count) for motion in motions]
             configurations = _members(motions, parameters)
             if members >= INVERSE.gapless_members:
-                if limits is not None:
-                    parameters, configurations = up_to_limits(
-                        motions, parameters, configurations, limits, _members
-                    )
                 found = zip(motions, parameters, configurations, strict=True)
-                configurations = [without_gaps(motion, u, q) for motion, u, q in found]
+                configurations = [_represented(*each, limits) for each in found]
             for motion, of_motion in zip(motions, configurations, strict=True):
                 labels += [motion.label] * len(of_motion)
                 curves += [None if is_point(motion) else motion] * len(of_motion)
@@ -310,6 +306,15 @@ def _members(motions: Sequence[SelfMotion], parameters: Sequence[Array]) -> list
             else [motion.at(u) for motion, u in zip(of_kind, at, strict=True)]
         )
     return found
+
+
+def _represented(motion: SelfMotion, u: Array, q: Array, limits: Limits | None) -> Array:
+    """Members (m, nq) [rad] that represent a self-motion within the limits, from members q (n, nq)
+    at parameters u (n,).
+    """
+    if limits is not None:
+        u, q = up_to_limits(motion, u, q, limits)
+    return without_gaps(motion, u, q)
 
 
 def _unrepresented(

@@ -27,9 +27,9 @@ class SelfMotionSettings:
     """Ratio of a gap to the median distance above which it is filled."""
     gap_halvings: int = 6
     """Largest number of times a gap is halved."""
-    limit_halvings: int = 5
-    """Number of times the interval between a member within limits and its neighbour outside is
-    halved. From the last member inside, ends slide to the limit."""
+    limit_samples: int = 33
+    """Number of members between one within limits and its neighbour outside, of which the last one
+    inside is taken. From there, ends slide to the limit."""
 
 
 SELF_MOTION = SelfMotionSettings()

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SELF_MOTION, SelfMotion, spread
-from joulepath.optimizer.kinematics.self_motion_members import without_gaps
+from joulepath.optimizer.kinematics.self_motion_members import up_to_limits, without_gaps
 
 # one turn of the first joint while the second stays within 0.003 rad of the stretched shoulder
 NEAR_SINGULAR = [0.57244, 0.00264, -2.87612, -1.45547, -0.40888, 2.9146, 0.92274]
@@ -49,3 +51,34 @@ def test_a_jump_ends_after_some_halvings_and_members_keep_their_order() -> None:
     filled = without_gaps(motion, u, motion.at(u))[:, 0]
     assert len(u) < len(filled) < 3 * len(u)
     assert filled == pytest.approx(np.sort(filled))
+
+
+class Lines:
+    """Curve of two arcs on which the only joint is the parameter."""
+
+    label, free, arcs = None, (0,), [(0.0, 1.0), (2.0, 3.0)]
+
+    def at(self, parameter: Array) -> Array:
+        return np.array(parameter)[:, None]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "added"),
+    [(0.3, 2.7, 2), (0.3, 2.6, 1), (0.3, 1.5, 1), (-1.0, 3.1, 0), (0.3, 0.35, 0)],
+)
+def test_members_reach_to_where_a_curve_leaves_the_limits(
+    low: float, high: float, added: int
+) -> None:
+    """But not from one arc to the next; nor does a curve that no member represents have one."""
+    motion: SelfMotion = Lines()  # type: ignore[assignment]
+    robot = load_robot("ur5e")
+    limits = replace(robot.limits, q_min=np.array([low]), q_max=np.array([high]))
+    u = spread(motion, 9)
+    parameters, q = up_to_limits(motion, u, motion.at(u), limits)
+    assert len(parameters) == len(u) + added and np.isin(u, parameters).all()
+    np.testing.assert_array_equal(q, motion.at(parameters))
+    assert (np.diff(parameters) > 0).all()
+    step = np.diff(u)[0] / (SELF_MOTION.limit_samples - 1)
+    for limit in (low, high)[:added]:
+        inside = parameters[(parameters >= low) & (parameters <= high)]
+        assert np.abs(inside - limit).min() <= step
