@@ -184,7 +184,7 @@ class RivalSettings:
     gain_in_time: float = 3.0
     """Multiple with a fixed duration: 2 % for one candidate and 6 % for the next."""
     distinct: float = 0.1
-    """Distance of ends from those of the best motion [rad] above which sliding ends are at another
+    """Distance of ends from those of a refined motion [rad] above which sliding ends are at another
     optimum. Ends at one optimum differ by a few hundredths."""
 
 
@@ -200,7 +200,7 @@ def refine_rivals(
 ) -> None:
     """Refine other candidates that may come below the best one.
 
-    Samples that slid to the ends of the best motion are left out, because they are at its optimum.
+    Samples that slid to the ends of a refined motion are left out, because they are at its optimum.
     Where powers have corners, `sharpen` has followed other candidates already.
 
     Args:
@@ -224,18 +224,20 @@ def refine_rivals(
             and not rival.refined
             and not rival.refused
         )
-        if is_open and _is_elsewhere(state, rival, best, settings) and not state.deadline.passed:
+        if is_open and _is_elsewhere(state, rival, settings) and not state.deadline.passed:
             refine(state, rival, graded_below)
 
 
-def _is_elsewhere(
-    state: SearchState, rival: Candidate, best: Candidate, settings: RivalSettings
-) -> bool:
-    """Whether a candidate may be at another optimum than the best one."""
+def _is_elsewhere(state: SearchState, rival: Candidate, settings: RivalSettings) -> bool:
+    """Whether a candidate may be at another optimum than the refined ones."""
     if not (rival.start.sampled or rival.goal.sampled):
         return True
-    moved = np.concatenate([rival.q_start - best.q_start, rival.q_goal - best.q_goal])
-    return slides(state.prepared, rival) and bool(np.abs(moved).max() > settings.distinct)
+    ends = np.concatenate([rival.q_start, rival.q_goal])
+    return slides(state.prepared, rival) and all(
+        np.abs(np.concatenate([each.q_start, each.q_goal]) - ends).max() > settings.distinct
+        for each in state.candidates
+        if each.refined
+    )
 
 
 def lasts_below(ratio: float, state: SearchState, candidate: Candidate) -> bool:
