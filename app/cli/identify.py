@@ -265,12 +265,6 @@ def _packed(file: Path) -> bytes:
     return packed.getvalue()
 
 
-NO_ENERGIES = (
-    "No energy of a move that is held out was measured: that needs the power of the bus, or "
-    "currents or torques of all motors, in a log of at least two different motions."
-)
-
-
 def moves_of(result: dict[str, Any]) -> str:
     """A line per held-out move, and per cycle of logs that repeat: predicted energy with its
     interval, measured energy, their difference."""
@@ -284,7 +278,12 @@ def moves_of(result: dict[str, Any]) -> str:
             difference = f"{each['measured'] / each['predicted'] - 1:+.1%}"
             energies = f"{each['predicted']:.1f}", likely, f"{each['measured']:.1f}"
             rows.append((*row, *energies, difference))
-    return table(rows) if len(rows) > 1 else NO_ENERGIES
+    if len(rows) == 1:
+        return (
+            "No held-out move has a measured energy: log the power of the bus, or the currents or "
+            "torques of all motors, over at least two different motions."
+        )
+    return table(rows)
 
 
 def summary_of(result: dict[str, Any]) -> dict[str, str]:

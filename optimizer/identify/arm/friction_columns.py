@@ -14,8 +14,12 @@ from joulepath.models.robot import Array
 
 COUPLED = "coupling."
 """Prefix of a term of a coupling; the number of the coupling then replaces that of the joint."""
-SENSOR_COULOMB, SENSOR_VISCOUS, SENSOR_GAIN = "sensor_coulomb", "sensor_viscous", "sensor_gain"
-"""Friction behind torque sensors at the links, and the share by which these read too much."""
+SENSOR_COULOMB = "sensor_coulomb"
+"""Coulomb friction behind a torque sensor at a link."""
+SENSOR_VISCOUS = "sensor_viscous"
+"""Viscous friction behind it."""
+SENSOR_GAIN = "sensor_gain"
+"""Share by which a torque sensor reads too much."""
 UNBOUNDED = ("offset", SENSOR_GAIN)
 """Coefficients that may be negative."""
 
