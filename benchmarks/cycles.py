@@ -34,6 +34,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.checks import gap_of
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from joulepath.models.registry import load_robot
@@ -43,6 +44,7 @@ from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.presentation.gap import optimality_gap
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import Cycle
@@ -226,7 +228,7 @@ def main() -> None:
             if each.saving is not None
         }
         row[EXCESS] = excess(answer, own)
-        row["gap"] = answer.energy.electrical.total / answer.lower_bound - 1
+        row["gap"] = gap_of(optimality_gap(answer.lower_bound, answer.energy.electrical.total))
         row["time [s]"] = time.perf_counter() - began
         row |= _sums(answer)
         row["distinct legs"] = sum(move.kinds for move in answer.moves)

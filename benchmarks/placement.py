@@ -19,7 +19,6 @@ a valid certificate. The memory is the resident one of the process after each pl
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import time
 from collections import Counter
@@ -27,6 +26,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.checks import gap_of
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.service import resident
 from benchmarks.statistics import Spread
@@ -167,7 +167,7 @@ def measured(placement: Placement, grid: bool) -> tuple[PlacementSolution, dict[
     found = place_robot(placement, clock=time.process_time, progress=False)
     own = {
         "saving": found.saving or 0.0,
-        "gap": found.optimality_gap or math.inf,
+        "gap": gap_of(found.optimality_gap),
         "time": time.process_time() - began,
         "wall_time": time.perf_counter() - wall,
         "points": len(found.map),

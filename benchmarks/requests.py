@@ -13,7 +13,6 @@ duration.
 
 from __future__ import annotations
 
-import math
 import sys
 import threading
 from collections import Counter
@@ -22,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from benchmarks.checks import balance_error, errors_found, objective
+from benchmarks.checks import balance_error, errors_found, gap_of, objective
 from benchmarks.command import parser, write_json
 from benchmarks.service import Answer, Client, Service, running
 from benchmarks.statistics import Spread
@@ -72,7 +71,7 @@ def examine(task: RequestTask, answer: Answer) -> Outcome:
         return outcome
     outcome.errors = errors_found(task.body, content, task.T_start, task.T_goal)
     outcome.energy = objective(content)
-    outcome.gap = content["energy"]["optimality_gap"] or math.inf
+    outcome.gap = gap_of(content["energy"]["optimality_gap"])
     outcome.balance_error = balance_error(content)
     outcome.candidates = sum(content["candidate_counts"].values())
     outcome.solves = content["solver"]["nlp_solves"]

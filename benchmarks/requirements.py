@@ -94,7 +94,7 @@ def _success(found: Results) -> Iterator[Requirement]:
     valid = PERCENT * found["valid_fraction"]
     yield Requirement(task, "valid answers [%]", "mean", valid, 99.9, at_least=True, digits=2)
     yield Requirement(task, "errors found in answers", "count", len(found["errors"]), 0)
-    yield from _gap(task, found["gap"], p50=5, p90=15)
+    yield from _gap(task, found["gap"], p50=5, p90=14.9)
     excess = PERCENT * found["relative_excess"]
     yield Requirement(
         task, "energy above time scaling, same duration [%]", "maximum", excess, 1, digits=2
@@ -102,7 +102,7 @@ def _success(found: Results) -> Iterator[Requirement]:
 
 
 def _tight(found: Results) -> Iterator[Requirement]:
-    yield from _gap("request, joint to pose, tight bound", found["gap"], p50=4, p90=9)
+    yield from _gap("request, joint to pose, tight bound", found["gap"], p50=4, p90=8.6)
 
 
 def _gap(task: str, gap: Results, p50: float, p90: float) -> Iterator[Requirement]:
