@@ -111,8 +111,8 @@ class SolvedPlacement:
     """Lower bound of the objective: at no place of the region do the cycles need less, in any
     configurations. Null where no bound is known."""
     optimality_gap: Ratio | None
-    """energy of the best place / lower_bound - 1: its energy is at most by this share above the
-    least possible. Null if the bound is not positive. For a six-joint arm of Universal Robots' form
+    """Energy of the best place / lower_bound - 1: it is above the least possible by at most this
+    share. Null if the bound is not positive. For a six-joint arm of Universal Robots' form
     or with a spherical wrist, and a cycle between poses or joint positions, the bound knows the
     configurations at the stops for every place. In other cases it knows the lengths of the ways,
     the payloads and the rests alone, and the gap is wide."""
@@ -177,7 +177,7 @@ class PlacementSolution(Result):
 
     @property
     def optimality_gap(self) -> float | None:
-        """See `optimality_gap` of an energy; None without a bound, too."""
+        """Energy of the best place / lower bound - 1; None without a positive bound."""
         if self.lower_bound is None:
             return None
         return optimality_gap(self.lower_bound, self.best.energy)

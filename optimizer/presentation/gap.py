@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from math import ceil
 
-ROUNDING = 1e-9
-"""Error of a gap that is not rounded up to the next digit."""
-
 
 def optimality_gap(lower_bound: float, energy: float) -> float | None:
     """The largest share by which an energy may be above the least possible.
@@ -20,4 +17,5 @@ def gap_text(gap: float | None) -> str:
     """A gap in words, rounded up: `at most 5.8% above the least possible`."""
     if gap is None:
         return "no positive lower bound"
-    return f"at most {ceil(1000 * (gap - ROUNDING)) / 10:.1f}% above the least possible"
+    # errors of rounding do not count
+    return f"at most {ceil(round(1000 * gap, 6)) / 10:.1f}% above the least possible"

@@ -200,8 +200,8 @@ class EnergyAndBound(Energy):
     """Lower bound of the objective: no motion of any shape and any allowed duration between these
     targets needs less."""
     optimality_gap: Ratio | None
-    """energy of the objective / lower_bound - 1: the energy is at most by this share above the
-    least possible. Null if the bound is not positive."""
+    """Energy of the objective / lower_bound - 1: the energy is above the least possible by at most
+    this share. Null if the bound is not positive."""
 
     @classmethod
     def bounded(cls, energy: Energy, lower_bound: float, objective: Objective) -> Self:

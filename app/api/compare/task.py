@@ -81,8 +81,8 @@ class MethodResult:
     excess: Ratio | None = None
     """Energy / energy of the best method - 1, of the objective."""
     optimality_gap: Ratio | None = None
-    """energy of the objective / `lower_bound` - 1: the energy is at most by this share above the
-    least possible. Null if the bound is not positive."""
+    """Energy of the objective / `lower_bound` - 1: the energy is above the least possible by at
+    most this share. Null if the bound is not positive."""
     wall_time: Seconds | None = None
     """Wall time of this method, on one core."""
     iterations: Count | None = None
