@@ -25,6 +25,8 @@ LONG_FOLDERS = (TESTS / "browser", TESTS / "fuzzing")
 """Folders whose tests are all `long`. Otherwise they are not even imported: their libraries take
 seconds to load.
 """
+LONG_TIMEOUT = 3600.0
+"""Time after which a long test counts as hanging [s]."""
 DATABASES = tempfile.TemporaryDirectory(prefix="joulepath-tests-")
 _count = itertools.count()
 
@@ -46,10 +48,13 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks the tests of the long folders, and puts the few tests that take long to the front: at
-    the end, one process would be busy with them while the others idle."""
+    the end, one process would be busy with them while the others idle. Long tests may hang for
+    longer before they fail: some take minutes on an idle machine."""
     for item in items:
         if any(folder in item.path.parents for folder in LONG_FOLDERS):
             item.add_marker("long")
+        if item.get_closest_marker("long") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(LONG_TIMEOUT))
     items.sort(key=lambda item: item.path.parent.name not in ("browser", "deploy", "tests"))
 
 
