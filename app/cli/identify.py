@@ -265,6 +265,12 @@ def _packed(file: Path) -> bytes:
     return packed.getvalue()
 
 
+NO_ENERGIES = (
+    "No energy of a move that is held out was measured: that needs the power of the bus, or "
+    "currents or torques of all motors, in a log of at least two different motions."
+)
+
+
 def moves_of(result: dict[str, Any]) -> str:
     """A line per held-out move, and per cycle of logs that repeat: predicted energy with its
     interval, measured energy, their difference."""
@@ -278,7 +284,7 @@ def moves_of(result: dict[str, Any]) -> str:
             difference = f"{each['measured'] / each['predicted'] - 1:+.1%}"
             energies = f"{each['predicted']:.1f}", likely, f"{each['measured']:.1f}"
             rows.append((*row, *energies, difference))
-    return table(rows)
+    return table(rows) if len(rows) > 1 else NO_ENERGIES
 
 
 def summary_of(result: dict[str, Any]) -> dict[str, str]:

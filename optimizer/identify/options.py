@@ -124,6 +124,16 @@ class IdentificationOptions:
         return bool(self.refit) or self.links_unknown
 
     @property
+    def joint_terms(self) -> tuple[str, ...]:
+        """Terms of friction and of the measurement that are fitted to each joint."""
+        return tuple(self.terms)
+
+    @property
+    def nuisances(self) -> frozenset[str]:
+        """Terms that are no figures of the robot: they are fitted however poorly known they are."""
+        return frozenset({"offset"})
+
+    @property
     def targets(self) -> tuple[Target, ...]:
         """Fitted figures: a payload is fitted only together with friction and rotors."""
         given = tuple(self.fit)

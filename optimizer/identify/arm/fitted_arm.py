@@ -25,10 +25,12 @@ FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
 class LinkSensor:
     """What torque sensors behind the gears see beside the bodies, per joint (nq,)."""
 
-    coulomb: Array
+    sensor_coulomb: Array
     """Coulomb friction behind the sensors [N·m]."""
-    viscous: Array
+    sensor_viscous: Array
     """Viscous friction behind the sensors [N·m·s/rad]."""
+    sensor_gain: Array
+    """Share by which the sensors read too much [1]."""
     offset: Array
     """Reading of the sensors without a torque [N·m]."""
 
@@ -94,10 +96,10 @@ class FittedArm:
         if not rows.link_side:
             return self.torque(rows)
         rigid, sensor = self.rigid_torque(rows), self.sensor
-        if sensor is None:
+        if sensor is None or rows.drag is None:
             return rigid
-        sign = rows.v / np.hypot(rows.v, self.knee)
-        return np.asarray(rigid + sensor.coulomb * sign + sensor.viscous * rows.v + sensor.offset)
+        friction = sensor.sensor_coulomb * rows.drag + sensor.sensor_viscous * rows.v
+        return np.asarray((1 + sensor.sensor_gain) * rigid + friction + sensor.offset)
 
     def torque_parts(self, rows: Rows) -> TorqueParts:
         """Torque parts from which the power follows."""

@@ -14,7 +14,9 @@ from joulepath.models.robot import Array
 
 COUPLED = "coupling."
 """Prefix of a term of a coupling; the number of the coupling then replaces that of the joint."""
-UNBOUNDED = ("offset",)
+SENSOR_COULOMB, SENSOR_VISCOUS, SENSOR_GAIN = "sensor_coulomb", "sensor_viscous", "sensor_gain"
+"""Friction behind torque sensors at the links, and the share by which these read too much."""
+UNBOUNDED = ("offset", SENSOR_GAIN)
 """Coefficients that may be negative."""
 
 
@@ -29,11 +31,11 @@ def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: floa
         knee: speed over which Coulomb friction reverses [rad/s].
         speed: speed at which the curved term bends [rad/s].
     """
-    if term == "viscous":
+    if term in ("viscous", SENSOR_VISCOUS):
         return v
     if term == "rotor_inertia":
         return a
-    if term == "scale":
+    if term in ("scale", SENSOR_GAIN):
         return rigid
     if term == "offset":
         return np.ones_like(v)

@@ -8,7 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.optimizer.identify.arm.friction_columns import COUPLED, column, lower_bounds
+from joulepath.optimizer.identify.arm.friction_columns import (
+    COUPLED,
+    SENSOR_COULOMB,
+    column,
+    lower_bounds,
+)
 from joulepath.optimizer.identify.choices import Estimator
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.estimates.grouped import (
@@ -66,11 +71,13 @@ class JointBlock:
     """Standard deviation of the rigid torque of each joint [N·m]."""
     speed: Array
     """Speeds (nq,) at which the curved terms bend [rad/s]."""
+    nuisances: frozenset[str]
+    """Terms that are no figures of the robot."""
 
 
 def terms_of(options: IdentificationOptions) -> list[str]:
     """Names of the fitted terms of each joint."""
-    friction = options.terms if "friction" in options.targets else ()
+    friction = options.joint_terms if "friction" in options.targets else ()
     scale = (SCALE,) if "torque_constant" in options.targets else ()
     return [*friction, *(("rotor_inertia",) if "rotor" in options.targets else ()), *scale]
 
@@ -111,8 +118,10 @@ def joint_block(
         spread[joint] = float(rigid[:, joint].std()) if use.any() else 0.0
         columns = np.zeros((int(use.sum()), len(names)))
         for k, term in enumerate(terms):
-            columns[:, at * len(terms) + k] = column(
-                term, v[:, joint], a[:, joint], rigid[:, joint], knee, float(speed[joint])
+            columns[:, at * len(terms) + k] = (
+                column(term, v[:, joint], a[:, joint], rigid[:, joint], knee, float(speed[joint]))
+                if term != SENSOR_COULOMB or rows.drag is None
+                else rows.drag[use, joint]
             )
         for c, (_, coupling) in enumerate(couplings):
             ratios = coupling.ratios
@@ -132,6 +141,7 @@ def joint_block(
         own={name: own_value(robot, name) for name in names},
         spread=spread,
         speed=speed,
+        nuisances=options.nuisances,
     )
 
 

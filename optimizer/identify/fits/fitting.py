@@ -17,7 +17,6 @@ from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
 from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.link_side import (
-    as_sensor_terms,
     kept_drives,
     seen_behind_gears,
     sensor_of,
@@ -131,7 +130,6 @@ def _with_torque(
     else:
         fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
         found = fit(robot, rows, torque, fitted.clusters, options)
-    found = as_sensor_terms(found) if rows.link_side else found
     of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
     terms = tuple(
         name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link

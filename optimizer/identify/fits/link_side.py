@@ -1,30 +1,48 @@
 """Fits to torques that sensors measure behind the gears.
 
 Such torques carry links and load, but neither rotors nor the friction of motors and gears. They
-identify links, and what the sensors themselves add: an offset, and the small friction of the
-bearings behind them. Friction and rotors of the drives stay the robot's own.
+identify links, and what the sensors themselves add: an offset, a gain, and the small friction of
+the bearings behind them. Friction and rotors of the drives stay the robot's own.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from joulepath.models.robot import FrictionLaw, Robot
 from joulepath.optimizer.identify.arm.fitted_arm import LinkSensor
-from joulepath.optimizer.identify.choices import Term
+from joulepath.optimizer.identify.arm.friction_columns import (
+    SENSOR_COULOMB,
+    SENSOR_GAIN,
+    SENSOR_VISCOUS,
+)
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.fits.block import own_value, terms_of
 from joulepath.optimizer.identify.options import IdentificationOptions
 
-SENSOR = "sensor_"
-"""Prefix of the friction that sensors behind the gears see."""
-SENSOR_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "offset")
 BEHIND_GEARS = (
     "The torques were measured behind the gears, where rotors and the friction of motors and gears "
     "do not act: log motor currents, or the power of the arm's bus."
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorOptions(IdentificationOptions):
+    """Options of a fit to torques behind the gears, none of whose terms is a figure of the
+    robot."""
+
+    @property
+    def joint_terms(self) -> tuple[str, ...]:
+        """Terms of the sensors. Only the robot's own links tell their gains from other links."""
+        gain = (SENSOR_GAIN,) if self.refit else ()
+        return (SENSOR_COULOMB, SENSOR_VISCOUS, "offset", *gain)
+
+    @property
+    def nuisances(self) -> frozenset[str]:
+        """All terms."""
+        return frozenset(self.joint_terms)
 
 
 def seen_behind_gears(robot: Robot) -> Robot:
@@ -38,26 +56,18 @@ def seen_behind_gears(robot: Robot) -> Robot:
     )
 
 
-def sensor_options(options: IdentificationOptions) -> IdentificationOptions:
+def sensor_options(options: IdentificationOptions) -> SensorOptions:
     """The options of a fit to torques behind the gears."""
-    return replace(options, fit=("friction",), terms=SENSOR_TERMS, couplings=())
-
-
-def as_sensor_terms(found: Estimate) -> Estimate:
-    """The estimate with the friction of the sensors named as such."""
-    names = tuple(
-        (SENSOR + term if term in SENSOR_TERMS[:2] else term, joint) for term, joint in found.names
-    )
-    return replace(found, names=names)
+    given = {each.name: getattr(options, each.name) for each in fields(options)}
+    return SensorOptions(**given | {"fit": ("friction",), "terms": ("offset",), "couplings": ()})
 
 
 def sensor_of(nq: int, names: tuple[Name, ...], value: np.ndarray) -> LinkSensor:
     """What sensors see beside the bodies, from fitted terms with values (p,)."""
-    parts = {term: np.zeros(nq) for term in SENSOR_TERMS}
+    parts = {each.name: np.zeros(nq) for each in fields(LinkSensor)}
     for (name, joint), found in zip(names, value.tolist(), strict=True):
-        term = name.removeprefix(SENSOR)
-        if term in parts and joint is not None:
-            parts[term][joint] = found
+        if name in parts and joint is not None:
+            parts[name][joint] = found
     return LinkSensor(**parts)
 
 

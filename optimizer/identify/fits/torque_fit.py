@@ -261,15 +261,17 @@ class Doubt(NamedTuple):
 
 
 def doubts_of(block: JointBlock, value: Array, sd: Array) -> list[Doubt]:
-    """Doubts about the fitted terms of a block; offsets are kept with any standard deviation."""
+    """Doubts about the fitted terms of a block; none about terms that are no figures."""
     found = list[Doubt]()
     for k, (term, _) in enumerate(block.names):
         inside = value[k] > block.lower[k] and value[k] != 0
         relative = float(sd[k] / abs(value[k])) if inside else np.inf
         size = relative / (TORQUE_FIT.max_scale_sd if term == SCALE else DETERMINED.max_relative_sd)
-        if term == "load" and not value[k] >= TORQUE_FIT.min_load_sds * sd[k] > 0:
+        if term in block.nuisances:
+            found.append(Doubt("", 0.0))
+        elif term == "load" and not value[k] >= TORQUE_FIT.min_load_sds * sd[k] > 0:
             found.append(Doubt(LITTLE_LOAD.format(TORQUE_FIT.min_load_sds), np.inf))
-        elif term == "offset" or size <= 1:
+        elif size <= 1:
             found.append(Doubt("", 0.0))
         else:
             reason = UNCERTAIN.format(relative) if np.isfinite(relative) else AT_BOUND.format(0.0)

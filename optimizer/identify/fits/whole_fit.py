@@ -15,7 +15,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.parameters import LINKS
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
-from joulepath.optimizer.identify.arm.friction_columns import COUPLED
+from joulepath.optimizer.identify.arm.friction_columns import COUPLED, SENSOR_GAIN
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
@@ -51,6 +51,9 @@ class WholeFitSettings:
     """Prior standard deviation of load friction [1]."""
     offset_sd: float = 0.05
     """Prior standard deviation of an offset over the torque limit [1]."""
+    gain_sd: float = 0.03
+    """Prior standard deviation of the gain of a torque sensor [1]: strain gauges are calibrated to
+    some per cent of their reading."""
     relative_sd: float = 1.0
     """Prior standard deviation of a term over the robot's own value [1]."""
     default_sd: float = 10.0
@@ -208,6 +211,8 @@ def _prior_sd(robot: Robot, name: Name, own: float) -> float:
     term, joint = name
     if term == "load":
         return WHOLE_FIT.load_sd
+    if term == SENSOR_GAIN:
+        return WHOLE_FIT.gain_sd
     if term == "offset" and joint is not None:
         return WHOLE_FIT.offset_sd * float(robot.limits.tau_max[joint])
     known = own > 0 and not term.startswith(COUPLED)

@@ -48,7 +48,8 @@ def figures_of(
     if options.reduced:
         for each in parameters:
             if not each.identified and each.figure in values and each.joint is not None:
-                values[each.figure][each.joint] = each.previous
+                # not the previous value, which may be a base parameter, with its rounding error
+                values[each.figure][each.joint] = own[each.figure][each.joint]
     identified = {
         name: _identified(robot.nq, name, told, value != own[name] if name in own else True)
         for name, value in values.items()

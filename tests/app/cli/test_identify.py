@@ -10,7 +10,7 @@ import pytest
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.identifications.answer import IdentificationResult
-from joulepath.app.cli.identify import summary_of
+from joulepath.app.cli.identify import moves_of, summary_of
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NothingHeldOut
 from joulepath.optimizer.problem.arm import Payload
@@ -73,6 +73,7 @@ def test_ten_seconds_at_rest_and_a_wattmeter(here: Here, tmp_path: Path) -> None
     assert mains["constant"]["value"] == pytest.approx(104 - 1.1 * 30.3, abs=0.1)
     assert [mains[each]["trust"] for each in ("factor", "constant")] == ["E", "B"]
     assert summary_of(json.loads(output.read_bytes()))["measure next"]
+    assert "two different motions" in moves_of(json.loads(output.read_bytes()))
     code, content = here.problem(*command[:-3], "30")
     assert code == 2 and content["errors"][0]["loc"][-1] == "mains"
 

@@ -24,8 +24,6 @@ from tests.identification_logs import Recording, recorded, truth_of, with_curren
 ROBOT = load_robot("ur10e")
 # relative; a few roundings of sums of some ten terms
 EXACT = 1e-12
-# of links: their inertias are written about the centre of mass, and moved back
-MOVED = 1e-9
 CURVED: tuple[Term, ...] = ("coulomb", "viscous", "curved", "load", "offset")
 
 
@@ -56,13 +54,13 @@ def torques(robot: Robot, rows: Rows) -> tuple[Array, Array]:
     return rigid, motor
 
 
-def check(found: Identification, log: Log, tolerance: float = EXACT) -> None:
+def check(found: Identification, log: Log) -> None:
     rows = rows_of(found.robot, [log], regressor=found.options.needs_regressor)
     arm, robot = found.fitted.arm, written(found)
     rigid, motor = torques(robot, rows)
     fitted = arm.torque(rows) - arm.offset
     scale = np.abs(fitted).max()
-    np.testing.assert_allclose(motor, fitted, rtol=0, atol=tolerance * scale)
+    np.testing.assert_allclose(motor, fitted, rtol=0, atol=EXACT * scale)
     np.testing.assert_array_equal(robot.drives.torque_constant, arm.torque_constant)
     if np.isfinite(rows.power).any():
         # offsets belong to the sensors, and are no figures
@@ -71,7 +69,7 @@ def check(found: Identification, log: Log, tolerance: float = EXACT) -> None:
             at = slice(row, row + 1)
             tau = rigid[at] + robot.drives.rotor_inertia * rows.a[at]
             energy = breakdown(np.ones(1), rows.v[at], rows.a[at], tau, 0.0, Arm(robot=robot))
-            assert energy.electrical.total == pytest.approx(power[row], rel=10 * tolerance)
+            assert energy.electrical.total == pytest.approx(power[row], rel=EXACT)
 
 
 @pytest.mark.parametrize(
@@ -108,14 +106,14 @@ def test_figures_of_any_options_are_written_as_they_were_fitted(options: dict[st
 
 def test_figures_of_power_alone_are_written_as_they_were_fitted() -> None:
     log = log_of(effort=None, effort_meaning=None)
-    check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0)), log, MOVED)
+    check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0)), log)
 
 
 @pytest.mark.parametrize("terms", [("coulomb", "viscous", "offset"), CURVED])
 def test_refitted_links_are_written_as_they_were_fitted(terms: tuple[Term, ...]) -> None:
     log = log_of()
     options = IdentificationOptions(held_out=0.0, refit=True, terms=terms)
-    check(identify(ROBOT, [log], options), log, MOVED)
+    check(identify(ROBOT, [log], options), log)
 
 
 def test_losses_that_the_power_does_not_separate_are_not_counted_twice() -> None:
