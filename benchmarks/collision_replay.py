@@ -2,16 +2,84 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
+import pinocchio as pin
 
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.bodies import Body
+from joulepath.optimizer.collision.coal_distance import COAL, coal_shape
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.motion.spline import Spline, sample
 from joulepath.optimizer.problem.arm import Arm
 
 
 def collisions(arm: Arm, spline: Spline, period: float) -> int:
     """Samples of a motion in collision, one every `period` [s] and the last."""
-    checker = StateValidityChecker(arm, CollisionModel(arm))
+    replay = CollisionReplay(arm, CollisionModel(arm))
     t = np.append(np.arange(0.0, spline.duration, period), spline.duration)
-    return sum(not checker.is_valid(q) for q in sample(spline, t)[0])
+    return sum(replay.collides(q) for q in sample(spline, t)[0])
+
+
+class CollisionReplay:
+    """The bodies and the checked pairs of a collision model, in Pinocchio and Coal.
+
+    Bodies keep their margins and an additional `reserve` [m].
+    """
+
+    def __init__(self, arm: Arm, model: CollisionModel, reserve: float = 0.0) -> None:
+        self._robot = arm.robot.model
+        self._data = self._robot.createData()
+        self._geometry = pin.GeometryModel()
+        skins = [self._add(number, body) for number, body in enumerate(model.bodies)]
+        self._clouds, self._model, self._reserve = (
+            np.flatnonzero(model.geometry.is_cloud),
+            model,
+            reserve,
+        )
+        pairs = model.pairs[~model.geometry.is_cloud].tolist()
+        for first, second in pairs:
+            self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+        self._geometry_data = pin.GeometryData(self._geometry)
+        for request, pair in zip(self._geometry_data.collisionRequests, pairs, strict=True):
+            growth = [model.bodies[k].core.radius + model.bodies[k].margin - skins[k] for k in pair]
+            request.security_margin = sum(growth) + reserve
+            request.enable_contact = False
+        # It reads the security margins when it is built.
+        self._manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._robot, self._geometry, self._geometry_data
+        )
+
+    def collides(self, q: Array) -> bool:
+        """Whether a pair is too near at q (nq,) [rad]."""
+        chain = self._model.coupling.positions(q)
+        if pin.computeCollisions(self._robot, self._data, self._manager, chain, True):
+            return True
+        return len(self._clouds) > 0 and self._hits_cloud(q)
+
+    def _hits_cloud(self, q: Array) -> bool:
+        """Whether a body is nearer to a part of a cloud than allowed, by the cloud's own tree."""
+        frames = self._model.frames(q[None])
+        least = self._model.pair_distances(frames, self._clouds, self._reserve).distance.min()
+        return bool(least < self._reserve)
+
+    def _add(self, number: int, body: Body) -> float:
+        """Adds a body to the geometry, and returns the growth [m] of Coal's shape beyond the
+        core.
+        """
+        T, skin = np.eye(4), 0.0
+        shape: coal.CollisionGeometry
+        if body.cloud is not None:
+            # The cloud's own tree checks it; this placeholder keeps the number of the body.
+            shape = coal.Sphere(COAL.skin)
+        elif body.core.is_half_space:
+            shape = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        else:
+            shape, skin, transform = coal_shape(body.core)
+            T[:3, :3], T[:3, 3] = transform.getRotation(), transform.getTranslation()
+        # Pinocchio needs distinct names, but names of bodies may repeat.
+        placement = pin.SE3(body.T_link_core @ T)
+        self._geometry.addGeometryObject(
+            pin.GeometryObject(str(number), body.link, placement, shape)
+        )
+        return skin

@@ -14,6 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import MOST_ROBOTS, Array, Mask, Robot
 from joulepath.optimizer.collision.bodies import Body, Indices, bodies_of
+from joulepath.optimizer.collision.compiled_distances import ClearanceCheck
 from joulepath.optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from joulepath.optimizer.declared import Metres
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
@@ -75,6 +76,12 @@ class CollisionModel:
     def frames(self, q: Array) -> Array:
         """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad]."""
         return link_frames(self._placements, self.coupling.positions(q))
+
+    def clearance_check(self, reserve: float) -> ClearanceCheck:
+        """A check whether all pairs without clouds are at least `reserve` [m] apart, for one
+        configuration after the other.
+        """
+        return self.geometry.clearance_check(self._placements, reserve)
 
     def signed_distances(self, q: Array, within: float = np.inf) -> tuple[Array, Array]:
         """Signed distances (n, p) [m] of every pair at q (n, nq) [rad], and their gradients (n, p,

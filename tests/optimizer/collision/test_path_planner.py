@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from benchmarks.collision_replay import CollisionReplay
 from joulepath import optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import CollisionModel
@@ -162,10 +163,15 @@ def test_state_validity_agrees_with_the_distances(seed: int) -> None:
     for reserve in (0.0, 0.005):
         checker = StateValidityChecker(arm, model, reserve)
         valid = np.array([checker.is_valid(x) for x in q])
-        # Coal ends its search within 1e-6 m
-        clear = np.abs(distance - reserve) > 1e-5
+        # the distances are exact within 1e-8 m
+        clear = np.abs(distance - reserve) > 1e-6
         assert (valid == (distance > reserve))[clear].all()
         assert 10 < valid.sum() < 390
+        replay = CollisionReplay(arm, model, reserve)
+        collides = np.array([replay.collides(x) for x in q])
+        # Coal ends its search within 1e-6 m
+        clear = np.abs(distance - reserve) > 1e-5
+        assert (valid != collides)[clear].all()
 
 
 @pytest.mark.parametrize("name", TASKS)
