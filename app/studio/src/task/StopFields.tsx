@@ -1,5 +1,6 @@
 import { NumberCell } from "../ui/NumberCell";
 import { Segment } from "../ui/Segment";
+import { gripped } from "../store/load";
 import { at, put, type Pointer } from "../store/pointer";
 import { isObject } from "../store/request";
 import { edit, request } from "../store/state";
@@ -25,7 +26,7 @@ function withDeed(stop: Stop, deed: Deed): Stop {
   const { payload: _, via: __, ...rest } = stop;
   if (deed === "same") return rest;
   if (deed === "puts") return { ...rest, payload: null };
-  if (deed === "takes") return { ...rest, payload: { mass: 1, com: [0, 0, 0.05] } };
+  if (deed === "takes") return { ...rest, payload: { mass: 1, com: gripped(request.value) } };
   const { dwell: ___, approach: ____, retreat: _____, ...passing } = rest;
   return { ...passing, via: true };
 }

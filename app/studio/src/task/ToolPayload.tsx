@@ -3,6 +3,7 @@ import { Errors } from "../ui/Errors";
 import { NumberCell } from "../ui/NumberCell";
 import { robotNow } from "../picture/pictured";
 import { untyped } from "../picture/drag";
+import { gripped } from "../store/load";
 import { at, join, put } from "../store/pointer";
 import { isObject, listOf, sixOf, withNumber } from "../store/request";
 import { edit, request, typed } from "../store/state";
@@ -78,13 +79,13 @@ export function ToolPayload() {
   );
 }
 
-/** A payload without mass is none; a first one has its centre 50 mm before the flange. */
+/** A payload without mass is none. */
 function setMass(value: number, text: string): void {
   const { payload } = request.value;
   const next =
     value === 0
       ? undefined
-      : { ...(isObject(payload) ? payload : { com: [0, 0, 0.05] }), mass: value };
+      : { ...(isObject(payload) ? payload : { com: gripped(request.value) }), mass: value };
   edit(put(request.value, "/payload", next), { ...untyped("/payload"), "/payload/mass": text });
 }
 
