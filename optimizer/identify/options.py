@@ -134,6 +134,12 @@ class IdentificationOptions:
         return frozenset({"offset"})
 
     @property
+    def reversal(self) -> int:
+        """Number of the distance over which friction behind the gears reverses, among those of the
+        rows."""
+        return 0
+
+    @property
     def targets(self) -> tuple[Target, ...]:
         """Fitted figures: a payload is fitted only together with friction and rotors."""
         given = tuple(self.fit)

@@ -33,6 +33,8 @@ class LinkSensor:
     """Share by which the sensors read too much [1]."""
     offset: Array
     """Reading of the sensors without a torque [N·m]."""
+    reversal: int
+    """Number of the distance, of those of the rows, over which the Coulomb friction reverses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +98,10 @@ class FittedArm:
         if not rows.link_side:
             return self.torque(rows)
         rigid, sensor = self.rigid_torque(rows), self.sensor
-        if sensor is None or rows.drag is None:
+        if sensor is None or rows.drags is None:
             return rigid
-        friction = sensor.sensor_coulomb * rows.drag + sensor.sensor_viscous * rows.v
+        friction = sensor.sensor_coulomb * rows.drags[:, :, sensor.reversal]
+        friction = friction + sensor.sensor_viscous * rows.v
         return np.asarray((1 + sensor.sensor_gain) * rigid + friction + sensor.offset)
 
     def torque_parts(self, rows: Rows) -> TorqueParts:

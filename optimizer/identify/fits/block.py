@@ -120,8 +120,8 @@ def joint_block(
         for k, term in enumerate(terms):
             columns[:, at * len(terms) + k] = (
                 column(term, v[:, joint], a[:, joint], rigid[:, joint], knee, float(speed[joint]))
-                if term != SENSOR_COULOMB or rows.drag is None
-                else rows.drag[use, joint]
+                if term != SENSOR_COULOMB or rows.drags is None
+                else rows.drags[use, joint, options.reversal]
             )
         for c, (_, coupling) in enumerate(couplings):
             ratios = coupling.ratios

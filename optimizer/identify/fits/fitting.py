@@ -124,7 +124,7 @@ def _with_torque(
     """The fit with torques, and the errors (k, p) of the parameters of its `prior_error_arms`."""
     own, noise = fitted.arm, None
     if rows.link_side:
-        robot, options = seen_behind_gears(robot), sensor_options(options)
+        robot, options = seen_behind_gears(robot), sensor_options(rows, torque, options)
     if options.method == "periodic":
         found, noise = fit_periodic(robot, rows, torque, fitted.clusters, options)
     else:
@@ -138,7 +138,9 @@ def _with_torque(
 
     def arm(values: Array) -> FittedArm:
         if rows.link_side:
-            changed = replace(own, sensor=sensor_of(robot.nq, terms, values[~of_links]))
+            changed = replace(
+                own, sensor=sensor_of(robot.nq, terms, values[~of_links], options.reversal)
+            )
         else:
             changed = with_torques(own, terms, values[~of_links], tuple(options.couplings))
         if not of_links.any():

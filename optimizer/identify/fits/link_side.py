@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from joulepath.models.robot import FrictionLaw, Robot
+from joulepath.models.robot import Array, FrictionLaw, Robot
 from joulepath.optimizer.identify.arm.fitted_arm import LinkSensor
 from joulepath.optimizer.identify.arm.friction_columns import (
     SENSOR_COULOMB,
@@ -19,8 +19,10 @@ from joulepath.optimizer.identify.arm.friction_columns import (
     SENSOR_VISCOUS,
 )
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.fits.block import own_value, terms_of
+from joulepath.optimizer.identify.estimates.grouped import solve_bounded
+from joulepath.optimizer.identify.fits.block import moving_rows, own_value, terms_of
 from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 BEHIND_GEARS = (
     "The torques were measured behind the gears, where rotors and the friction of motors and gears "
@@ -32,6 +34,14 @@ BEHIND_GEARS = (
 class SensorOptions(IdentificationOptions):
     """Options of a fit to torques behind the gears, none of whose terms is a figure of the
     robot."""
+
+    best_reversal: int
+    """Number of the distance over which the friction reverses, among those of the rows."""
+
+    @property
+    def reversal(self) -> int:
+        """The best one."""
+        return self.best_reversal
 
     @property
     def joint_terms(self) -> tuple[str, ...]:
@@ -56,19 +66,45 @@ def seen_behind_gears(robot: Robot) -> Robot:
     )
 
 
-def sensor_options(options: IdentificationOptions) -> SensorOptions:
-    """The options of a fit to torques behind the gears."""
+def sensor_options(rows: Rows, torque: Array, options: IdentificationOptions) -> SensorOptions:
+    """The options of a fit to torques (n, nq) [N·m] behind the gears."""
     given = {each.name: getattr(options, each.name) for each in fields(options)}
-    return SensorOptions(**given | {"fit": ("friction",), "terms": ("offset",), "couplings": ()})
+    given |= {"fit": ("friction",), "terms": ("offset",), "couplings": ()}
+    return SensorOptions(**given, best_reversal=_best_reversal(rows, torque, options))
 
 
-def sensor_of(nq: int, names: tuple[Name, ...], value: np.ndarray) -> LinkSensor:
+def _best_reversal(rows: Rows, torque: Array, options: IdentificationOptions) -> int:
+    """Number of the distance that makes the torques most likely, all joints together.
+
+    The links of each joint are fitted, too, so that the errors of the robot's own do not count.
+    """
+    assert rows.drags is not None
+    cost = np.zeros(rows.drags.shape[2])
+    for joint in range(torque.shape[1]):
+        use = moving_rows(rows, torque, joint, options.velocity_threshold, ())
+        bodies = (
+            rows.rigid[use, joint, None] if rows.regressor is None else rows.regressor[use, joint]
+        )
+        shared = [bodies, rows.v[use, joint, None], np.ones((int(use.sum()), 1))]
+        columns, values = np.hstack([*shared, rows.drags[use, joint]]), torque[use, joint]
+        gram, moment = columns.T @ columns, columns.T @ values
+        count = columns.shape[1] - len(cost)
+        for k in range(len(cost)):
+            at = [*range(count), count + k]
+            found = solve_bounded(gram[np.ix_(at, at)], moment[at], np.full(count + 1, -np.inf))
+            error = float(np.sum((values - columns[:, at] @ found) ** 2))
+            cost[k] += len(values) * np.log(max(error, np.finfo(float).tiny))
+    return int(np.argmin(cost))
+
+
+def sensor_of(nq: int, names: tuple[Name, ...], value: Array, reversal: int) -> LinkSensor:
     """What sensors see beside the bodies, from fitted terms with values (p,)."""
-    parts = {each.name: np.zeros(nq) for each in fields(LinkSensor)}
+    terms = (SENSOR_COULOMB, SENSOR_VISCOUS, SENSOR_GAIN, "offset")
+    parts = {term: np.zeros(nq) for term in terms}
     for (name, joint), found in zip(names, value.tolist(), strict=True):
         if name in parts and joint is not None:
             parts[name][joint] = found
-    return LinkSensor(**parts)
+    return LinkSensor(**parts, reversal=reversal)
 
 
 def kept_drives(robot: Robot, clusters: int, options: IdentificationOptions) -> Estimate:

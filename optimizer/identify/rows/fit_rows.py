@@ -41,9 +41,9 @@ class RowSettings:
     """Range of a joint over a move up to which the joint stands still [rad]."""
     still_speed: float = 0.02
     """Speed of a joint that stands still, up to which the speed is noise [rad/s]."""
-    reversal: float = 2e-3
-    """Distance over which the friction of bearings behind torque sensors reverses [rad]; the best
-    one of nearly all joints of two Pandas."""
+    reversals: tuple[float, ...] = (1e-5, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
+    """Distances over which the friction of bearings behind torque sensors may reverse [rad]; 1e-3
+    and 2e-3 are the best ones of two Pandas."""
     max_power_ratio: float = 20.0
     """Ratio of the mean power of a log to the robot's own power at rest, or of the latter to the
     former, from which on the channel is not the power of the bus [1]."""
@@ -101,9 +101,9 @@ class Rows:
     """Whether `effort` is a current."""
     link_side: bool = False
     """Whether `effort` was measured behind the gears, without rotors and the motors' friction."""
-    drag: Array | None = None
-    """Direction (n, nq) of the friction behind the gears, from -1 to 1; None for efforts of the
-    motors."""
+    drags: Array | None = None
+    """Direction (n, nq, d) of the friction behind the gears, from -1 to 1, for d distances over
+    which it may reverse; None for efforts of the motors."""
     regressor: Array | None = None
     """Regressor (n, nq, 10 nq) of the links' torques; None where the inertials count as known."""
     wrench_regressor: Array | None = None
@@ -175,29 +175,29 @@ def rows_of(
     joined = {name: _joined([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
     joined["group"] = groups_of_motions(joined["q"], joined["v"], joined["move"], joined["rest"])
     link_side = sides == ["link"]
-    drag = _drag(joined["q"], joined["v"], joined["log"]) if link_side else None
-    return Rows(**joined, current=meanings == ["current"], link_side=link_side, drag=drag)
+    drags = _drags(joined["q"], joined["v"], joined["log"]) if link_side else None
+    return Rows(**joined, current=meanings == ["current"], link_side=link_side, drags=drags)
 
 
-def _drag(q: Array, v: Array, log: IntArray) -> Array:
-    """Direction (n, nq) of the friction of bearings, which reverses over a distance and not over a
-    speed (Dahl 1976).
+def _drags(q: Array, v: Array, log: IntArray) -> Array:
+    """Direction (n, nq, d) of the friction of bearings, which reverses over a distance and not over
+    a speed (Dahl 1976).
 
     Args:
         q: positions (n, nq) [rad].
         v: velocities (n, nq) [rad/s], whose direction counts where a log begins.
         log: number of the log (n,).
     """
-    step = np.diff(q, axis=0, prepend=q[:1])
-    forward, kept = np.sign(step), np.exp(-np.abs(step) / ROWS.reversal)
+    step = np.diff(q, axis=0, prepend=q[:1])[:, :, None]
+    forward, kept = np.sign(step), np.exp(-np.abs(step) / np.array(ROWS.reversals))
     first = np.flatnonzero(np.diff(log, prepend=-1))
-    forward[first], kept[first] = np.sign(v[first]), 0.0
-    drag = np.empty_like(q)
-    state = np.zeros(q.shape[1])
+    forward[first], kept[first] = np.sign(v[first])[:, :, None], 0.0
+    drags: Array = np.empty_like(kept)
+    state: Array = np.zeros(kept.shape[1:])
     for row in range(len(q)):
         state = forward[row] + (state - forward[row]) * kept[row]
-        drag[row] = state
-    return drag
+        drags[row] = state
+    return drags
 
 
 def _wrench(robot: Robot, log: Log, rows: dict[str, Array]) -> dict[str, Array]:

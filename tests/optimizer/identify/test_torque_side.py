@@ -17,6 +17,7 @@ from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.identify.logs.recorded import measured
 from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.rows.fit_rows import ROWS
 from joulepath.optimizer.problem.arm import Arm
 from tests.identification_logs import (
     GRAVITY,
@@ -108,6 +109,22 @@ def test_gains_of_sensors_are_not_taken_for_links() -> None:
     assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
     ratio = errors.fitted.torque.rmse / errors.own.torque.rmse
     assert (ratio[[3, 5]] < 0.1).all()
+
+
+@pytest.mark.parametrize("distance", [1e-5, 2e-3])
+def test_friction_of_bearings_reverses_over_the_distance_of_the_log(distance: float) -> None:
+    truth = truth_of(PANDA, 2)
+    recording = recorded(PANDA, truth, moves=14, seed=2)
+    drag = np.zeros_like(recording.q)
+    for row, step in enumerate(np.diff(recording.exact_q, axis=0), 1):
+        forward = np.sign(step)
+        drag[row] = forward + (drag[row - 1] - forward) * np.exp(-np.abs(step) / distance)
+    seen = rigid_torques(PANDA, truth, recording.q, recording.v, recording.a) + BEARING * drag
+    log = replace(recording, torque=seen).log("torque")
+    log = replace(log, torque_side="link", power=None)
+    sensor = identify(PANDA, [log], WITHOUT_SPLIT).fitted.arm.sensor
+    assert sensor is not None and ROWS.reversals[sensor.reversal] == distance
+    assert sensor.sensor_coulomb == pytest.approx([BEARING] * PANDA.nq, rel=0.05)
 
 
 def test_advice_asks_for_what_the_links_do_not_tell(heavier: tuple[Robot, Log]) -> None:
