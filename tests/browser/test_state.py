@@ -136,6 +136,15 @@ def test_each_mistake_leads_to_a_sentence_at_its_field(
     page.locator("#undo").click()
 
 
+def test_a_group_that_is_shut_opens_for_its_mistake(page: Page) -> None:
+    fill_json(page, {**FIRST, "gravity": [0, 0, -900]})
+    show_json(page, False)
+    group = page.locator("#more")
+    group.evaluate("(group) => { group.open = false; }")
+    page.locator("#optimise").click()
+    expect(group.get_by_text("greater than or equal to -100")).to_be_visible()
+
+
 def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) -> None:
     """A sentence at the button; what was typed is answered when the service is there again."""
     url = f"{service.url}/studio"
@@ -239,4 +248,7 @@ def test_a_part_of_known_size_needs_no_inertia(page: Page) -> None:
     assert state(page, "request.payload.com") == tcp
     expect(page.locator("[data-pointer='/payload/com/2']")).to_have_value("142.0")
     page.get_by_label("Shape of the payload").select_option("none")
+    type_into(page, "/payload/mass", "4.5")
+    expect(page.locator("#form")).to_contain_text("5.40 kg, gripper included, is more than")
+    type_into(page, "/payload/mass", "2")
     assert state(page, "request.payload") == {"mass": 2, "com": tcp, "shape": None}

@@ -94,7 +94,7 @@ function tail(keys: string[]): string[] {
   if (last === "size") return [`size ${AXES[Number(index)] ?? ""}`];
   if (last === "com") return [`centre of mass ${AXES[Number(index)] ?? ""}`];
   return keys
-    .filter((key) => !["target", "pose", "q"].includes(key))
+    .filter((key, k) => !["target", "pose", "q"].includes(key) && key !== keys[k - 1])
     .map((key) => NAMES[key] ?? words(key));
 }
 

@@ -5,6 +5,7 @@ import { at, put, type Pointer } from "../store/pointer";
 import { isObject } from "../store/request";
 import { edit, request } from "../store/state";
 import type { Stop } from "../store/types";
+import { OverRating } from "./OverRating";
 import { PayloadFields } from "./PayloadFields";
 
 type Deed = "same" | "takes" | "puts" | "passes";
@@ -94,6 +95,7 @@ export function StopFields({ pointer }: { pointer: Pointer }) {
               withUnit
             />
           </div>
+          <OverRating mass={at(request.value, `${pointer}/payload/mass`)} />
           <PayloadFields pointer={`${pointer}/payload`} />
         </>
       )}

@@ -1,7 +1,6 @@
 import { Button } from "../ui/Button";
 import { Errors } from "../ui/Errors";
 import { NumberCell } from "../ui/NumberCell";
-import { robotNow } from "../picture/pictured";
 import { untyped } from "../picture/drag";
 import { gripped } from "../store/load";
 import { at, join, put } from "../store/pointer";
@@ -10,6 +9,7 @@ import { edit, request, typed } from "../store/state";
 import type { Pose, Tool } from "../store/types";
 import { figure } from "../store/units";
 import { dressed, toolNow } from "../store/tools";
+import { OverRating } from "./OverRating";
 import { PayloadFields } from "./PayloadFields";
 import { PoseCells } from "./PoseCells";
 import { ToolPicker } from "./ToolPicker";
@@ -25,7 +25,6 @@ export function ToolPayload() {
   const [x = 0, y = 0, z = 0] = listOf<number>(tcp.position);
   const mass = at(asked, "/payload/mass");
   const count = listOf(at(asked, "/tool/capsules")).length;
-  const rated = robotNow.value?.limits.rated_payload?.value;
   return (
     <section class="section" aria-label="Tool and payload">
       <details class="fold" id="tool-fold">
@@ -66,11 +65,7 @@ export function ToolPayload() {
               : "nothing carried"}
         </small>
       </div>
-      {typeof mass === "number" && typeof rated === "number" && mass > rated && (
-        <p class="warning-text">
-          {figure(mass)} kg is more than a {robotNow.value?.title} may carry ({rated} kg).
-        </p>
-      )}
+      <OverRating mass={mass} />
       {isObject(asked.payload) && <PayloadFields pointer="/payload" />}
       <Errors under="/tool" />
       <Errors under="/tcp" />
