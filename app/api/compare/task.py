@@ -81,7 +81,8 @@ class MethodResult:
     excess: Ratio | None = None
     """Energy / energy of the best method - 1, of the objective."""
     optimality_gap: Ratio | None = None
-    """1 - lower_bound / energy of the objective; 0 if this energy is not positive."""
+    """energy of the objective / `lower_bound` - 1: the energy is at most by this share above the
+    least possible. Null if the bound is not positive."""
     wall_time: Seconds | None = None
     """Wall time of this method, on one core."""
     iterations: Count | None = None
