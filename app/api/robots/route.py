@@ -36,6 +36,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
+from joulepath.app.schemas.examples.bodies import JSON, TITLE_EXAMPLES
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
 from joulepath.models.form import link_bodies
@@ -174,6 +175,7 @@ async def put(
     responses=problem_responses(
         InvalidRequest, UnknownRobot, RobotExists, NotOwner, StoreUnavailable
     ),
+    openapi_extra={"requestBody": {"content": {JSON: {"examples": TITLE_EXAMPLES}}}},
 )
 async def rename(
     name: Name, body: RobotTitle, store: ServiceStore, client: ServiceClient
