@@ -1,10 +1,11 @@
-"""How far the capsules and the hulls of links reach beyond the meshes that they cover.
+"""How far the capsules and the hulls of links and tools reach beyond the meshes that they cover.
 
     python -m benchmarks.covers
-    python -m benchmarks.covers --meshes panda=FOLDER ur10e=FOLDER
+    python -m benchmarks.covers --meshes panda=FOLDER ur10e=FOLDER franka_hand=FOLDER
 
-FOLDER contains the meshes of a robot as `joulepath.models.meshes` describes. Without folders, the
-meshes of UR3e and UR5e are those of the package `airo-models`. For every moving link, the table has
+FOLDER contains the meshes of a robot as `joulepath.models.meshes` describes, or of the tool as
+`joulepath.models.fit_tool_hulls` does. Without folders, the meshes of UR3e and UR5e are those of
+the package `airo-models`. For every moving link, the table has
 the number of uncovered pieces of the meshes' triangles, and the excess: the distance of points of
 the cover's surface from the nearest point of any mesh of the link. The exit code is 1 if a hull
 leaves a piece uncovered or exceeds the limits below.
@@ -22,9 +23,11 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from benchmarks.command import on_one_core, parser, write_json
 from joulepath.models.capsule_cover import LinkCover, not_held, outside
+from joulepath.models.fit_tool_hulls import HAND, surfaces
 from joulepath.models.meshes import PANDA, SHIFTS, installed, link_surfaces, sampled
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, LinkHull
+from joulepath.models.robot import Array, LinkCapsule, LinkHull
+from joulepath.models.tools.registry import tool_figures
 
 # limits of the excess of hulls [m]: 99th percentile over the surface of an arm, and maximum
 P99, MOST = 3e-3, 8e-3
@@ -75,18 +78,48 @@ def beyond(covers: Sequence[LinkCover], meshes: Sequence[Array], rng: np.random.
 def of_robot(name: str, folder: Path, seed: int) -> list[Excess]:
     """The excess of all covers of a robot's moving links."""
     robot, rng, rows = load_robot(name), np.random.default_rng(seed), list[Excess]()
+    meshes = {
+        link: list(link_surfaces(folder, name, link).values()) for link in range(1, robot.nq + 1)
+    }
     for kind, covers in (("capsules", robot.capsules), ("hulls", robot.hulls)):
-        excess, own = list[Array](), list[Excess]()
-        for link in sorted({each.link for each in covers} - {0}):
-            of_link = [each for each in covers if each.link == link]
-            meshes = list(link_surfaces(folder, name, link).values())
-            missed = sum(len(not_held(each, of_link)) for each in meshes)
-            excess.append(beyond(of_link, meshes, rng))
-            own.append(_row(name, robot.link_names[link], kind, len(of_link), missed, excess[-1]))
+        of_links = {link: [each for each in covers if each.link == link] for link in meshes}
+        found = {
+            robot.link_names[link]: _found(
+                name, robot.link_names[link], kind, own, meshes[link], rng
+            )
+            for link, own in of_links.items()
+            if own
+        }
+        own = [row for row, _ in found.values()]
         if own:
             bodies, missed = (sum(getattr(r, key) for r in own) for key in ("bodies", "uncovered"))
-            rows += [*own, _row(name, "all", kind, bodies, missed, np.concatenate(excess))]
+            excess = np.concatenate([each for _, each in found.values()])
+            rows += [*own, _row(name, "all", kind, bodies, missed, excess)]
     return rows
+
+
+def of_tool(name: str, folder: Path, seed: int) -> list[Excess]:
+    """The excess of the capsules and of the hulls of a tool."""
+    value = {key: figure["value"] for key, figure in tool_figures(name).items() if key != "title"}
+    capsules = [LinkCapsule(0, np.reshape(row[:6], (2, 3)), row[6]) for row in value["capsules"]]
+    hulls = [LinkHull(0, np.array(each), value["hull_radius"]) for each in value["hulls"]]
+    meshes, rng = list(surfaces(folder)), np.random.default_rng(seed)
+    return [
+        _found(name, "all", kind, covers, meshes, rng)[0]
+        for kind, covers in (("capsules", capsules), ("hulls", hulls))
+    ]
+
+
+def _found(
+    name: str,
+    link: str,
+    kind: str,
+    covers: Sequence[LinkCover],
+    meshes: Sequence[Array],
+    rng: np.random.Generator,
+) -> tuple[Excess, Array]:
+    missed, excess = sum(len(not_held(m, covers)) for m in meshes), beyond(covers, meshes, rng)
+    return _row(name, link, kind, len(covers), missed, excess), excess
 
 
 def _row(name: str, link: str, kind: str, bodies: int, missed: int, excess: Array) -> Excess:
@@ -102,21 +135,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     given = command.parse_args(arguments)
     folders = {name: Path(folder) for name, _, folder in (e.partition("=") for e in given.meshes)}
-    if unknown := sorted(set(folders) - {*SHIFTS, PANDA}):
-        command.error(f"no meshes of {', '.join(unknown)} are read: {', '.join((*SHIFTS, PANDA))}")
+    if unknown := sorted(set(folders) - {*SHIFTS, PANDA, HAND}):
+        known = ", ".join((*SHIFTS, PANDA, HAND))
+        command.error(f"no meshes of {', '.join(unknown)} are read: {known}")
     on_one_core()
     if not folders:
         folders = {name: folder for name in SHIFTS if (folder := installed(name)) is not None}
     rows = list[Excess]()
     print(
-        f"{'robot':8}{'link':12}{'cover':10}{'bodies':>6}{'uncovered':>10}"
+        f"{'robot':12}{'link':12}{'cover':10}{'bodies':>6}{'uncovered':>10}"
         f"{'p50':>6}{'p99':>6}{'max':>6} mm"
     )
     for name, folder in folders.items():
-        for row in of_robot(name, folder, given.seed):
+        for row in (of_tool if name == HAND else of_robot)(name, folder, given.seed):
             rows.append(row)
             print(
-                f"{row.robot:8}{row.link:12}{row.kind:10}{row.bodies:6}{row.uncovered:10}"
+                f"{row.robot:12}{row.link:12}{row.kind:10}{row.bodies:6}{row.uncovered:10}"
                 f"{1e3 * row.p50:6.1f}{1e3 * row.p99:6.1f}{1e3 * row.maximum:6.1f}",
                 flush=True,
             )

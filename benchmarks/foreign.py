@@ -3,11 +3,13 @@
     python -m benchmarks.foreign FILE
     python -m benchmarks.foreign FILE --robot panda
     python -m benchmarks.foreign FILE --count 10 --seed 1 --families cage box --kinds joint
+    python -m benchmarks.foreign FILE --meshes FOLDER
 
 FILE is JSON in the format of docs/explained/foreign_scenes.md, which names sources of such sets.
 Every problem is asked with its goal as joint positions and as a pose, as a worker runs it: from the
-validated request, with a deadline. Pinocchio and Coal replay every answer at a period of 1 ms. The
-exit code is 1 if an answer collides.
+validated request, with a deadline. Pinocchio and Coal replay every answer at a period of 1 ms. With
+--meshes, a folder as `joulepath.models.meshes` describes, they replay the meshes of the links among
+the obstacles at 0.1 ms, too. The exit code is 1 if an answer collides.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -24,14 +26,16 @@ from typing import Any, Literal
 import numpy as np
 import orjson
 
-from benchmarks.collision_replay import collisions
+from benchmarks.collision_replay import collisions, mesh_collisions
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from joulepath import optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.meshes import link_surfaces
 from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import warm_up
 
@@ -39,6 +43,8 @@ Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")
 # deadline of a request, and period of the replay [s]
 DEADLINE, REPLAY = 10.0, 1e-3
+# period of the replay of meshes [s]
+MESH_REPLAY = 1e-4
 # robot of the problems, unless --robot names another
 ROBOT = "ur5e"
 # a gripper modelled for another arm reaches into the capsules of this many links next to it
@@ -121,7 +127,12 @@ def chosen(
     return found
 
 
-def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
+def run(
+    problem: ForeignProblem,
+    kind: Kind,
+    deadline: float,
+    meshes: Mapping[int, Sequence[Array]] | None = None,
+) -> Outcome:
     """Solves and replays one request."""
     began, used = time.perf_counter(), time.process_time()
 
@@ -139,12 +150,16 @@ def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
     best = min(
         (c for c in solution.candidates if c.energy is not None), key=lambda c: c.energy or 0.0
     )
+    spline = solution.trajectory.spline
+    hits = collisions(asked.arm, spline, REPLAY)
+    if meshes:
+        hits += mesh_collisions(asked.arm, meshes, spline, MESH_REPLAY)
     return outcome(
         **took,
         energy=solution.energy.of(asked.objective),
         duration=solution.duration,
         reason=best.reason,
-        collisions=collisions(asked.arm, solution.trajectory.spline, REPLAY),
+        collisions=hits,
     )
 
 
@@ -228,14 +243,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command.add_argument(
         "--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)"
     )
+    command.add_argument("--meshes", type=Path, metavar="FOLDER", help="meshes of the robot")
     given = command.parse_args(arguments)
     problems = selected(command, given)
+    meshes: dict[int, list[Array]] = {}
+    if given.meshes is not None:
+        meshes = {
+            link: list(link_surfaces(given.meshes, given.robot, link).values())
+            for link in range(1, load_robot(given.robot).nq + 1)
+        }
     on_one_core()
     warm_up(given.robot)
     outcomes: list[Outcome] = []
     for problem in problems:
         for kind in given.kinds:
-            found = run(problem, kind, given.deadline)
+            found = run(problem, kind, given.deadline, meshes)
             outcomes.append(found)
             if given.verbose:
                 result = found.problem or f"{found.energy:.2f} J"

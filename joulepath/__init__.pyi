@@ -90,6 +90,7 @@ from .optimizer.problem.clouds import Points, TriangleMesh, Voxels
 from .optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from .optimizer.problem.cycle import Cycle
 from .optimizer.problem.dwell import Dwell
+from .optimizer.problem.even_body import even_payload
 from .optimizer.problem.free_order import FreeOrder
 from .optimizer.problem.line import Line
 from .optimizer.problem.pose import Pose
@@ -327,6 +328,7 @@ __all__ = [
     "capsule_between",
     "compare",
     "evaluate",
+    "even_payload",
     "export",
     "identify",
     "inverse_kinematics",

@@ -1,9 +1,10 @@
 """Triangles of the meshes covered by the capsules of a robot, in link frames.
 
-The meshes are not part of this package. For arms of Universal Robots, a folder contains
-`visual/NAME.obj` and `collision/NAME.obj`, like the package `airo-models` on PyPI with the meshes
-of the maker's description. For the Panda, it contains `visual/linkK.dae` and
-`collision/linkK.stl`, like meshes/robot_arms/fer in github.com/frankaemika/franka_description.
+The meshes are not part of this package. A folder contains `visual/NAME` and `collision/NAME`, each
+as OBJ, STL or COLLADA. For arms of Universal Robots, these are the folders of the package
+`airo-models` on PyPI, or meshes/ur10e in
+github.com/UniversalRobots/Universal_Robots_ROS2_Description. For the Panda, they are
+meshes/robot_arms/fer in github.com/frankaemika/franka_description.
 """
 
 from __future__ import annotations
@@ -61,15 +62,14 @@ def mesh_placement(robot: str, link: int) -> pin.SE3:
 
 
 def link_surfaces(folder: Path, robot: str, link: int) -> dict[str, Array]:
-    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link. `robot` is one of SHIFTS
-    or PANDA; of the visual meshes of the latter, the triangles of the convex hull.
+    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link; of a COLLADA file, the
+    triangles of its convex hull. `robot` is one of SHIFTS or PANDA.
     """
     if robot == PANDA:
-        return {"visual": _hull_of_dae(folder, link), "collision": _stl(folder, link)}
+        return {kind: surface(folder / kind / f"link{link}") for kind in KINDS}
     T = mesh_placement(robot, link)
     return {
-        kind: _triangles(mesh_file(folder, kind, link)) @ T.rotation.T + T.translation
-        for kind in KINDS
+        kind: surface(folder / kind / _FILES[link]) @ T.rotation.T + T.translation for kind in KINDS
     }
 
 
@@ -98,14 +98,24 @@ def _triangles(path: Path) -> Array:
     return np.asarray(np.array(vertices)[np.array(faces)])
 
 
-def _stl(folder: Path, link: int) -> Array:
-    corners, triangles = read_mesh(
-        "stl", (folder / "collision" / f"link{link}.stl").read_bytes(), MeshSize()
-    )
+def surface(stem: Path) -> Array:
+    """Triangles (t, 3, 3) of the mesh file with this path, whatever its suffix is; of a COLLADA
+    file, those of its convex hull.
+    """
+    for suffix, read in _READERS.items():
+        if (path := stem.with_suffix(suffix)).is_file():
+            return read(path)
+    raise FileNotFoundError(f"no mesh {stem} as {', '.join(_READERS)}")
+
+
+def _stl(path: Path) -> Array:
+    corners, triangles = read_mesh("stl", path.read_bytes(), MeshSize())
     return np.asarray(corners[triangles])
 
 
-def _hull_of_dae(folder: Path, link: int) -> Array:
-    content = (folder / "visual" / f"link{link}.dae").read_bytes()
-    corners = collada_corners(content, MeshSize(), unwatched)
+def _hull_of_dae(path: Path) -> Array:
+    corners = collada_corners(path.read_bytes(), MeshSize(), unwatched)
     return np.asarray(corners[ConvexHull(corners).simplices])
+
+
+_READERS = {".obj": _triangles, ".stl": _stl, ".dae": _hull_of_dae}

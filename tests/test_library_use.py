@@ -24,6 +24,7 @@ FUNCTIONS = {
     "capsule_between",
     "compare",
     "evaluate",
+    "even_payload",
     "export",
     "identify",
     "inverse_kinematics",

@@ -6,14 +6,15 @@ import click
 
 from joulepath.app.cli.service import SERVICE, answered, connect
 
-KINDS = ("answers", "jobs", "studies", "logs", "identifications")
+KINDS = ("answers", "jobs", "studies", "logs", "identifications", "robots")
 
 
 @click.command(
     epilog="""\b
 Examples:
   joulepath rename jobs 9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60 'Night run, cell 4'
-  joulepath rename logs 9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60"""
+  joulepath rename logs 9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60
+  joulepath rename robots my_arm 'Palletiser, hall 2'"""
 )
 @SERVICE
 @click.argument("kind", type=click.Choice(KINDS))
@@ -23,7 +24,7 @@ Examples:
 def rename(
     context: click.Context, url: str, key: str | None, kind: str, id: str, name: str | None
 ) -> None:
-    """Gives what a service keeps under ID another NAME, or none.
+    """Gives what a service keeps under ID another NAME, or none. The NAME of a robot is its title.
 
     This command needs a service that runs, and the extra `client` of the package.
     """

@@ -306,14 +306,15 @@ class Client:
         """Give another name to something that the service keeps: `PATCH` of its path.
 
         Args:
-            path: its path, such as `/jobs/ID`, `/studies/ID`, `/logs/ID`, `/identifications/ID`, or
-                the field `answer` of an answer.
-            name: the name; None for none.
+            path: its path, such as `/jobs/ID`, `/studies/ID`, `/logs/ID`, `/identifications/ID`,
+                `/robots/NAME`, or the field `answer` of an answer.
+            name: the name; None for none. Of a robot it is the title.
 
         Returns:
             What is renamed, as lists show it.
         """
-        return self._json("PATCH", path, json={"name": name})
+        field = "title" if path.startswith("/robots/") else "name"
+        return self._json("PATCH", path, json={field: name})
 
     def _listed(self, name: str) -> Iterator[Json]:
         """The entries of all pages of a list."""

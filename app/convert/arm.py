@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from joulepath.optimizer.problem.arm import (
     Payload,
 )
 from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.even_body import even_payload
 from joulepath.optimizer.problem.tool_cone import ToolCone
 
 
@@ -86,10 +88,21 @@ def to_payload(payload: asked.Payload | None) -> Payload:
     """The payload of the library; without mass if there is none. Raises InvalidProblem."""
     if payload is None:
         return Payload()
-    ixx, ixy, ixz, iyy, iyz, izz = payload.inertia or [0.0] * 6
-    inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
     shape = None if payload.shape is None else to_attachment(payload.shape, payload.touches)
-    return Payload(payload.mass, np.array(payload.com), inertia, shape)
+    if payload.com is None and shape is not None:
+        body = even_payload(payload.mass, shape)
+    else:
+        body = Payload(payload.mass, np.array(payload.com or [0.0] * 3), shape=shape)
+    if payload.inertia is None:
+        return body
+    ixx, ixy, ixz, iyy, iyz, izz = payload.inertia
+    return replace(body, inertia=np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]))
+
+
+def inertia_row(payload: Payload) -> list[float]:
+    """The inertia of a payload as in requests."""
+    inertia: list[float] = payload.inertia[np.triu_indices(3)].tolist()
+    return inertia
 
 
 def to_limits(limits: asked.MoveLimits, robot: Robot) -> Limits:

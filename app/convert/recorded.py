@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from joulepath.app.api.logs.request import LogSettings
-from joulepath.app.convert.arm import robot_named, to_payload
+from joulepath.app.convert.arm import inertia_row, robot_named, to_payload
 from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
@@ -142,8 +142,4 @@ def told_by(log: Log, asked: S) -> S:
 def _payload(payload: library.Payload) -> Payload | None:
     if payload.mass == 0:
         return None
-    inertia = payload.inertia
-    rows = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-    return Payload(
-        mass=payload.mass, com=payload.com.tolist(), inertia=[float(inertia[at]) for at in rows]
-    )
+    return Payload(mass=payload.mass, com=payload.com.tolist(), inertia=inertia_row(payload))

@@ -49,15 +49,17 @@ class Payload(Request):
     """A body that is fixed to the flange."""
 
     mass: float = described("Mass.", "kg", 2.0, ge=0, le=1e3)
-    com: Vector3 = described(
-        "Centre of mass in the flange frame. Required unless `mass` is 0.",
+    com: Vector3 | None = described(
+        "Centre of mass in the flange frame. Null: that of a body of one density that fills "
+        "`shape`. Required unless there is a `shape` or `mass` is 0.",
         "m",
         [0.0, 0.0, 0.05],
-        default=[0.0, 0.0, 0.0],
+        default=None,
     )
     inertia: list[float] | None = described(
         "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, "
-        "iyz, izz]. Null: a point mass.",
+        "iyz, izz]. Null: that of a body of one density that fills `shape` if `com` is null too, "
+        "else a point mass.",
         "kg·m²",
         [0.004, 0.0, 0.0, 0.004, 0.0, 0.003],
         default=None,
@@ -74,7 +76,7 @@ class Payload(Request):
 
     @model_validator(mode="after")
     def _has_a_centre(self) -> Self:
-        if self.mass > 0 and "com" not in self.model_fields_set:
+        if self.mass > 0 and self.com is None and self.shape is None:
             missing = InitErrorDetails(
                 type="missing", loc=("com",), input=self.model_dump(exclude_unset=True)
             )

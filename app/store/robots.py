@@ -60,6 +60,13 @@ def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
     return True
 
 
+def rename(session: Session, name: str, title: str | None, client: Client) -> OwnRobot:
+    """Gives a robot another title; None for its name. Raises the errors of `delete`."""
+    robot = _of_client(session, name, client)
+    robot.figures = robot.figures | {"title": title or name}
+    return robot
+
+
 def delete(session: Session, name: str, client: Client) -> None:
     """Deletes a robot.
 
@@ -68,12 +75,16 @@ def delete(session: Session, name: str, client: Client) -> None:
         UnknownRobot: there is no such robot; the error has the names of added robots.
         NotOwner: the robot belongs to another client.
     """
+    session.delete(_of_client(session, name, client))
+
+
+def _of_client(session: Session, name: str, client: Client) -> OwnRobot:
     check_own(name)
     robot = session.get(OwnRobot, name)
     if robot is None:
         raise UnknownRobot(name, _own_names(session))
     check_owner(client, robot.owner)
-    session.delete(robot)
+    return robot
 
 
 def _check_count(session: Session, most: int) -> None:

@@ -12,8 +12,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from joulepath.app.convert.arm import to_arm
-from joulepath.app.schemas.arm import ArmRequest
+from joulepath.app.convert.arm import inertia_row, to_arm, to_payload
+from joulepath.app.schemas.arm import ArmRequest, Payload
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
@@ -179,8 +179,13 @@ def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Pro
 
 def _payload(base: Base) -> Iterator[Proposal]:
     payload = base.request.get("payload")
-    if payload and payload["mass"] and any(payload["com"]):
-        nearer = payload | {"com": [SUGGESTIONS.nearer * part for part in payload["com"]]}
+    if not payload or not payload["mass"]:
+        return
+    body = to_payload(Payload.model_validate(payload))
+    if body.com.any():
+        nearer = payload | {"com": (SUGGESTIONS.nearer * body.com).tolist()}
+        if payload.get("com") is None:  # the inertia of the shape would be lost
+            nearer["inertia"] = inertia_row(body)
         yield Proposal(
             "payload",
             "Grip the payload so that its centre of mass is at half its present distance from the "

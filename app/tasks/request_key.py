@@ -41,11 +41,13 @@ def cell_of(body: CycleRequest) -> str:
 def key_of(
     meaning: Meaning, owner: str | None, own_robot: dict[str, Any] | None, job_id: str | None = None
 ) -> str:
-    """The key of a request of `owner`; `own_robot` are the figures of an added robot.
+    """The key of a request of `owner`; `own_robot` are the figures of an added robot, whose title
+    changes no answer.
 
     With a `job_id`, it differs from the keys of all other jobs.
     """
-    return _hash([meaning["digest"], owner, own_robot, job_id])
+    own = {name: each for name, each in (own_robot or {}).items() if name != "title"}
+    return _hash([meaning["digest"], owner, own or None, job_id])
 
 
 def _hash(content: Any) -> str:

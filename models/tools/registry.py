@@ -13,6 +13,8 @@ from joulepath.models.registry import LOADER
 _ENDING = ".yaml"
 FIGURES = ("mass", "center_of_mass", "inertia", "tcp", "capsules")
 """Names of the figures of every tool."""
+HULL_FIGURES = ("hulls", "hull_radius")
+"""Names of further figures, of tools whose meshes are public."""
 
 
 @cache

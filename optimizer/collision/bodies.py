@@ -24,9 +24,9 @@ class Body:
     """Core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
 
     Other bodies must keep a distance of at least `margin` [m]. `touches` are the links that the
-    body touches by design. A body with `is_hull` is the hull of a link: it is compared with
-    obstacles in place of the link's capsules. A body with a `cloud` is its patch `patch`; the core
-    is then only a box around it, with the radius of its parts.
+    body touches by design. A body with `is_hull` is a hull of a link or tool: it is compared with
+    obstacles in place of the capsules of this name and link. A body with a `cloud` is its patch
+    `patch`; the core is then only a box around it, with the radius of its parts.
     """
 
     name: str
@@ -70,8 +70,8 @@ class Body:
 
 
 def bodies_of(arm: Arm) -> tuple[Body, ...]:
-    """Bodies of an arm: the capsules of the robot, then tool and payload, then the hulls of the
-    robot if there is any obstacle, then the obstacles of the scene.
+    """Bodies of an arm: the capsules of the robot, then tool and payload, then the hulls of robot
+    and tool if there is any obstacle, then the obstacles of the scene.
     """
     robot, last = arm.robot, arm.robot.last_link
     T_last_flange = robot.T_last_flange
@@ -86,11 +86,14 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
             core_of(p.shape),
             T_last_flange @ p.T_flange_shape,
             touches=_touched(p, robot),
+            is_hull=p.is_hull,
         )
         for name, p in parts
     ]
+    of_tool = [body for body in attached if not body.is_hull]
+    hulls = [*hulls, *(body for body in attached if body.is_hull)]
     obstacles = [body for obstacle in arm.scene.obstacles for body in _bodies_of_obstacle(obstacle)]
-    return (*capsules, *attached, *(hulls if obstacles else ()), *obstacles)
+    return (*capsules, *of_tool, *(hulls if obstacles else ()), *obstacles)
 
 
 @lru_cache(MOST_ROBOTS)

@@ -163,12 +163,56 @@ class CompiledDistances:
         self._call(library.gradients, frames, configuration, pair, normal, point, result)
         return result
 
+    def clearance_check(self, placements: Array, pairs: Indices, reserve: float) -> ClearanceCheck:
+        """A check whether all of `pairs` (p,) are at least `reserve` [m] apart; `placements`
+        (nq, 4, 4) are those of `link_frames`. The pairs are none of clouds.
+        """
+        return ClearanceCheck(self._shapes, self._kept, placements, pairs, reserve)
+
     def _call(self, function: Any, frames: Array, *arrays: Array | Indices) -> None:
         """Calls a function of as many cases as the arrays are long; the last arrays are its
         results.
         """
         arguments = [_plain(array) for array in (frames, *arrays)]
         function(self._of, address(arguments[0]), len(arguments[1]), *map(address, arguments[1:]))
+
+
+class ClearanceCheck:
+    """Checks one configuration after the other. Not for several threads at once.
+
+    A check ends at the first pair that is too near, and begins with the one at which the last check
+    ended. The search for a direction that separates two convex bodies begins along the last one.
+
+    Attributes:
+        frames: T_base_link (nq + 1, 4, 4) [m] of all links at the last configuration.
+    """
+
+    def __init__(
+        self,
+        shapes: _Shapes,
+        kept: list[Array | Indices],
+        placements: Array,
+        pairs: Indices,
+        reserve: float,
+    ) -> None:
+        self.frames = np.empty((shapes.frames, 4, 4))
+        self._q, last = np.empty(len(placements)), np.zeros(1, dtype=np.intp)
+        given, workspace = (_plain(placements), _plain(pairs)), np.empty((shapes.bodies, 3))
+        directions = np.zeros((len(pairs), 3))
+        self._kept = shapes, kept, given, directions, last, workspace
+        self._arguments = (
+            ctypes.addressof(shapes),
+            *map(address, (given[0], self._q)),
+            len(pairs),
+            address(given[1]),
+            reserve,
+            *map(address, (self.frames, directions, last, workspace)),
+        )
+
+    def is_met(self, q: Array) -> bool:
+        """Whether the pairs are far enough apart at q (nq,) [rad] of the chain."""
+        self._q[:] = q
+        return bool(library.keeps_clear(*self._arguments))
 
 
 def _plain(array: Array | Indices) -> Array | Indices:

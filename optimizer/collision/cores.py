@@ -76,7 +76,7 @@ def core_of(shape: Shape) -> Core:
         case HalfSpace():
             return Core(np.zeros((1, 3)), is_half_space=True)
         case Mesh():
-            return Core(shape.vertices)
+            return Core(shape.vertices, shape.radius)
         case Points() | Voxels() | TriangleMesh():
             raise TypeError(f"{type(shape).__name__} is no convex shape")
         case _:

@@ -14,6 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import MOST_ROBOTS, Array, Mask, Robot
 from joulepath.optimizer.collision.bodies import Body, Indices, bodies_of
+from joulepath.optimizer.collision.compiled_distances import ClearanceCheck
 from joulepath.optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from joulepath.optimizer.declared import Metres
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
@@ -52,8 +53,8 @@ class CollisionModel:
 
     Two links are checked unless they are adjacent or can never be in collision. Tool and payload
     are checked against all links except the links that they touch by design. The scene is checked
-    against every moving body; of a link with a hull, its hull is checked, except against clouds,
-    and its capsules otherwise. All distances have the margin of the obstacle subtracted.
+    against every moving body; of a link or a tool with hulls, these are checked, except against
+    clouds, and its capsules otherwise. All distances have the margin of the obstacle subtracted.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -75,6 +76,12 @@ class CollisionModel:
     def frames(self, q: Array) -> Array:
         """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad]."""
         return link_frames(self._placements, self.coupling.positions(q))
+
+    def clearance_check(self, reserve: float) -> ClearanceCheck:
+        """A check whether all pairs without clouds are at least `reserve` [m] apart, for one
+        configuration after the other.
+        """
+        return self.geometry.clearance_check(self._placements, reserve)
 
     def signed_distances(self, q: Array, within: float = np.inf) -> tuple[Array, Array]:
         """Signed distances (n, p) [m] of every pair at q (n, nq) [rad], and their gradients (n, p,
@@ -278,7 +285,7 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
     links = range(len(arm.robot.capsules))
     moving = [k for k, body in enumerate(bodies) if body.link > 0 or k in links]
     obstacles = [k for k, body in enumerate(bodies) if body.link == 0 and k not in links]
-    with_hull = {body.link for body in bodies if body.is_hull}
+    with_hull = {(body.name, body.link) for body in bodies if body.is_hull}
     pairs: list[tuple[int, int]] = []
     for k in moving:
         body = bodies[k]
@@ -293,10 +300,11 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
             ]
         else:
             others = [i for i in links if bodies[i].link not in body.touches]
-        if k not in links:
-            others += [i for i in obstacles if not (body.is_hull and bodies[i].cloud)]
-        elif body.link > 0:
-            others += [i for i in obstacles if bodies[i].cloud or body.link not in with_hull]
+        if body.link > 0:
+            replaced = (body.name, body.link) in with_hull and not body.is_hull
+            others += [
+                i for i in obstacles if not (replaced if bodies[i].cloud is None else body.is_hull)
+            ]
         pairs += [(i, k) for i in others]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 

@@ -17,7 +17,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Body, Indices
 from joulepath.optimizer.collision.cloud_pairs import CloudPairs
 from joulepath.optimizer.collision.coal_distance import ConvexPairs
-from joulepath.optimizer.collision.compiled_distances import CompiledDistances
+from joulepath.optimizer.collision.compiled_distances import ClearanceCheck, CompiledDistances
 from joulepath.optimizer.collision.pair_arrays import PairArrays, PairKind
 
 
@@ -180,6 +180,11 @@ class PairGeometry:
             lowest = [self._compiled.supports(frames, at, second, normal) for at in at_both]
             best = np.maximum(best, np.minimum(*lowest) - highest)
         return np.asarray(best)
+
+    def clearance_check(self, placements: Array, reserve: float) -> ClearanceCheck:
+        """A check of all pairs without clouds, see `CompiledDistances.clearance_check`."""
+        pairs = np.flatnonzero(~self.is_cloud)
+        return self._compiled.clearance_check(placements, pairs, reserve)
 
     def gradients(
         self, frames: Array, configuration: Indices, pair: Indices, witness: WitnessPoints

@@ -123,17 +123,22 @@ static int reduce(Simplex *simplex, double *nearest) {
 
 /* Distance [m] of the cores of two bodies, unit normal from the first to the second, and the nearest point of the
    second. NAN if the cores touch or overlap, or if the search does not end. INFINITY as soon as they are proven to be
-   farther apart than `within`: normal and point are then those of an early step. */
+   farther apart than `within`: normal and point are then those of an early step. An upper bound as soon as that is at
+   most `enough`. The search begins along `direction`, unless that is zero, and leaves its last direction there: both
+   are in the frame of the first body's link. */
 static double convex_convex(const Shapes *shapes, const double *frames, long configuration, long first, long second,
-                            double within, double *normal, double *point) {
+                            double within, double enough, double *direction, double *normal, double *point) {
   const double *A = frame_of(shapes, frames, configuration, first);
   const double *B = frame_of(shapes, frames, configuration, second);
-  double x[3], at[3], v[3], before = INFINITY;
-  place(B, shapes->ball_centres + 3 * second, x);
-  into(A, x, v);
-  for (int i = 0; i < 3; ++i) v[i] -= shapes->ball_centres[3 * first + i];
+  double x[3], at[3], *v = direction, before = INFINITY;
+  if (dot(v, v) < NONE) {
+    place(B, shapes->ball_centres + 3 * second, x);
+    into(A, x, v);
+    for (int i = 0; i < 3; ++i) v[i] -= shapes->ball_centres[3 * first + i];
+  }
   if (dot(v, v) < NONE) v[0] = 1.0;
-  Simplex simplex = {0};
+  Simplex simplex;
+  simplex.count = 0;
   for (int step = 0; step < MOST_STEPS; ++step) {
     double along[3], in_base[3], in_second[3];
     farthest(shapes, first, v, at);
@@ -146,7 +151,7 @@ static double convex_convex(const Shapes *shapes, const double *frames, long con
     into(A, x, corner->second);
     for (int i = 0; i < 3; ++i) corner->difference[i] = corner->second[i] - at[i];
     const double squared = dot(v, v), distance = sqrt(squared), bound = dot(v, corner->difference) / distance;
-    const int ends = simplex.count > 0 && distance - bound <= GAP;
+    const int ends = simplex.count > 0 && (distance - bound <= GAP || distance <= enough);
     if (ends || bound > within) {
       double nearest[3] = {0.0, 0.0, 0.0}, away[3];
       for (int k = 0; k < simplex.count; ++k)

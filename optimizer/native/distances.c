@@ -63,6 +63,20 @@ static double bead_bound(const Shapes *shapes, const double *frames, long config
   return bound > 0 ? bound : -INFINITY;
 }
 
+/* Lower bound [m] on the distance of the cores of a pair by balls around them, with centres (bodies, 3) in the base
+   frame. */
+static double ball_bound(const Shapes *shapes, const double *centre, long pair) {
+  const long first = shapes->first[pair], second = shapes->second[pair];
+  double across[3];
+  if (shapes->kinds[pair] == HALF_SPACE) {
+    const double *origin = shapes->points + 3 * shapes->most_points * first;
+    for (int i = 0; i < 3; ++i) across[i] = centre[3 * second + i] - origin[i];
+    return dot(across, shapes->axes + 3 * first) - shapes->ball_radii[second];
+  }
+  for (int i = 0; i < 3; ++i) across[i] = centre[3 * second + i] - centre[3 * first + i];
+  return sqrt(dot(across, across)) - shapes->ball_radii[first] - shapes->ball_radii[second];
+}
+
 /* Lower bounds (n, p) on the distances of pairs (p), at first those in `distance` if `known`. Where they are at most
    `within`, balls improve them, and beads if `within` is finite. Returns how many are left at most as great: their
    `row` and `column`. `centre` has room for (bodies, 3). */
@@ -77,13 +91,7 @@ long bounds(const Shapes *shapes, long n, const double *frames, long p, const lo
       double *at = distance + c * p + k;
       if (known && *at > within) continue;
       double bound = -INFINITY;
-      if (shapes->kinds[pair] != HALF_SPACE) {
-        const long first = shapes->first[pair], second = shapes->second[pair];
-        double across[3];
-        for (int i = 0; i < 3; ++i) across[i] = centre[3 * second + i] - centre[3 * first + i];
-        const double radii = shapes->ball_radii[first] + shapes->ball_radii[second] + shapes->growth[pair];
-        bound = sqrt(dot(across, across)) - radii;
-      }
+      if (shapes->kinds[pair] != HALF_SPACE) bound = ball_bound(shapes, centre, pair) - shapes->growth[pair];
       *at = known ? greater(*at, bound) : bound;
       if (*at > within) continue;
       if (isfinite(within)) {
@@ -283,33 +291,39 @@ static double half_space(const Shapes *shapes, const double *frames, long config
 
 #include "convex.c"
 
+/* Signed distance, normal and point (3) of a pair; `within`, `enough` and `direction` are those of `convex_convex`.
+   NAN where Coal or a cloud computes it. */
+static double pair_distance(const Shapes *shapes, const double *frames, long c, long pair, double within, double enough,
+                            double *direction, double *normal, double *point) {
+  const long first = shapes->first[pair], second = shapes->second[pair];
+  double found = NAN, a[6], b[6];
+  switch (shapes->kinds[pair]) {
+    case SEGMENT_SEGMENT:
+      segment_ends(shapes, frames, c, first, a);
+      segment_ends(shapes, frames, c, second, b);
+      return segment_segment(a, b, normal, point);
+    case BOX_SEGMENT:
+      return box_and_segment(shapes, frames, c, first, second, normal, point);
+    case SEGMENT_BOX:
+      found = box_and_segment(shapes, frames, c, second, first, normal, point);
+      for (int i = 0; i < 3; ++i) normal[i] = -normal[i];
+      return found;
+    case HALF_SPACE:
+      return half_space(shapes, frames, c, first, second, normal, point);
+    case CONVEX:
+      return convex_convex(shapes, frames, c, first, second, within, enough, direction, normal, point);
+  }
+  return found;
+}
+
 /* Signed distances (k), normals and points (k, 3) of pairs (k) at configurations (k). NAN where Coal or a cloud computes
    them; INFINITY for convex cores without a closed form that are farther apart than `within` and the pair's growth. */
 void witness_points(const Shapes *shapes, const double *frames, long k, const long *configuration, const long *pair,
                     double within, double *distance, double *normal, double *point) {
-  for (long j = 0; j < k; ++j, normal += 3, point += 3) {
-    const long c = configuration[j], first = shapes->first[pair[j]], second = shapes->second[pair[j]];
-    double found = NAN, a[6], b[6];
-    switch (shapes->kinds[pair[j]]) {
-      case SEGMENT_SEGMENT:
-        segment_ends(shapes, frames, c, first, a);
-        segment_ends(shapes, frames, c, second, b);
-        found = segment_segment(a, b, normal, point);
-        break;
-      case BOX_SEGMENT:
-        found = box_and_segment(shapes, frames, c, first, second, normal, point);
-        break;
-      case SEGMENT_BOX:
-        found = box_and_segment(shapes, frames, c, second, first, normal, point);
-        for (int i = 0; i < 3; ++i) normal[i] = -normal[i];
-        break;
-      case HALF_SPACE:
-        found = half_space(shapes, frames, c, first, second, normal, point);
-        break;
-      case CONVEX:
-        found = convex_convex(shapes, frames, c, first, second, within + shapes->growth[pair[j]], normal, point);
-    }
-    distance[j] = found;
+  for (long j = 0; j < k; ++j) {
+    double direction[3] = {0.0, 0.0, 0.0};
+    distance[j] = pair_distance(shapes, frames, configuration[j], pair[j], within + shapes->growth[pair[j]], -INFINITY,
+                                direction, normal + 3 * j, point + 3 * j);
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "chain.c"
 #include "distances.c"
+#include "clearance_check.c"
 #include "grid_points.c"
 #include "least_potential.c"
 #include "speed_conjugate.c"

@@ -332,5 +332,7 @@ class Arm:
         if mass > self.robot.rated_payload:
             rating = self.robot.rated_payload
             raise InvalidProblem(
-                field, f"{field} exceeds the robot's rating: give at most {rating:g} kg."
+                field,
+                f"{field} exceeds the robot's rating: the arm would carry {mass:g} kg and may carry "
+                f"{rating:g} kg, a tool given by name included.",
             )

@@ -81,13 +81,14 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Convex hull of `vertices` (n, 3) [m].
+    """Convex hull of `vertices` (n, 3) [m], grown by `radius` [m].
 
     Raises:
         InvalidProblem: the vertices lie in a plane, or close together.
     """
 
     vertices: Array
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
         vertices = frozen(self.vertices, (-1, 3), "vertices")
@@ -141,6 +142,8 @@ class Attachment:
         T_flange_shape: its pose in the flange frame, shape (4, 4).
         touches: names of the links it touches by design, with unchecked distances; None for the
             link of the flange.
+        is_hull: whether it covers the tool more closely than the parts without this mark: in their
+            place, it is compared with obstacles, except clouds.
 
     Raises:
         InvalidProblem: the shape cannot be carried, or a value is malformed.
@@ -149,6 +152,7 @@ class Attachment:
     shape: Shape
     T_flange_shape: Array = field(default_factory=lambda: np.eye(4))
     touches: Sequence[str] | None = None
+    is_hull: bool = False
 
     def __post_init__(self) -> None:
         if isinstance(self.shape, HalfSpace):

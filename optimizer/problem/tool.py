@@ -13,7 +13,7 @@ from joulepath.models.tools.registry import tool_figures, tool_names
 from joulepath.optimizer.exceptions import UnknownTool
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.scene import Attachment, capsule_between
+from joulepath.optimizer.problem.scene import Attachment, Mesh, capsule_between
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Tool:
     title: str
     """Manufacturer and model."""
     shape: tuple[Attachment, ...]
-    """Capsules that represent the tool in the collision model."""
+    """Capsules, and hulls if any, that represent the tool in the collision model."""
     body: Payload
     """Mass, centre of mass and inertia of the tool itself."""
     T_flange_tcp: Array
@@ -82,9 +82,15 @@ def load_tool(name: str) -> Tool:
     return Tool(
         name=name,
         title=figures["title"],
-        shape=tuple(
-            capsule_between(np.array(row[:3]), np.array(row[3:6]), row[6], None)
-            for row in value["capsules"]
+        shape=(
+            *(
+                capsule_between(np.array(row[:3]), np.array(row[3:6]), row[6], None)
+                for row in value["capsules"]
+            ),
+            *(
+                Attachment(Mesh(np.array(points), value["hull_radius"]), is_hull=True)
+                for points in value.get("hulls", ())
+            ),
         ),
         body=Payload(
             value["mass"],

@@ -10,6 +10,7 @@ from uuid import uuid4
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.registry import load_robot
 from tests.app.job_clients import evaluation
 from tests.app.live import CLIENT, Server
@@ -49,9 +50,16 @@ def add_study(service: Server) -> str:
     return str(service.post("/studies", {"name": "A study", "threshold": 60.0}).json()["id"])
 
 
+def add_robot(service: Server) -> str:
+    name = f"arm_{uuid4().hex[:6]}"
+    assert service.post("/robots", {"name": name, **ARM}).status_code == 201
+    return name
+
+
 KEPT: dict[str, tuple[Callable[[Server], str], str, str, str]] = {
     # how it is made, its page, its list, and the field that searches it
     "studies": (add_study, "Library", "#studies li", "Search studies"),
+    "robots": (add_robot, "Library", "#own-robots li", "Search your robots"),
     "jobs": (add_job, "Jobs", "#jobs .side li", "Search jobs"),
     "logs": (add_log, "Logs", "#logs .side ul:first-of-type li", "Search logs and identifications"),
     "identifications": (
@@ -77,7 +85,7 @@ def test_it_is_renamed_found_and_deleted(browser: Browser, service: Server, thin
         rename(page, row, name)
         expect(page.locator(rows, has_text=name)).to_have_count(1)
         told: dict[str, Any] = service.get(path).json()
-        assert told["name"] == name
+        assert told["title" if things == "robots" else "name"] == name
         page.get_by_label(search).fill(name.upper())
         expect(page.locator(rows)).to_have_count(1)
         expect(page.locator(rows)).to_contain_text(name)

@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.schemas.arm import ArmRequest
+from joulepath.optimizer.problem.tool import load_tool
 from tests.app.live import Server
 from tests.browser.pages import (
     FIRST,
@@ -133,6 +136,15 @@ def test_each_mistake_leads_to_a_sentence_at_its_field(
     page.locator("#undo").click()
 
 
+def test_a_group_that_is_shut_opens_for_its_mistake(page: Page) -> None:
+    fill_json(page, {**FIRST, "gravity": [0, 0, -900]})
+    show_json(page, False)
+    group = page.locator("#more")
+    group.evaluate("(group) => { group.open = false; }")
+    page.locator("#optimise").click()
+    expect(group.get_by_text("greater than or equal to -100")).to_be_visible()
+
+
 def test_without_the_service_nothing_is_lost(browser: Browser, service: Server) -> None:
     """A sentence at the button; what was typed is answered when the service is there again."""
     url = f"{service.url}/studio"
@@ -207,3 +219,36 @@ def test_a_gripper_by_name_is_seen_and_counts(page: Page) -> None:
     page.locator("#undo").click()
     page.locator("#tool").select_option("")
     assert state(page, "request.tool") is None
+
+
+def test_a_part_of_known_size_needs_no_inertia(page: Page) -> None:
+    """It is gripped at the TCP, and its program sets the part and the gripper as one payload."""
+    fill_json(page, {"start": FIRST["start"], "goal": FIRST["goal"], "tool": "robotiq_2f_85"})
+    show_json(page, False)
+    expect(page.locator("[data-pointer='/tcp/position/2']")).to_have_value("142.0")
+    type_into(page, "/payload/mass", "2")
+    tcp = load_tool("robotiq_2f_85").T_flange_tcp[:3, 3].tolist()
+    assert state(page, "request.payload") == {"mass": 2, "com": tcp}
+    page.locator(".payload-form > summary").click()
+    page.get_by_label("Shape of the payload").select_option("cylinder")
+    type_into(page, "/payload/shape/length", "80")
+    given = state(page, "request.payload")
+    assert given["shape"]["pose"]["position"] == tcp and "com" not in given
+    optimised(page)
+    sent = state(page, "answered.solution.arm")
+    carried = to_arm(ArmRequest.model_validate(sent)).payload
+    assert carried.mass == pytest.approx(2.9) and carried.inertia.any()
+    page.locator("#export").click()
+    page.locator("[data-format=movej]").click()
+    centre = ", ".join(f"{each:.6g}" for each in carried.com.round(6) + 0.0)
+    expect(page.locator("#preview")).to_contain_text(f"set_target_payload(2.9, [{centre}])")
+    expect(page.locator(".steps")).to_contain_text("2.90 kg (gripper and part)")
+    page.keyboard.press("Escape")
+    page.get_by_role("radio", name="own", exact=True).click()
+    assert state(page, "request.payload.com") == tcp
+    expect(page.locator("[data-pointer='/payload/com/2']")).to_have_value("142.0")
+    page.get_by_label("Shape of the payload").select_option("none")
+    type_into(page, "/payload/mass", "4.5")
+    expect(page.locator("#form")).to_contain_text("5.40 kg, gripper included, is more than")
+    type_into(page, "/payload/mass", "2")
+    assert state(page, "request.payload") == {"mass": 2, "com": tcp, "shape": None}

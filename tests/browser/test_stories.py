@@ -133,7 +133,7 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
         page.locator("[data-row='/stops/0/target'] input").nth(1).focus()
         page.get_by_role("radio", name="takes").click()
         type_into(page, "/stops/0/payload/mass", "2")
-        page.get_by_text("Centre and shape").click()
+        page.locator(".payload-form > summary").click()
         page.get_by_label("Shape of the payload").select_option("box")
         type_into(page, "/stops/0/payload/shape/size/2", "60")
         type_into(page, "/stops/0/dwell", "0.3")

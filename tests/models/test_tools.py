@@ -4,17 +4,20 @@ that can be built.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot, robot_names
-from joulepath.models.tools.registry import FIGURES, tool_figures, tool_names
+from joulepath.models.tools.registry import FIGURES, HULL_FIGURES, tool_figures, tool_names
 from joulepath.models.trust import TRUST
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.exceptions import UnknownTool
-from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.arm import TOOL, Arm, Payload
+from joulepath.optimizer.problem.clouds import Points
+from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from joulepath.optimizer.problem.tool import load_tool
 
 # of sums of a few numbers in double precision
@@ -22,13 +25,16 @@ ROUNDING = 1e-12
 # m: the TCP lies between fingers, or on the rim of a cup
 BETWEEN_FINGERS = 0.06
 CONFIGURATIONS = 20
+# m: the nearest point of the fingers is some millimetres beside the axis of the flange
+FLAT_TIP = 5e-4
 
 
 @pytest.mark.parametrize("name", tool_names())
 def test_every_figure_has_a_letter_and_a_source(name: str) -> None:
     figures = tool_figures(name)
-    assert set(figures) == {"title", *FIGURES}
-    for each in FIGURES:
+    further = HULL_FIGURES if "hulls" in figures else ()
+    assert set(figures) == {"title", *FIGURES, *further}
+    for each in (*FIGURES, *further):
         figure = figures[each]
         assert figure["trust"] in TRUST and figure["unit"] and figure["note"]
         # a letter for a source has one
@@ -103,3 +109,41 @@ def test_the_table_of_the_page_is_that_of_the_figures() -> None:
         assert figures["center_of_mass"]["trust"] == mass["trust"]
         row = f"| `{name}` | {mass['value']:.3g} | {tcp['value'][2]:.3g} | {' | '.join(letters)} |"
         assert row in page
+
+
+def test_obstacles_are_compared_with_the_hulls_of_a_tool() -> None:
+    """Links and clouds are compared with its capsules."""
+    ball = Obstacle("ball", Sphere(0.05), np.eye(4))
+    scan = Obstacle("scan", Points(np.zeros((1, 3)), 0.01))
+    arm = Arm(
+        robot=load_robot("panda"), tool=load_tool("franka_hand").shape, scene=Scene([ball, scan])
+    )
+    model = CollisionModel(arm)
+    of_tool = [
+        (model.bodies[i].name, model.bodies[k].is_hull)
+        for i, k in model.pairs.tolist()
+        if model.bodies[k].name == TOOL
+    ]
+    assert of_tool.count(("ball", True)) == len(tool_figures("franka_hand")["hulls"]["value"])
+    assert ("ball", False) not in of_tool
+    assert ("scan", False) in of_tool and ("scan", True) not in of_tool
+    others = {name for name, is_hull in of_tool if is_hull}
+    assert others == {"ball"}
+    # without obstacles there are no hulls
+    assert not any(body.is_hull for body in CollisionModel(replace(arm, scene=Scene())).bodies)
+
+
+def test_distances_from_a_tool_are_those_from_its_grown_hulls() -> None:
+    """Along the axis of the flange, from a ball ahead of the fingers."""
+    arm = Arm(robot=load_robot("panda"), tool=load_tool("franka_hand").shape)
+    figures = tool_figures("franka_hand")
+    tip = max(point[2] for hull in figures["hulls"]["value"] for point in hull)
+    q = np.array([[0.0, -0.3, 0.0, -2.0, 0.0, 1.7, 0.8]])
+    T = CollisionModel(arm).frames(q)[0, -1] @ arm.robot.T_last_flange
+    ahead = np.eye(4)
+    ahead[:3, 3] = (T @ [0.0, 0.0, 0.2, 1.0])[:3]
+    model = CollisionModel(replace(arm, scene=Scene([Obstacle("ball", Sphere(0.01), ahead, 0.0)])))
+    distance = model.signed_distances(q)[0][0]
+    of_tool = [model.names(k) == ("ball", TOOL) for k in range(len(distance))]
+    gap = 0.2 - tip - figures["hull_radius"]["value"] - 0.01
+    assert distance[of_tool].min() == pytest.approx(gap, abs=FLAT_TIP)

@@ -10,6 +10,9 @@ from pydantic import Field
 from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.app.schemas.lengths import LENGTHS
+from joulepath.app.schemas.naming import Name as SearchText
+from joulepath.app.schemas.naming import search_in
+from joulepath.app.schemas.queries import Query
 from joulepath.models.own_arm.description import PLAUSIBLE
 from joulepath.models.shape_sizes import SIZES
 
@@ -232,3 +235,15 @@ class NewRobot(OwnArm):
     name: OwnName = described(
         "Name in requests: small letters, digits, `-` and `_`; no robot has it yet.", None, "my_arm"
     )
+
+
+class RobotTitle(Request):
+    """Another title of a robot."""
+
+    title: Text | None = described("The title. Null: the name.", None, "Palletiser, hall 2")
+
+
+class RobotQuery(Query):
+    """The robots that are listed."""
+
+    search: SearchText | None = search_in("the name or the title")

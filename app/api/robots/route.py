@@ -1,4 +1,4 @@
-"""GET /robots and POST /robots; GET, PUT and DELETE /robots/{name}."""
+"""GET /robots and POST /robots; GET, PUT, PATCH and DELETE /robots/{name}."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
@@ -20,7 +20,7 @@ from joulepath.app.api.robots.models import (
     RobotList,
     RobotSummary,
 )
-from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName
+from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName, RobotQuery, RobotTitle
 from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.api.shared.dependencies import (
     ServiceClient,
@@ -32,9 +32,11 @@ from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import ADDING_PROBLEMS
 from joulepath.app.exceptions.access import NotOwner
+from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
+from joulepath.app.schemas.examples.bodies import JSON, TITLE_EXAMPLES
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
 from joulepath.models.form import link_bodies
@@ -64,25 +66,28 @@ _SECTIONS = (
     "",
     summary="All robots",
     response_model=RobotList,
-    responses=problem_responses(StoreUnavailable),
+    responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
-async def list_robots(store: ServiceStore) -> RobotList:
-    """Names, titles and joints of all robots, and what their energies rest on."""
+async def list_robots(query: Annotated[RobotQuery, Query()], store: ServiceStore) -> RobotList:
+    """Names, titles and joints of all robots, or of those found by `search`, and what their
+    energies rest on."""
     bundled = await run_in_threadpool(
         lambda: {name: load_robot(name).figures for name in robot_names()}
     )
     added = await store.read(robots.all_of)
+    listed = [
+        *(
+            RobotSummary(**_summary(name, figures, added=False, owner=None))
+            for name, figures in bundled.items()
+        ),
+        *(
+            RobotSummary(**_summary(each.name, each.figures, added=True, owner=each.owner))
+            for each in added
+        ),
+    ]
+    text = (query.search or "").casefold()
     return RobotList(
-        robots=[
-            *(
-                RobotSummary(**_summary(name, figures, added=False, owner=None))
-                for name, figures in bundled.items()
-            ),
-            *(
-                RobotSummary(**_summary(each.name, each.figures, added=True, owner=each.owner))
-                for each in added
-            ),
-        ]
+        robots=[each for each in listed if text in f"{each.name}\n{each.title}".casefold()]
     )
 
 
@@ -161,6 +166,23 @@ async def put(
         response.status_code = 201
         set_location(request, response, f"/robots/{name}")
     return _of_user(robot)
+
+
+@router.patch(
+    "/{name}",
+    summary="Name a robot",
+    response_model=RobotDetail,
+    responses=problem_responses(
+        InvalidRequest, UnknownRobot, RobotExists, NotOwner, StoreUnavailable
+    ),
+    openapi_extra={"requestBody": {"content": {JSON: {"examples": TITLE_EXAMPLES}}}},
+)
+async def rename(
+    name: Name, body: RobotTitle, store: ServiceStore, client: ServiceClient
+) -> RobotDetail:
+    """Gives a robot that was added another title. Its name in requests stays."""
+    rename = partial(robots.rename, name=name, title=body.title, client=client)
+    return await store.write(lambda session: _of_user(rename(session)))
 
 
 @router.delete(

@@ -12,7 +12,9 @@ _SOURCE = "github.com/google-deepmind/mujoco_menagerie, robotiq_2f85/2f85.xml"
 class ToolFigure(Response):
     """A figure of a tool, in the flange frame."""
 
-    value: float | list[float] | list[list[float]] = described("Value of the figure.", None, 0.9)
+    value: float | list[float] | list[list[float]] | list[list[list[float]]] = described(
+        "Value of the figure.", None, 0.9
+    )
     unit: str = described("Unit.", None, "kg")
     source: str = described("Source of the value; `none` with the letter E.", None, _SOURCE)
     trust: Literal["A", "B", "C", "E"] = described(
@@ -51,3 +53,9 @@ class ToolDetail(ToolSummary):
         "Shape for collision checking: capsules [x1, y1, z1, x2, y2, z2, radius], both ends of the "
         "axis."
     )
+    hulls: ToolFigure | None = part(
+        "Convex hulls that hold the tool more closely, and are compared with obstacles except "
+        "clouds: points [x, y, z] of each, whose hull is grown by `hull_radius`; null for a tool "
+        "without hulls."
+    )
+    hull_radius: ToolFigure | None = part("Grows the hulls; null for a tool without hulls.")

@@ -43,4 +43,6 @@ async def show_tool(name: Name) -> ToolDetail:
         title=figures["title"],
         trust=TRUST,
         **{each: figures[each] for each in FIGURES},
+        hulls=figures.get("hulls"),
+        hull_radius=figures.get("hull_radius"),
     )

@@ -147,14 +147,14 @@ it("what the service says has the units and the names of the page", () => {
     "elbow needs 155 N·m, 297 mm short of 12 m, in 3 moves",
   );
   const errors = [
-    { loc: ["body", "goal", "pose", "position", 0], msg: "Too large" },
+    { loc: ["body", "goal", "pose", "position", 0], msg: "At most 100" },
     { loc: ["body", "payload", "mass"], msg: "Too heavy" },
   ];
   tell(new Problem({ title: "Invalid request", detail: "See `errors`.", errors }), MOVE);
   expect(trouble.value).toMatchObject({
     text: "Correct what is marked.",
     fields: [
-      { pointer: "/goal/pose/position/0", text: "Too large (in SI units, not mm)" },
+      { pointer: "/goal/pose/position/0", text: "At most 100 (in SI units, not mm)" },
       { pointer: "/payload/mass", text: "Too heavy" },
     ],
   });

@@ -8,6 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.cli.rename import KINDS
+from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.registry import load_robot
 from tests.app.cli.console import Here
 from tests.app.job_clients import evaluation
@@ -34,6 +35,7 @@ MADE: dict[str, Callable[[TestClient], str]] = {
     "jobs": lambda client: posted(client, "/jobs", {"requests": [evaluation()]}),
     "studies": lambda client: posted(client, "/studies", {"name": "A", "threshold": 60.0}),
     "logs": log,
+    "robots": lambda client: str(client.put("/robots/lift", json=ARM).json()["name"]),
     "identifications": lambda client: posted(client, "/identifications", {"logs": [log(client)]}),
 }
 
@@ -41,12 +43,14 @@ MADE: dict[str, Callable[[TestClient], str]] = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_whatever_is_kept_has_another_name(here: Here, client: TestClient, kind: str) -> None:
     path = f"/{kind}/{(id := MADE[kind](client))}"
+    field = "title" if kind == "robots" else "name"
     assert here.run("rename", kind, id, "Lift, cell 4") == (0, b"", b"")
-    assert client.get(path).json()["name"] == "Lift, cell 4"
+    assert client.get(path).json()[field] == "Lift, cell 4"
     taken_away = here.run("rename", kind, id)[0]
     kept = kind == "studies"
     assert taken_away == (2 if kept else 0)
-    assert client.get(path).json()["name"] == ("Lift, cell 4" if kept else None)
+    without = {"studies": "Lift, cell 4", "robots": id}.get(kind)
+    assert client.get(path).json()[field] == without
 
 
 def test_what_is_refused(here: Here) -> None:

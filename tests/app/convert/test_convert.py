@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.convert.request import to_problem
@@ -79,3 +79,22 @@ def test_payload_inertia_is_symmetric() -> None:
         problem(payload={"mass": 1, "com": [0, 0, 0.1]}).arm.payload.inertia.tolist()
         == np.zeros((3, 3)).tolist()
     )
+
+
+def test_a_payload_of_known_size_needs_no_inertia() -> None:
+    shape = {"shape": "box", "size": [0.1, 0.2, 0.3], "pose": {"position": [0, 0, 0.2]}}
+    shape["pose"]["rotvec"] = [0, 0, 0]
+    even = problem(payload={"mass": 6, "shape": shape}).arm.payload
+    assert even.com.tolist() == [0, 0, 0.2]
+    np.testing.assert_allclose(even.inertia, np.diag([0.065, 0.05, 0.025]), rtol=1e-12)
+    point = problem(payload={"mass": 6, "shape": shape, "com": [0, 0, 0.1]}).arm.payload
+    assert point.com.tolist() == [0, 0, 0.1] and not point.inertia.any()
+    own = problem(payload={"mass": 6, "shape": shape, "inertia": [3, 0, 0, 4, 0, 5]}).arm.payload
+    assert own.com.tolist() == [0, 0, 0.2]
+    assert own.inertia.tolist() == np.diag([3.0, 4.0, 5.0]).tolist()
+
+
+def test_a_payload_of_unknown_size_needs_its_centre() -> None:
+    with pytest.raises(ValidationError, match=r"payload\.com"):
+        problem(payload={"mass": 1})
+    assert problem(payload={"mass": 0}).arm.payload.mass == 0

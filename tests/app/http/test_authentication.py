@@ -239,6 +239,8 @@ def test_a_robot_is_its_owners(guarded: Guarded) -> None:
     assert guarded.send("press", "PUT", robot, ARM).json()["owner"] == "press"
     refused(guarded.send("cell", "PUT", robot, ARM), NotOwner)
     refused(guarded.send("cell", "DELETE", robot), NotOwner)
+    refused(guarded.send("cell", "PATCH", robot, {"title": "Mine"}), NotOwner)
+    assert guarded.send("press", "PATCH", robot, {"title": "Mine"}).json()["title"] == "Mine"
     assert guarded.send("boss", "PUT", robot, ARM).json()["owner"] == "press", (
         "a replaced robot keeps its owner"
     )

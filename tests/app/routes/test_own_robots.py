@@ -7,6 +7,7 @@ import io
 import zipfile
 from collections.abc import Iterator
 from typing import Any
+from uuid import uuid4
 
 import mujoco
 import numpy as np
@@ -94,6 +95,30 @@ def test_the_robots_of_the_service_stay(client: TestClient) -> None:
     refused(client.post("/robots", json={"name": "ur5e", **ARM}), RobotExists)
     refused(client.put("/robots/ur5e", json=ARM), RobotExists)
     refused(client.delete("/robots/ur5e"), RobotExists)
+
+
+def test_a_robot_has_another_title(mine: TestClient) -> None:
+    """Its name in requests stays, and so does what was computed with it."""
+    cached = {"Cache-Control": "max-age=600"}
+    kept = mine.post("/optimize", json=MOVE, headers=cached).json()["id"]
+    title = f"50% tray {uuid4().hex[:6]}"
+    renamed = mine.patch("/robots/mine", json={"title": title})
+    assert renamed.status_code == 200, renamed.text
+    assert renamed.json() == mine.get("/robots/mine").json()
+    assert (renamed.json()["name"], renamed.json()["title"]) == ("mine", title)
+    assert mine.post("/optimize", json=MOVE, headers=cached).json()["id"] == kept
+
+    def found(search: str) -> list[str]:
+        listed = mine.get("/robots", params={"search": search}).json()["robots"]
+        return [each["name"] for each in listed]
+
+    assert found(title.upper()) == found("MINE") == ["mine"]
+    assert found("5_% tray") == [] and "ur5e" in found("robots ur")
+    assert mine.patch("/robots/mine", json={"title": None}).json()["title"] == "mine"
+    for body in ({"title": ""}, {"title": "\u200b"}, {"name": "other"}, {}):
+        refused(mine.patch("/robots/mine", json=body), InvalidRequest)
+    refused(mine.patch("/robots/nobodys", json={"title": "x"}), UnknownRobot)
+    refused(mine.patch("/robots/ur5e", json={"title": "x"}), RobotExists)
 
 
 def test_a_motion_of_least_energy(mine: TestClient) -> None:

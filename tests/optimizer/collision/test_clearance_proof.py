@@ -93,7 +93,7 @@ def test_the_nearest_points_are_on_the_two_bodies(shape: Shape, carried: Shape |
     """A pea at the point of the first body is as far from the second body as the first is; one at
     the other touches.
     """
-    hand = replace(ROBOT, capsules=ROBOT.capsules[-1:])
+    hand = replace(ROBOT, capsules=ROBOT.capsules[-1:], hulls=())
     load = None if carried is None else Attachment(carried, at([0.0, 0, 0.2], [0.1, 0.2, 0.3]))
     payload = Payload(1.0, shape=load)
     below = at(
@@ -141,7 +141,7 @@ def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
     q_start = np.array([-2.5, -1.2, 1.5, -1.9, -1.57, 0.0])
     q_goal = q_start + np.array([5.0, 0, 0, 0, 0, 0])
     spline = Spline(5, np.array([0.0] * 6 + [2.5] * 6), np.array([q_start] * 3 + [q_goal] * 3))
-    hand = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[-1:])
+    hand = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[-1:], hulls=())
     height = CollisionModel(Arm(robot=hand)).frames(q_start[None])[0, 6]
     floor = Obstacle("floor", HalfSpace(), at([0, 0, height[2, 3] - 0.2]), margin=0.0)
     model = CollisionModel(Arm(robot=hand, scene=Scene([floor])))

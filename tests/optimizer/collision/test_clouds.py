@@ -112,7 +112,9 @@ def part(number: int, shape: Sphere | Box | Mesh, position: Array) -> Obstacle:
 
 
 def model_of(obstacles: list[Obstacle], load: int = 0) -> CollisionModel:
-    return CollisionModel(arm_in_cell(LOADS[load], Scene(obstacles)))
+    """Of the capsules alone, with which clouds are compared."""
+    arm = arm_in_cell(LOADS[load], Scene(obstacles))
+    return CollisionModel(replace(arm, robot=replace(arm.robot, hulls=())))
 
 
 def by_body(model: CollisionModel, q: Array) -> Array:

@@ -10,7 +10,6 @@ import coal
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from joulepath.models.fit_hulls import fitted_hull
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
@@ -24,11 +23,7 @@ from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from tests.mesh_folders import meshes
 from tests.optimizer.cells import wander
 
-# hulls around the meshes of an arm that ships without them
-ROBOT = replace(
-    load_robot("ur5e"),
-    hulls=tuple(fitted_hull(meshes("ur5e"), "ur5e", link) for link in range(1, 7)),
-)
+ROBOT = load_robot("ur5e")
 EXCESS = 2.7e-3 + 1e-4  # m; of the fit beyond the hulls of the meshes, and of its last digit
 SEARCHED = 1e-6  # m; tolerance of Coal's search
 

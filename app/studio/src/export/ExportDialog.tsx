@@ -2,7 +2,6 @@ import { useEffect, useState } from "preact/hooks";
 import { Button } from "../ui/Button";
 import { Dialog } from "../ui/Dialog";
 import { Icon } from "../ui/icons";
-import { Problem } from "../store/client";
 import { save } from "../store/share";
 import { answered, project, toast } from "../store/state";
 import { figure } from "../store/units";
@@ -61,8 +60,7 @@ export function ExportDialog({ onClose }: { onClose: () => void }) {
     const timer = setTimeout(() => {
       fileOf(shown, format, options, own.signal).then(
         setFile,
-        (error: Error) =>
-          own.signal.aborted || setWhy(error instanceof Problem ? error.message : String(error)),
+        (error: Error) => own.signal.aborted || setWhy(error.message),
       );
     }, PAUSE);
     return () => {

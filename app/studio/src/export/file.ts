@@ -1,5 +1,6 @@
 // A file of the answer in a format, by the service or by this page.
 import { send } from "../store/client";
+import { toolOfAnswer } from "../store/load";
 import type { Answered } from "../store/state";
 import { isText } from "./formats";
 import { movejProgram } from "./movej";
@@ -24,7 +25,7 @@ export async function fileOf(
   signal: AbortSignal,
 ): Promise<ExportedFile> {
   if (format === "movej") {
-    const text = movejProgram(shown, speed, output);
+    const text = movejProgram(shown, speed, output, await toolOfAnswer(shown));
     return {
       name: `${shown.robot.name}-movej.script`,
       blob: new Blob([text], { type: "text/plain" }),

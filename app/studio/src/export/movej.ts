@@ -1,11 +1,17 @@
 // A plain program of `movej` to the found joints, for those who write their programs by hand.
+import { carried } from "../store/load";
 import type { Answered } from "../store/state";
+import type { ToolDetail } from "../store/tools";
 import type { Payload } from "../store/types";
 
 const number = (value: number) => `${Number(value.toFixed(6))}`;
 const joints = (q: number[]) => `[${q.map(number).join(", ")}]`;
-const payload = (load: Payload | null | undefined) =>
-  `  set_target_payload(${number(load?.mass ?? 0)}, [${(load?.com ?? [0, 0, 0]).map(number).join(", ")}])`;
+
+function payload(part: Payload | null, tool: ToolDetail | null): string {
+  const load = carried(part, tool);
+  if (!load) throw new Error("Give the payload a centre of mass (com): this program sets it.");
+  return `  set_target_payload(${number(load.mass)}, [${load.com.map(number).join(", ")}])`;
+}
 
 interface Stop {
   name: string;
@@ -37,9 +43,14 @@ function stopsOf({ solution, cycle, cell }: Answered): Stop[] {
 
 /**
  * The text of a URScript program; `output`: a digital output that is on while the arm carries
- * something more.
+ * something more; `tool`: the one that the request names, whose mass is in the payload. Throws Error.
  */
-export function movejProgram(shown: Answered, speed: number, output: number | null): string {
+export function movejProgram(
+  shown: Answered,
+  speed: number,
+  output: number | null,
+  tool: ToolDetail | null,
+): string {
   const stops = stopsOf(shown);
   const [a, v] = [number(1.4 * speed * speed), number(1.05 * speed)];
   const base = stops[0]!.load?.mass ?? 0;
@@ -50,7 +61,7 @@ export function movejProgram(shown: Answered, speed: number, output: number | nu
       output === null || mass === before
         ? []
         : [`  set_standard_digital_out(${output}, ${mass > base ? "True" : "False"})`];
-    const loaded = mass === before && k ? [] : [payload(load)];
+    const loaded = mass === before && k ? [] : [payload(load, tool)];
     return [
       `  # ${name}`,
       `  movej(${joints(q)}, a=${a}, v=${v})`,

@@ -3,7 +3,7 @@ import { rotvecOf, turnOf } from "./chain";
 import { at, keysOf, type Pointer } from "./pointer";
 import { isObject, stopName } from "./request";
 import type { ApiRequest, Pose } from "./types";
-import { fixed, shown, UNITS, words, type UnitName } from "./units";
+import { shown, UNITS, words, type UnitName } from "./units";
 
 export interface Change {
   pointer: Pointer;
@@ -75,6 +75,7 @@ export function nameOf(
   if (first === "scene") return "Scene";
   if (first === "tcp") return ["TCP", ...tail(keys.slice(1))].join(" ");
   if (pointer === "/payload/mass") return "Payload";
+  if (first === "payload") return ["Payload", ...tail(keys.slice(1))].join(" ");
   return capital(
     keys
       .filter((key) => key !== "target")
@@ -91,10 +92,13 @@ function tail(keys: string[]): string[] {
   if (last === "rotvec") return [`R${AXES[Number(index)] ?? ""}`];
   if (last === "q") return [`joint ${Number(index) + 1}`];
   if (last === "size") return [`size ${AXES[Number(index)] ?? ""}`];
+  if (last === "com") return [`centre of mass ${AXES[Number(index)] ?? ""}`];
   return keys
-    .filter((key) => !["target", "pose", "q"].includes(key))
-    .map((key) => (key === "rotvec" ? "orientation" : words(key)));
+    .filter((key, k) => !["target", "pose", "q"].includes(key) && key !== keys[k - 1])
+    .map((key) => NAMES[key] ?? words(key));
 }
+
+const NAMES: Record<string, string> = { rotvec: "orientation", com: "centre of mass" };
 
 /** The unit in which a value at a pointer is shown. */
 export function unitAt(pointer: Pointer): UnitName {
@@ -119,8 +123,9 @@ function textOf(pointer: Pointer, value: unknown): string {
   if (typeof value === "boolean") return value ? "yes" : "no";
   if (Array.isArray(value)) {
     const numbers = value.every((each) => typeof each === "number");
+    const unit = unitAt(pointer);
     return numbers
-      ? value.map((each: number) => fixed(each, 3)).join(", ")
+      ? `${value.map((each) => shown(each, unit)).join(", ")} ${UNITS[unit].sign}`.trim()
       : `${value.length} entries`;
   }
   return isObject(value) && typeof value.mass === "number" ? `${value.mass} kg` : "set";

@@ -56,7 +56,7 @@ export const postureWords = (label: string) =>
 
 // fields that the service names in a sentence, in the words of the panel
 const NAMED: Record<string, string> = {
-  "`payload.shape`": "“Centre and shape” of the payload",
+  "`payload.shape`": "“Form” of the payload",
   "`tool.capsules`": "the capsules of the tool",
 };
 

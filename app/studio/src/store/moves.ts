@@ -1,4 +1,5 @@
 // Tables of moves, as they become a job: from where to where, with what.
+import { gripped } from "./load";
 import { parsePose, type Reading } from "./parsePose";
 import { poseOfSix } from "./request";
 import type { ApiRequest, Payload } from "./types";
@@ -157,9 +158,9 @@ export function requestsOf(
     ...shared,
     start: targetOf(start, k),
     goal: targetOf(goal, k),
-    ...(mass === null ? {} : { payload: loadOf(mass, cell.payload ?? null) }),
+    ...(mass === null ? {} : { payload: loadOf(mass, cell) }),
   }));
 }
 
-const loadOf = (mass: number, given: Payload | null): Payload | null =>
-  mass > 0 ? { ...(given ?? { com: [0, 0, 0.05] }), mass } : null;
+const loadOf = (mass: number, cell: ApiRequest): Payload | null =>
+  mass > 0 ? { ...(cell.payload ?? { com: gripped(cell) }), mass } : null;

@@ -1,5 +1,5 @@
 // What the service knows: robots, their figures, the OpenAPI document. Each is asked for once.
-import { get, send } from "./client";
+import { get, listed, send } from "./client";
 import type { ApiRequest, Robot } from "./types";
 
 const robots = new Map<string, Promise<Robot>>();
@@ -43,8 +43,8 @@ export interface RobotSummary {
   energy_trust: string;
 }
 
-export const robotList = async (): Promise<RobotSummary[]> =>
-  (await get<{ robots: RobotSummary[] }>("robots")).robots;
+export const robotList = async (search = ""): Promise<RobotSummary[]> =>
+  (await listed<{ robots: RobotSummary[] }>("robots", { search })).robots;
 
 interface Example {
   summary: string;

@@ -58,11 +58,15 @@ export function dressed(asked: ApiRequest, tool: ToolDetail | null): ApiRequest 
   };
 }
 
-/** The same, with figures that are asked for. Throws Problem. */
-export async function dressedLater(asked: ApiRequest): Promise<ApiRequest> {
+/** Figures of the tool that a request names; null without one. Throws Problem. */
+export async function namedTool(asked: ApiRequest): Promise<ToolDetail | null> {
   const name = toolName(asked);
-  return name === null ? asked : dressed(asked, await toolOf(name));
+  return name === null ? null : toolOf(name);
 }
+
+/** The request as `dressed`, with figures that are asked for. Throws Problem. */
+export const dressedLater = async (asked: ApiRequest): Promise<ApiRequest> =>
+  dressed(asked, await namedTool(asked));
 
 /** Fetches the figures of the tool that the request names, from now on. */
 export function followTool(): void {

@@ -45,7 +45,10 @@ export function tell(error: unknown, asked: ApiRequest = request.value): void {
   const fields = (details.errors ?? []).map(({ loc, msg }) => {
     const pointer = located(asked, loc);
     const { factor, sign } = UNITS[unitAt(pointer)];
-    return { pointer, text: factor === 1 ? msg : `${msg} (in SI units, not ${sign})` };
+    return {
+      pointer,
+      text: factor === 1 || !/\d/.test(msg) ? msg : `${msg} (in SI units, not ${sign})`,
+    };
   });
   const pointer = pointerOf(details, asked);
   const said = error instanceof Error ? error.message : String(error);

@@ -25,7 +25,8 @@ export interface Obstacle extends Shape {
 
 export interface Payload {
   mass: number;
-  com?: number[];
+  com?: number[] | null;
+  inertia?: number[] | null;
   shape?: Shape | null;
   touches?: string[] | null;
 }

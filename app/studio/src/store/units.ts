@@ -81,6 +81,7 @@ const LONGEST = 5; // what is longer is told in metres [m]
 export const asShown = (text: string): string =>
   text
     .replace(/\b[a-z0-9_]+_joint\b/g, jointName)
+    .replaceAll("stops/", "stop ")
     .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b(?![²³])/g, (whole, metres: string) =>
       Number(metres) < LONGEST ? `${figure(Number(metres) * 1000, 2)} mm` : whole,
     );

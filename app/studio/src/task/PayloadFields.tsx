@@ -1,28 +1,46 @@
 import { NumberCell } from "../ui/NumberCell";
+import { Segment } from "../ui/Segment";
+import { centreOf, gripped } from "../store/load";
 import { at, put, type Pointer } from "../store/pointer";
-import { isObject } from "../store/request";
+import { isObject, listOf } from "../store/request";
 import { edit, request } from "../store/state";
 import type { Payload, Shape } from "../store/types";
 import { untyped } from "../picture/drag";
 
-const SHAPES: Record<string, Shape | null> = {
-  none: null,
+const SHAPES: Record<string, Shape> = {
   box: { shape: "box", size: [0.06, 0.06, 0.1] },
   cylinder: { shape: "cylinder", radius: 0.03, length: 0.1 },
   sphere: { shape: "sphere", radius: 0.04 },
 };
+const CENTRES = [
+  { value: "even", text: "evenly filled" },
+  { value: "own", text: "own" },
+] as const;
 
-/** Centre of mass and shape of what is carried, at its place in the request. */
+const sizesOf = ({ size, radius, length }: Shape): number[] =>
+  Array.isArray(size) ? size : [radius, length].filter((each) => each !== undefined);
+
+/** What a part is by its shape and its centre, in a few words. */
+function wordsOf({ com, inertia, shape }: Payload): string {
+  if (!shape) return inertia ? "its own inertia" : "a point";
+  const sizes = sizesOf(shape).map((each) => Number((each * 1000).toFixed(1)));
+  const filled = com || inertia ? "" : ", even";
+  return `${shape.shape} ${sizes.length ? `${sizes.join(" × ")} mm` : ""}${filled}`;
+}
+
+/** Shape and centre of mass of what is carried, at its place in the request. */
 export function PayloadFields({ pointer }: { pointer: Pointer }) {
   const payload = at(request.value, pointer) as Payload;
-  const shape = isObject(payload.shape) ? payload.shape : null;
+  const shape = isObject(payload.shape) ? (payload.shape as Shape) : null;
+  const even = shape !== null && !payload.com;
+  const set = (next: Payload) => edit(put(request.value, pointer, next), untyped(pointer));
+  const { com, inertia, ...rest } = payload;
+  const centre = () => centreOf(payload) ?? gripped(request.value);
   const choose = (name: string) => {
     const next = SHAPES[name];
-    // about the centre of mass
-    const placed = next
-      ? { ...next, pose: { position: payload.com ?? [0, 0, 0], rotvec: [0, 0, 0] } }
-      : null;
-    edit(put(request.value, pointer, { ...payload, shape: placed }), untyped(`${pointer}/shape`));
+    const pose = { position: centre(), rotvec: [0, 0, 0] };
+    // a part of which the size is known is evenly filled until it is said otherwise
+    set(next ? { ...rest, shape: { ...next, pose } } : { ...rest, com: centre(), shape: null });
   };
   const cell = (name: string, field: string) => (
     <NumberCell
@@ -32,42 +50,65 @@ export function PayloadFields({ pointer }: { pointer: Pointer }) {
       unit="mm"
     />
   );
+  const three = (name: string, field: string) =>
+    ["X", "Y", "Z"].map((axis, k) => cell(`${name} ${axis}`, `${field}/${k}`));
   return (
-    <details class="fold">
+    <details class="fold payload-form">
       <summary>
-        <span class="fold-name">Centre and shape</span>
+        <span class="fold-name">Form</span> <b>{wordsOf(payload)}</b>
       </summary>
-      <div class="field">
-        <span>Centre of mass, mm</span>
-        {["X", "Y", "Z"].map((axis, k) => cell(`Centre of mass ${axis}`, `com/${k}`))}
-      </div>
       <div class="field">
         <span>Shape</span>
         <select
           aria-label="Shape of the payload"
-          value={shape ? (String(shape.shape) in SHAPES ? String(shape.shape) : "other") : "none"}
+          value={shape ? (shape.shape in SHAPES ? shape.shape : "other") : "none"}
           onChange={(event) => choose(event.currentTarget.value)}
         >
+          <option>none</option>
           {Object.keys(SHAPES).map((name) => (
             <option key={name}>{name}</option>
           ))}
-          {shape && !(String(shape.shape) in SHAPES) && (
-            <option value="other">{String(shape.shape)}, see JSON</option>
+          {shape && !(shape.shape in SHAPES) && (
+            <option value="other">{shape.shape}, see JSON</option>
           )}
         </select>
-        {shape?.shape === "box" &&
-          ["X", "Y", "Z"].map((axis, k) => cell(`Payload size ${axis}`, `shape/size/${k}`))}
-        {shape && "radius" in shape && cell("Payload radius", "shape/radius")}
-        {shape && "length" in shape && cell("Payload length", "shape/length")}
       </div>
       {shape && (
+        <>
+          <div class="field">
+            <span>Size, mm</span>
+            {shape.shape === "box" && three("Payload size", "shape/size")}
+            {"radius" in shape && <>radius {cell("Payload radius", "shape/radius")}</>}
+            {"length" in shape && <>length {cell("Payload length", "shape/length")}</>}
+          </div>
+          <div class="field">
+            <span>Its middle at, mm</span>
+            {three("Payload middle", "shape/pose/position")}
+          </div>
+          <div class="field">
+            <span>Mass</span>
+            <Segment
+              label="Where the mass is"
+              options={CENTRES}
+              value={even ? "even" : "own"}
+              onChange={(next) => set(next === "even" ? rest : { ...payload, com: centre() })}
+            />
+          </div>
+        </>
+      )}
+      {!even && (
         <div class="field">
-          <span>Its middle at, mm</span>
-          {["X", "Y", "Z"].map((axis, k) =>
-            cell(`Payload middle ${axis}`, `shape/pose/position/${k}`),
-          )}
+          <span>Centre of mass, mm</span>
+          {three("Centre of mass", "com")}
         </div>
       )}
+      <p class="hint">
+        {even
+          ? "Centre and inertia are computed from mass and size."
+          : listOf(inertia).length
+            ? "Its inertia is that in JSON."
+            : "The mass counts as a point. Give its shape, and its inertia counts."}
+      </p>
     </details>
   );
 }

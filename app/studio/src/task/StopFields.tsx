@@ -1,9 +1,11 @@
 import { NumberCell } from "../ui/NumberCell";
 import { Segment } from "../ui/Segment";
+import { gripped } from "../store/load";
 import { at, put, type Pointer } from "../store/pointer";
 import { isObject } from "../store/request";
 import { edit, request } from "../store/state";
 import type { Stop } from "../store/types";
+import { OverRating } from "./OverRating";
 import { PayloadFields } from "./PayloadFields";
 
 type Deed = "same" | "takes" | "puts" | "passes";
@@ -25,7 +27,7 @@ function withDeed(stop: Stop, deed: Deed): Stop {
   const { payload: _, via: __, ...rest } = stop;
   if (deed === "same") return rest;
   if (deed === "puts") return { ...rest, payload: null };
-  if (deed === "takes") return { ...rest, payload: { mass: 1, com: [0, 0, 0.05] } };
+  if (deed === "takes") return { ...rest, payload: { mass: 1, com: gripped(request.value) } };
   const { dwell: ___, approach: ____, retreat: _____, ...passing } = rest;
   return { ...passing, via: true };
 }
@@ -93,6 +95,7 @@ export function StopFields({ pointer }: { pointer: Pointer }) {
               withUnit
             />
           </div>
+          <OverRating mass={at(request.value, `${pointer}/payload/mass`)} />
           <PayloadFields pointer={`${pointer}/payload`} />
         </>
       )}

@@ -1,14 +1,15 @@
 import { Button } from "../ui/Button";
 import { Errors } from "../ui/Errors";
 import { NumberCell } from "../ui/NumberCell";
-import { robotNow } from "../picture/pictured";
 import { untyped } from "../picture/drag";
+import { gripped } from "../store/load";
 import { at, join, put } from "../store/pointer";
 import { isObject, listOf, sixOf, withNumber } from "../store/request";
 import { edit, request, typed } from "../store/state";
 import type { Pose, Tool } from "../store/types";
 import { figure } from "../store/units";
 import { dressed, toolNow } from "../store/tools";
+import { OverRating } from "./OverRating";
 import { PayloadFields } from "./PayloadFields";
 import { PoseCells } from "./PoseCells";
 import { ToolPicker } from "./ToolPicker";
@@ -24,7 +25,6 @@ export function ToolPayload() {
   const [x = 0, y = 0, z = 0] = listOf<number>(tcp.position);
   const mass = at(asked, "/payload/mass");
   const count = listOf(at(asked, "/tool/capsules")).length;
-  const rated = robotNow.value?.limits.rated_payload?.value;
   return (
     <section class="section" aria-label="Tool and payload">
       <details class="fold" id="tool-fold">
@@ -65,11 +65,7 @@ export function ToolPayload() {
               : "nothing carried"}
         </small>
       </div>
-      {typeof mass === "number" && typeof rated === "number" && mass > rated && (
-        <p class="warning-text">
-          {figure(mass)} kg is more than a {robotNow.value?.title} may carry ({rated} kg).
-        </p>
-      )}
+      <OverRating mass={mass} />
       {isObject(asked.payload) && <PayloadFields pointer="/payload" />}
       <Errors under="/tool" />
       <Errors under="/tcp" />
@@ -78,13 +74,13 @@ export function ToolPayload() {
   );
 }
 
-/** A payload without mass is none; a first one has its centre 50 mm before the flange. */
+/** A payload without mass is none. */
 function setMass(value: number, text: string): void {
   const { payload } = request.value;
   const next =
     value === 0
       ? undefined
-      : { ...(isObject(payload) ? payload : { com: [0, 0, 0.05] }), mass: value };
+      : { ...(isObject(payload) ? payload : { com: gripped(request.value) }), mass: value };
   edit(put(request.value, "/payload", next), { ...untyped("/payload"), "/payload/mass": text });
 }
 
