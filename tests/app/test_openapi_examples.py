@@ -186,7 +186,7 @@ def test_body_is_answered(name: str, client: TestClient, made: dict[str, str], l
 )
 def test_path_is_answered(operation: Operation, client: TestClient, robot: str) -> None:
     names = operation.parameters("path")
-    if operation.method in ("put", "delete"):
+    if operation.method in ("put", "patch", "delete"):
         names |= {"name": robot}
     # an id stands for something that was made before; the example's was not, and the document says
     # what then comes
