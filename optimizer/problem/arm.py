@@ -333,6 +333,6 @@ class Arm:
             rating = self.robot.rated_payload
             raise InvalidProblem(
                 field,
-                f"{field} exceeds the robot's rating: the arm would carry {mass:g} kg and may carry "
-                f"{rating:g} kg, a tool given by name included.",
+                f"{field} exceeds the robot's rating: the arm would carry {mass:g} kg and may "
+                f"carry {rating:g} kg, a tool given by name included.",
             )

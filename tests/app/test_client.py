@@ -36,7 +36,7 @@ def test_it_optimizes_as_the_service_does(service: joulepath.Client) -> None:
 
 
 def test_it_has_the_functions_of_the_library(service: joulepath.Client) -> None:
-    """By the same names; many problems are a job, and shapes and bodies are data."""
+    """By the same names; many problems are a job, and shapes are data."""
     own = {"optimize_many", "capsule_between", "even_payload"}
     public = {name: getattr(joulepath, name) for name in joulepath.__all__}
     functions = {name for name in public if name.islower()} - own

@@ -165,6 +165,9 @@ def test_a_programmer_makes_a_round_of_a_table(browser: Browser, service: Server
         program = Path(download.value.path()).read_text()
         assert program.count("movej([") == 4, "start, two stops, and back"
         assert "set_target_payload(2," in program
+        put_down = program.index("# place 1"), program.index("# start", program.index("# place 1"))
+        for line in ("set_standard_digital_out(0, False)", "set_target_payload(0,"):
+            assert put_down[0] < program.index(line, put_down[0]) < put_down[1]
 
 
 def test_a_researcher_brings_an_own_arm(browser: Browser, service: Server, tmp_path: Path) -> None:

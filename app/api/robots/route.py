@@ -7,7 +7,7 @@ from functools import partial
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Body, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
@@ -36,7 +36,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.schemas.examples.bodies import JSON, TITLE_EXAMPLES
+from joulepath.app.schemas.examples.own_arm import TITLE_EXAMPLES
 from joulepath.app.store import robots
 from joulepath.app.store.tables import OwnRobot, now
 from joulepath.models.form import link_bodies
@@ -175,10 +175,12 @@ async def put(
     responses=problem_responses(
         InvalidRequest, UnknownRobot, RobotExists, NotOwner, StoreUnavailable
     ),
-    openapi_extra={"requestBody": {"content": {JSON: {"examples": TITLE_EXAMPLES}}}},
 )
 async def rename(
-    name: Name, body: RobotTitle, store: ServiceStore, client: ServiceClient
+    name: Name,
+    body: Annotated[RobotTitle, Body(openapi_examples=TITLE_EXAMPLES)],
+    store: ServiceStore,
+    client: ServiceClient,
 ) -> RobotDetail:
     """Gives a robot that was added another title. Its name in requests stays."""
     rename = partial(robots.rename, name=name, title=body.title, client=client)

@@ -13,10 +13,6 @@ from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES
 
 JSON = "application/json"
 CSV = "text/csv"
-TITLE_EXAMPLES: dict[str, Example] = {
-    "title": {"summary": "Give it a title", "value": {"title": "Palletiser, hall 2"}}
-}
-"""Bodies of `PATCH /robots/{name}`. The table below has those of `PUT`."""
 BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     **{path: body_examples(path) for path in shown()},
     "/identifications": {JSON: IDENTIFY_EXAMPLES},

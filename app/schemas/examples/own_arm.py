@@ -52,3 +52,7 @@ PUT_EXAMPLES: dict[str, Example] = {
         },
     },
 }
+TITLE_EXAMPLES: Any = {
+    "title": {"summary": "Give it a title", "value": {"title": "Palletiser, hall 2"}},
+}
+"""Beside `PUT_EXAMPLES`, those of the same path."""

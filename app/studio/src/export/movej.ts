@@ -34,7 +34,7 @@ function stopsOf({ solution, cycle, cell }: Answered): Stop[] {
     { name: "start", q: start.q, load: cycle.loads[0]?.payload ?? null, dwell: 0 },
   ];
   cycle.legs.forEach(({ kind, goal: to, duration }, k) => {
-    const load = cycle.loads[k + 1]?.payload ?? cycle.loads[k]?.payload ?? null;
+    const load = (cycle.loads[k + 1] ?? cycle.loads[k])?.payload ?? null;
     if (kind === "dwell" || kind === "wait") stops.at(-1)!.dwell += duration;
     else stops.push({ name: to.stop ?? "?", q: to.q, load, dwell: 0 });
   });
