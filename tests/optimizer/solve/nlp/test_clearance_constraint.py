@@ -166,7 +166,7 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
 
 def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     model = CollisionModel(problem_with(HOME, GOAL, scene=Scene((low_post(),))).arm)
-    q = np.linspace(HOME, GOAL, 25)
+    q = np.linspace(HOME, GOAL, 100)
     expected = (
         1
         - (model.signed_distances(q)[0] - CLEARANCE_CONSTRAINT.reserve)
