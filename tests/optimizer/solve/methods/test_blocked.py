@@ -62,7 +62,7 @@ POST = Obstacle("post", Sphere(0.06), placed(-0.45, 0.35, 0.5))
 # a wall from the base outwards, between start and goal, and beside the upper arm at the goal
 WALL = Obstacle(
     "wall",
-    Box(np.array([1.2, 0.02, 2.4])),
+    Box(np.array([1.23, 0.02, 2.4])),
     placed(-0.8 * 0.8, 0.6 * 0.8, 0.0, np.arctan2(0.6, -0.8)),
     margin=0.0,
 )
