@@ -96,9 +96,6 @@ def test_the_error_names_the_colliding_pair(
     limited = replace(PLANNED_PATHS, most_states=states)
     monkeypatch.setattr(planned_paths, "PLANNED_PATHS", limited)
     problem = blocked(method, WALL)
-    # with hulls, fewer states find a way
-    arm = replace(problem.arm, robot=replace(problem.arm.robot, hulls=()))
-    problem = replace(problem, arm=arm)
     with pytest.raises(NoCollisionFreeTrajectory) as caught:
         optimize(problem)
     assert WALL.name in caught.value.pair and caught.value.depth > 0
