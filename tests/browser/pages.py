@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from playwright.sync_api import Browser, Page, expect
 
 from tests.app.live import ANSWER, ROOT
@@ -28,6 +29,22 @@ MESHES = (
     "() => Boolean(window.studio?.view?.arms.length) && "
     "!studio.view.arms[0].drawn[0].geometry.hasAttribute('uv')"
 )
+ROUNDING = 1e-9  # m; sums of some ten products in double precision
+PIXELS = """() => {
+    const { view } = studio;
+    view.setFineness(0.5);
+    view.renderer.render(view.scene, view.camera);
+    const gl = view.renderer.getContext();
+    const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+    const data = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    let drawn = 0, sum = 0;
+    for (let k = 0; k < data.length; k += 4) {
+        drawn += data[k + 3] > 0;
+        sum += data[k] + 3 * data[k + 1] + 7 * data[k + 2];
+    }
+    return [drawn / (width * height), sum];
+}"""
 AXE = (ROOT / "app" / "studio" / "node_modules" / "axe-core" / "axe.min.js").read_text("utf-8")
 
 
@@ -44,6 +61,14 @@ def until(page: Page, condition: str, patience: float = ANSWER) -> None:
 
 def state(page: Page, what: str) -> Any:
     return page.evaluate(f"() => studio.state.{what}")
+
+
+def tcp(page: Page, time: float) -> np.ndarray:
+    """The pose of the TCP (4, 4) as it is drawn at a time."""
+    page.locator("#scrub").evaluate(
+        "(it, time) => { it.value = time; it.dispatchEvent(new Event('input')); }", time
+    )
+    return np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
 
 
 def show_json(page: Page, shown: bool = True) -> None:

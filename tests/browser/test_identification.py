@@ -158,7 +158,7 @@ def test_what_a_log_does_not_tell_is_explained(page: Page, tmp_path: Path) -> No
     assert not page.evaluate(OPENED)
     file.write_text("t,q1\n0,1\n")
     add_log(page, file)
-    expect(page.locator("#log-error a")).to_have_attribute(
+    expect(page.get_by_role("dialog").locator(".error a")).to_have_attribute(
         "href", re.compile("problems/(validation|invalid-table)")
     )
     page.get_by_role("button", name="Close").click()

@@ -12,55 +12,29 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
 from tests.app.live import ROOT, Server
 from tests.app.requests import NEAR, move
 from tests.browser.pages import (
     FIRST,
     MESHES,
+    PIXELS,
+    ROUNDING,
     SHOWN,
     ask,
     opened,
     state,
+    tcp,
     until,
 )
 from tests.browsers import BROWSER, MISSING
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
-DRAWN = 1e-6  # m; the certificate's own tolerance of an end
-ROUNDING = 1e-9  # m; sums of some ten products in double precision
 # relative; the service integrates the power of the recording's samples by another rule
 RECORDED = 2e-3
 MOST_BYTES = 1_200_000  # of a first visit, without the answer and the meshes
 LOADED = """() => [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")]
     .filter(({ name }) => !/optimize$|meshes.glb$/.test(name)).reduce((sum, { transferSize }) => sum + transferSize, 0)"""  # noqa: E501
-PIXELS = """() => {
-    const { view } = studio;
-    view.setFineness(0.5);
-    view.renderer.render(view.scene, view.camera);
-    const gl = view.renderer.getContext();
-    const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
-    const data = new Uint8Array(4 * width * height);
-    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
-    let drawn = 0, sum = 0;
-    for (let k = 0; k < data.length; k += 4) {
-        drawn += data[k + 3] > 0;
-        sum += data[k] + 3 * data[k + 1] + 7 * data[k + 2];
-    }
-    return [drawn / (width * height), sum];
-}"""
-
-
-def tcp(page: Page, time: float) -> np.ndarray:
-    """The pose of the TCP (4, 4) as it is drawn at a time."""
-    page.locator("#scrub").evaluate(
-        "(it, time) => { it.value = time; it.dispatchEvent(new Event('input')); }", time
-    )
-    return np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
 
 
 def test_the_first_look_moves(browser: Browser, service: Server) -> None:
@@ -76,77 +50,6 @@ def test_the_first_look_moves(browser: Browser, service: Server) -> None:
         assert state(page, "answered.asked") == FIRST
         until(page, MESHES)
         assert page.evaluate(LOADED) <= MOST_BYTES
-
-
-def test_the_picture_is_of_the_motion(page: Page) -> None:
-    """At both ends the TCP is drawn where the request wants it."""
-    for time, end in ((0.0, "start"), (state(page, "duration"), "goal")):
-        pose = FIRST[end]["pose"]
-        turn = "quaternion" if "quaternion" in pose else "rpy"
-        asked = getattr(Pose, f"from_{turn}")(pose["position"], pose[turn])
-        assert tcp(page, time) == pytest.approx(asked.T, abs=DRAWN)
-
-
-def test_the_picture_is_where_the_library_says(page: Page) -> None:
-    arm = Arm(
-        robot=load_robot("ur5e"), T_flange_tcp=Pose.from_quaternion([0, 0, 0.16], [0, 0, 0, 1]).T
-    )
-    trajectory = state(page, "answered.solution.trajectory")
-    for k in (10, 50, 90):
-        assert tcp(page, trajectory["t"][k]) == pytest.approx(
-            tcp_pose(arm, np.array(trajectory["q"][k])), abs=ROUNDING
-        )
-
-
-def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
-    share, before = page.evaluate(PIXELS)
-    assert share > 0.05
-    page.locator("#show > summary").click()
-    seen = {before}
-    for name in ("ghosts", "path", "nearest", "margins", "capsules", "axes"):
-        page.locator(f"[data-show={name}]").click()
-        _, now = page.evaluate(PIXELS)
-        assert now not in seen, name
-        seen.add(now)
-    for name in ("ghosts", "path", "nearest", "margins", "capsules", "axes"):
-        page.locator(f"[data-show={name}]").click()
-    page.locator("#show > summary").click()
-    assert page.evaluate(PIXELS)[1] == before
-
-
-def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
-    clearance = state(page, "answered.solution.certificate.clearance")
-    drawn = page.evaluate(
-        """() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]"""  # noqa: E501
-    )
-    assert np.array(drawn).reshape(2, 3) == pytest.approx(np.array(clearance["points"]), abs=DRAWN)
-    expect(page.locator(".label.near")).to_contain_text(" – ".join(clearance["pair"]))
-
-
-def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Page) -> None:
-    """Where the service has them; else the arm is drawn from its figures, and the page says
-    nothing.
-    """
-    with_meshes = page.evaluate(PIXELS)
-    with opened(browser, f"{service.url}/studio") as other:
-        other.route(
-            "**/meshes.glb", lambda route: route.fulfill(status=404, json={"title": "No meshes"})
-        )
-        other.reload()
-        until(other, SHOWN)
-        until(
-            other,
-            "() => performance.getEntriesByType('resource').some(({ name }) => "
-            "name.endsWith('/meshes.glb'))",
-        )
-        without = other.evaluate(PIXELS)
-        assert not other.evaluate(MESHES) and other.locator("#problem").is_hidden()
-        assert (
-            without[0] == pytest.approx(with_meshes[0], rel=0.05) and without[1] != with_meshes[1]
-        )
-        other.unroute("**/meshes.glb")
-        ask(other, move(robot="ur3e"))
-        until(other, MESHES)
 
 
 def test_one_clock(page: Page) -> None:
@@ -366,62 +269,6 @@ def test_the_keyboard_is_enough(browser: Browser, service: Server) -> None:
         assert state(page, "request") == FIRST
         page.keyboard.press("Control+Shift+z")
         assert state(page, "stale") is False
-
-
-def test_what_stands_before_the_arm_fades(page: Page) -> None:
-    """The side of the shelf, seen through it; what stands behind the arm, or is not to fade, does
-    not.
-    """
-    faint = """show => {
-        const { view } = studio;
-        const { position } = view.camera;
-        const before = position.clone();
-        view.eye.fade = Object.getPrototypeOf(view.eye).fade;
-        const own = view.eye.fade.bind(view.eye);
-        view.eye.fade = (frames, ignored, _, moving) => own(frames, ignored, show, moving);
-        position.set(-2.4, -0.6, 0.45);
-        view.render();
-        const faint = view.parts.obstacles.children.filter(({ userData }) => userData.material.opacity < 0.5);
-        position.copy(before);
-        delete view.eye.fade;
-        view.render();
-        return faint.map(({ userData }) => userData.name);
-    }"""  # noqa: E501
-    page.locator("#view").press("End")
-    assert page.evaluate(faint, True) == ["shelf side"]
-    assert page.evaluate(faint, False) == []
-
-
-def test_a_coarse_picture_has_no_shadows(page: Page) -> None:
-    """On a machine without a graphics card they take half the time of a moving picture. A still one
-    has them again.
-    """
-    drawn = """fineness => {
-        const { view } = studio;
-        view.setFineness(fineness);
-        view.renderer.shadowMap.needsUpdate = true;
-        view.renderer.render(view.scene, view.camera);
-        return view.renderer.info.render.calls;
-    }"""
-    assert page.evaluate(drawn, 0.5) < page.evaluate(drawn, 1)
-
-
-def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> None:
-    shells = "() => studio.view.parts.margins.children.filter(({ visible }) => visible).length"
-    x, y = page.evaluate("""() => {
-        const { view } = studio;
-        const top = view.parts.obstacles.children.find(({ userData }) => userData.name === "shelf top");
-        const at = top.children[0].getWorldPosition(view.camera.position.clone()).project(view.camera);
-        const box = view.renderer.domElement.getBoundingClientRect();
-        return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
-    }""")  # noqa: E501
-    assert page.evaluate(shells) == 0
-    # a scene that was drawn anew meanwhile has its shell again when the pointer moves
-    assert any(page.mouse.move(x + k % 2, y) or page.evaluate(shells) == 1 for k in range(10))  # type: ignore[func-returns-value]
-    expect(page.locator(".label.hover")).to_have_text("shelf top, margin 10.0 mm")
-    page.mouse.move(5, 5)
-    expect(page.locator(".label.hover")).to_have_count(0)
-    assert page.evaluate(shells) == 0
 
 
 def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:

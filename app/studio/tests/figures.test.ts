@@ -146,6 +146,9 @@ it("what the service says has the units and the names of the page", () => {
   expect(asShown("elbow_joint needs 155 N·m, 0.2969 m short of 12 m, in 3 moves")).toBe(
     "elbow needs 155 N·m, 297 mm short of 12 m, in 3 moves",
   );
+  expect(asShown("7 m away: give it in metres, not millimetres, or move it closer.")).toBe(
+    "7 m away: move it closer.",
+  );
   const errors = [
     { loc: ["body", "goal", "pose", "position", 0], msg: "At most 100" },
     { loc: ["body", "payload", "mass"], msg: "Too heavy" },
@@ -160,28 +163,27 @@ it("what the service says has the units and the names of the page", () => {
   });
 });
 
-it("a problem stands at the place that it names", () => {
+it("a problem stands at the places that it names", () => {
   const stops = [{ name: "bin" }, { name: "bead/2" }, {}];
   const round = { ...MOVE, stops } as ApiRequest;
   const at = (details: ProblemDetails, asked = round) => {
     tell(new Problem({ title: "No", detail: "Why.", ...details }), asked);
-    expect(trouble.value!.fields.map(({ pointer }) => pointer)).toEqual(
-      trouble.value!.pointer === null ? [] : [trouble.value!.pointer],
-    );
-    return trouble.value!.pointer;
+    return trouble.value!.fields.map(({ pointer }) => pointer);
   };
   const type = "/problems/duration-too-short";
-  expect(at({ target: "goal" }, MOVE)).toBe("/goal");
-  expect(at({ path: "path" }, MOVE)).toBe("/path");
-  expect(at({ target: "stops.2.target" })).toBe("/stops/2/target");
-  expect(at({ target: "stops/bead/2" })).toBe("/stops/1/target");
-  expect(at({ path: "stops/bin/approach" })).toBe("/stops/0/target");
-  expect(at({ stop: "stops/3" })).toBe("/stops/2/target");
-  expect(at({ stop: "start" })).toBe("/start");
-  expect(at({ type }, MOVE)).toBe("/duration");
-  expect(at({ type })).toBe("/time");
-  expect(at({ pair: ["forearm_link", "table"] })).toBe("/scene/obstacles/0");
-  expect(at({ pair: ["forearm_link", "tool"] })).toBeNull();
+  expect(at({ target: "goal" }, MOVE)).toEqual(["/goal"]);
+  expect(at({ path: "path" }, MOVE)).toEqual(["/path"]);
+  expect(at({ target: "stops.2.target" })).toEqual(["/stops/2/target"]);
+  expect(at({ target: "stops/bead/2" })).toEqual(["/stops/1/target"]);
+  expect(at({ path: "stops/bin/approach" })).toEqual(["/stops/0/target"]);
+  expect(at({ stop: "stops/3" })).toEqual(["/stops/2/target"]);
+  expect(at({ stop: "start" })).toEqual(["/start"]);
+  expect(at({ type }, MOVE)).toEqual(["/duration"]);
+  expect(at({ type })).toEqual(["/time"]);
+  expect(at({ pair: ["forearm_link", "table"] })).toEqual(["/scene/obstacles/0"]);
+  const pair: [string, string] = ["forearm_link", "table"];
+  expect(at({ pair, target: "goal" }, MOVE)).toEqual(["/goal", "/scene/obstacles/0"]);
+  expect(at({ pair: ["forearm_link", "tool"] })).toEqual([]);
 });
 
 it("a mass of a table that is no number is named, and not left out", () => {

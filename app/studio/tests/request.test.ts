@@ -1,8 +1,10 @@
 import { describe, expect, it } from "vitest";
 import {
   asKind,
+  asKindAgain,
   duplicated,
   moved,
+  ownFields,
   withObstacle,
   withoutRow,
   withRobot,
@@ -32,6 +34,20 @@ describe("kinds", () => {
     const back = asKind(round, "move");
     expect(back.goal).toEqual({ q: [1, 2, 3, 4, 5, 6] });
     expect(asKind(asKind(MOVE, "round"), "move")).toEqual(MOVE);
+  });
+  it("a round comes back with its stops, and ends where the move ended", () => {
+    const { stops } = round;
+    const back = asKindAgain(asKind(round, "move"), "round", ownFields(round));
+    expect(back).toEqual(round);
+    const other = { ...asKind(round, "move"), goal: { q: [6, 5, 4, 3, 2, 1] } };
+    const moved = asKindAgain(other, "round", ownFields(round)).stops!;
+    expect(moved.map(({ name }) => name)).toEqual(stops!.map(({ name }) => name));
+    expect(moved[1]!.target).toEqual(other.goal);
+  });
+  it("a move comes back with its time", () => {
+    const timed = { ...MOVE, duration: 3 };
+    const back = asKindAgain(asKind(timed, "round"), "move", ownFields(timed));
+    expect(back).toEqual(timed);
   });
   it("a path keeps its ends", () => {
     const path = asKind(MOVE, "path");

@@ -1,9 +1,10 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
+import { PlainNumber } from "../ui/PlainNumber";
 import { Section } from "../ui/Section";
 import { costsOf, DEFAULT_ECONOMICS, type Economics, type Sourced } from "../store/economics";
 import { answered, economics, stale, type Answered } from "../store/state";
-import { figure, fixed, parseNumber } from "../store/units";
+import { figure, fixed } from "../store/units";
 import { adviceFailed, advised, waits } from "./advice";
 
 /** The parts of what one move or round costs. */
@@ -131,24 +132,20 @@ function Assumptions() {
     value: number | null,
     source: string,
     take: (value: number | null) => void,
+    empty?: string,
   ) => (
-    <label class="field" key={text}>
+    <div class="field" key={text}>
       <span>{text}</span>
-      <input
-        type="text"
-        inputMode="decimal"
-        aria-label={`${text} in ${unit}`}
-        value={value ?? ""}
-        placeholder="not counted"
-        onChange={(event) => {
-          const number = parseNumber(event.currentTarget.value);
-          if (number !== null && number >= 0) take(number);
-          else if (!event.currentTarget.value.trim()) take(null);
-        }}
+      <PlainNumber
+        label={`${text} in ${unit}`}
+        value={value}
+        least="zero"
+        empty={empty}
+        onValue={take}
       />
       <small>{unit}</small>
       <small class="source">{source}</small>
-    </label>
+    </div>
   );
   const yours = (value: number): Sourced => ({ value, source: "yours" });
   return (
@@ -191,6 +188,7 @@ function Assumptions() {
           ? "yours"
           : "a wattmeter’s reading while the arm stands, less the arm’s own power",
         (value) => set({ box: value === null ? null : yours(value) }),
+        "not counted",
       )}
     </div>
   );

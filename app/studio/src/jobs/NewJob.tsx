@@ -50,6 +50,8 @@ export function NewJob({ onClose }: { onClose: () => void }) {
   const take = async (file: File | undefined) => {
     if (!file) return;
     setText(await file.text());
+    setChosen(-1);
+    setWhy("");
     setSource(file.name);
     setName(file.name.replace(/\.\w+$/, ""));
   };
@@ -83,7 +85,10 @@ export function NewJob({ onClose }: { onClose: () => void }) {
           <input
             type="text"
             value={name}
-            onChange={(event) => setName(event.currentTarget.value)}
+            onChange={(event) => {
+              setName(event.currentTarget.value);
+              setWhy("");
+            }}
           />
         </label>
         <label>
@@ -106,6 +111,7 @@ export function NewJob({ onClose }: { onClose: () => void }) {
             onInput={(event) => {
               setText(event.currentTarget.value);
               setChosen(-1);
+              setWhy("");
             }}
           />
         </label>

@@ -35,7 +35,7 @@ const factsOf = ({ kind, energy, duration, robot, created }: Kept) =>
 
 /** Answers of their own, by name: those of jobs and studies are with them. */
 export function Answers() {
-  const [answers, setAnswers] = useState<Kept[]>([]);
+  const [answers, setAnswers] = useState<Kept[] | null>(null);
   const [next, setNext] = useState<string | null>(null);
   const [search, setSearch] = useState("");
   const latest = useRef(0);
@@ -46,7 +46,7 @@ export function Answers() {
     const page = await listed<{ answers: Kept[]; next: string | null }>("answers", query);
     if (mine !== latest.current) return;
     const own = page.answers.filter(({ kind }) => !OF_LOGS.includes(kind));
-    setAnswers((before) => (after ? [...before, ...own] : own));
+    setAnswers((before) => (after ? [...(before ?? []), ...own] : own));
     setNext(page.next);
   };
   useEffect(() => {
@@ -54,11 +54,11 @@ export function Answers() {
   }, [search]);
   const drop = async (id: string) => {
     await remove(`answers/${id}`);
-    setAnswers((before) => before.filter((each) => each.id !== id));
+    setAnswers((before) => before?.filter((each) => each.id !== id) ?? null);
   };
   const rename = async (id: string, name: string | null) => {
     const renamed = await patch<Kept>(`answers/${id}`, { name });
-    setAnswers((before) => before.map((each) => (each.id === id ? renamed : each)));
+    setAnswers((before) => before?.map((each) => (each.id === id ? renamed : each)) ?? null);
   };
   return (
     <section aria-label="Answers">
@@ -69,7 +69,7 @@ export function Answers() {
         onSearch={setSearch}
       />
       <ul class="kept" id="answers">
-        {answers.map((each) => (
+        {answers?.map((each) => (
           <KeptRow
             key={each.id}
             name={each.name}
@@ -81,7 +81,7 @@ export function Answers() {
           />
         ))}
       </ul>
-      {!answers.length && <p class="hint">{search ? "no answer of this name" : "none"}</p>}
+      {answers?.length === 0 && <p class="hint">{search ? "no answer of this name" : "none"}</p>}
       {next && <Button onClick={trying(() => load(next))}>Older</Button>}
     </section>
   );

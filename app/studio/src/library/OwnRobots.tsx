@@ -9,7 +9,7 @@ import type { Robot } from "../store/types";
 
 /** Robots of one's own, by their titles; their names in requests stay. */
 export function OwnRobots() {
-  const [all, setAll] = useState<RobotSummary[]>([]);
+  const [all, setAll] = useState<RobotSummary[] | null>(null);
   const [search, setSearch] = useState("");
   const latest = useRef(0);
   const load = async () => {
@@ -41,7 +41,7 @@ export function OwnRobots() {
         onSearch={setSearch}
       />
       <ul class="kept" id="own-robots">
-        {all.map(({ name, title, joints }) => (
+        {all?.map(({ name, title, joints }) => (
           <KeptRow
             key={name}
             name={title}
@@ -51,7 +51,7 @@ export function OwnRobots() {
           />
         ))}
       </ul>
-      {!all.length && (
+      {all?.length === 0 && (
         <p class="hint">
           {search ? "no robot of this name" : "none: add one in the robot picker of a cell."}
         </p>

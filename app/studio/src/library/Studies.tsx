@@ -27,7 +27,7 @@ const MOST_ITERATIONS = 50;
 
 /** Studies by name, and the iterations of one of them. */
 export function Studies() {
-  const [all, setAll] = useState<Study[]>([]);
+  const [all, setAll] = useState<Study[] | null>(null);
   const [search, setSearch] = useState("");
   const [opened, setOpened] = useState<{ name: string; rows: Iteration[] } | null>(null);
   const latest = useRef(0);
@@ -71,7 +71,7 @@ export function Studies() {
         onSearch={setSearch}
       />
       <ul class="kept" id="studies">
-        {all.map((study) => (
+        {all?.map((study) => (
           <KeptRow
             key={study.id}
             name={study.name}
@@ -88,7 +88,7 @@ export function Studies() {
           />
         ))}
       </ul>
-      {!all.length && <p class="hint">{search ? "no study of this name" : "none"}</p>}
+      {all?.length === 0 && <p class="hint">{search ? "no study of this name" : "none"}</p>}
     </section>
   );
 }

@@ -24,10 +24,32 @@ const inWords = (text: string) =>
     .replace(/effort=(\w+)/g, "“$1”")
     .replace(/`(\w+)`/g, (_, name: string) => (WORDS[name] ? `“${WORDS[name]}”` : name));
 
+type Field =
+  "file" | "name" | "robot" | "payload" | "units" | "current_units" | "effort" | "columns";
+
 interface Why {
+  field: Field;
   text: string;
   link: string | null;
-  field: "effort" | null;
+}
+
+// the fields of problems that name none
+const FIELDS: Record<string, Field> = { "unknown-robot": "robot", "effort-not-usable": "effort" };
+const NAMED: Field[] = ["name", "robot", "payload", "units", "current_units", "effort", "columns"];
+
+/** What went wrong with a log, at the fields of this dialog; what none of them caused is at the file. */
+function reasonsOf(error: unknown): Why[] {
+  const details = error instanceof Problem ? error.details : {};
+  const at = details.type?.indexOf("problems/") ?? -1;
+  const link = at < 0 ? null : details.type!.slice(at);
+  const told = (details.errors ?? []).map(({ loc, msg }) => ({
+    field: NAMED.find((each) => each === loc[1]) ?? "file",
+    text: inWords(msg),
+    link,
+  }));
+  if (told.length) return told;
+  const slug = details.type?.split("/").at(-1) ?? "";
+  return [{ field: FIELDS[slug] ?? "file", text: inWords((error as Error).message), link }];
 }
 
 /** How a file is to be read. */
@@ -41,7 +63,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
     mass: "",
     columns: "",
   });
-  const [why, setWhy] = useState<Why | null>(null);
+  const [why, setWhy] = useState<Why[]>([]);
   const [busy, setBusy] = useState(false);
   const [robots, setRobots] = useState<Pick<RobotSummary, "name" | "title">[]>([
     { name: settings.robot, title: settings.robot },
@@ -55,8 +77,9 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
     const { mass, columns, ...plain } = settings;
     const weight = parseNumber(mass);
     if (mass.trim() && weight === null)
-      return setWhy({ text: "The payload is a number of kg.", link: null, field: null });
+      return setWhy([{ field: "payload", text: "Enter a number of kg, as 1.5.", link: null }]);
     setBusy(true);
+    setWhy([]);
     try {
       const carried: Record<string, string> =
         weight === null
@@ -72,17 +95,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
       chosen.value = [...new Set([...chosen.value, detail.id])];
       onClose();
     } catch (error) {
-      const details = error instanceof Problem ? error.details : {};
-      const fields = (details.errors ?? [])
-        .map(({ loc, msg }) => `${loc.slice(1).join(".")}: ${msg}`)
-        .join(" ");
-      setWhy({
-        text: inWords(`${(error as Error).message} ${fields}`),
-        field: details.type?.endsWith("effort-not-usable") ? "effort" : null,
-        link: details.type?.includes("problems/")
-          ? details.type.slice(details.type.indexOf("problems/"))
-          : null,
-      });
+      setWhy(reasonsOf(error));
     } finally {
       setBusy(false);
     }
@@ -97,11 +110,14 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
       </select>
     </label>
   );
-  const told = why && (
-    <p class="error" role="alert" id="log-error">
-      {why.text} {why.link && <a href={why.link}>What this means</a>}
-    </p>
-  );
+  const told = (field: Field) =>
+    why
+      .filter((each) => each.field === field)
+      .map(({ text, link }) => (
+        <p class="error" role="alert" key={text} data-field={field}>
+          {text} {link && <a href={link}>What this means</a>}
+        </p>
+      ));
   return (
     <Dialog
       title={`Add ${file.name}`}
@@ -113,9 +129,11 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
       }
     >
       <div class="fields">
+        {told("file")}
         <label>
           Name <input type="text" value={settings.name} onChange={set("name")} />
         </label>
+        {told("name")}
         <label>
           Robot{" "}
           <select value={settings.robot} onChange={set("robot")}>
@@ -126,6 +144,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
             ))}
           </select>
         </label>
+        {told("robot")}
         <label>
           Payload that it carried, kg{" "}
           <input
@@ -136,10 +155,13 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
             onChange={set("mass")}
           />
         </label>
+        {told("payload")}
         {choice("units", "Angles in", ["rad", "deg"])}
+        {told("units")}
         {choice("current_units", "Currents in", ["A", "mA"])}
+        {told("current_units")}
         {choice("effort", "Efforts are", ["auto", "current", "torque", "external"])}
-        {why?.field === "effort" && told}
+        {told("effort")}
         <label>
           Names of columns, as JSON, where they are unusual{" "}
           <input
@@ -149,7 +171,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
             onChange={set("columns")}
           />
         </label>
-        {why?.field !== "effort" && told}
+        {told("columns")}
       </div>
     </Dialog>
   );

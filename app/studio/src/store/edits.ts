@@ -31,6 +31,27 @@ export function asKind(request: ApiRequest, kind: Kind): ApiRequest {
   return kind === "path" ? { ...move, path: isObject(request.path) ? request.path : {} } : move;
 }
 
+/** The fields of a request that belong to its kind. */
+export function ownFields(request: ApiRequest): ApiRequest {
+  const fields = request.stops ? OF_ROUNDS : OF_MOVES;
+  return Object.fromEntries(Object.entries(request).filter(([name]) => fields.includes(name)));
+}
+
+/**
+ * The same cell as a request of a kind that it had before: the fields of then come back, and the
+ * last target is that of now.
+ */
+export function asKindAgain(request: ApiRequest, kind: Kind, before: ApiRequest): ApiRequest {
+  const made = asKind(request, kind);
+  const { path } = before;
+  if (kind !== "round")
+    return { ...(request.stops ? before : {}), ...made, ...(path ? { path } : {}) };
+  const stops = [...listOf<Stop>(before.stops)];
+  const last = stops.findLastIndex((stop) => isObject(stop) && stop.target);
+  if (last >= 0 && request.goal) stops[last] = { ...stops[last]!, target: request.goal };
+  return { ...made, ...before, stops };
+}
+
 /**
  * The request for another robot, without the figures of one arm. Joint positions of another number
  * of joints become the middle of the robot's own.

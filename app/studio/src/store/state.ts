@@ -66,12 +66,11 @@ export interface Looked {
   motion: Answered | null;
 }
 
-/** What went wrong, and the field that caused it. */
+/** What went wrong, and the fields that caused it. */
 export interface Trouble {
   title: string;
   text: string;
   link: string | null;
-  pointer: Pointer | null;
   fields: { pointer: Pointer; text: string }[];
 }
 

@@ -2,6 +2,7 @@
 import { effect, signal } from "@preact/signals";
 import { get } from "./client";
 import { request } from "./state";
+import { said } from "./trouble";
 import type { ApiRequest, Parameter } from "./types";
 
 export interface ToolSummary {
@@ -21,6 +22,9 @@ const known = new Map<string, Promise<ToolDetail>>();
 
 /** The tool that the request names, when its figures have come. */
 export const toolNow = signal<ToolDetail | null>(null);
+
+/** Why the figures of the tool have not come, in words; empty if nothing went wrong. */
+export const toolWhy = signal("");
 
 /** Throws Problem. */
 export const toolList = async (): Promise<ToolSummary[]> =>
@@ -72,6 +76,7 @@ export const dressedLater = async (asked: ApiRequest): Promise<ApiRequest> =>
 export function followTool(): void {
   effect(() => {
     const name = toolName(request.value);
+    toolWhy.value = "";
     if (name === toolNow.peek()?.name) return;
     if (name === null) {
       toolNow.value = null;
@@ -81,6 +86,9 @@ export function followTool(): void {
       .then((tool) => {
         if (toolName(request.peek()) === name) toolNow.value = tool;
       })
-      .catch(() => undefined); // the service says so when the request is sent
+      .catch((error) => {
+        if (toolName(request.peek()) === name)
+          toolWhy.value = `The figures of this gripper did not come. ${said(error)}`;
+      });
   });
 }

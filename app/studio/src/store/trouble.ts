@@ -22,7 +22,18 @@ const FIELDS: Record<string, Pointer> = {
 
 const slugOf = (details: ProblemDetails) => details.type?.split("/").at(-1) ?? "";
 
-/** The field that a problem is about; null if it names none. */
+/** The fields that a problem is about: the target or setting, and the obstacle that is hit. */
+function pointersOf(details: ProblemDetails, asked: ApiRequest): Pointer[] {
+  const isNear = ({ name }: Obstacle) => details.pair?.includes(name);
+  const obstacle = obstaclesListed(asked).findIndex(isNear);
+  const own = pointerOf(details, asked);
+  return [
+    ...(own === null ? [] : [own]),
+    ...(obstacle < 0 ? [] : [join("scene", "obstacles", obstacle)]),
+  ];
+}
+
+/** The target or setting that a problem is about; null if it names none. */
 function pointerOf(details: ProblemDetails, asked: ApiRequest): Pointer | null {
   const place = details.target ?? details.stop ?? details.path;
   if (place && !place.startsWith("stops/")) return `/${place.replaceAll(".", "/")}`;
@@ -31,10 +42,7 @@ function pointerOf(details: ProblemDetails, asked: ApiRequest): Pointer | null {
   const stop = listOf(asked.stops).findIndex(isOf);
   if (stop >= 0) return `/stops/${stop}/target`;
   const pointer = FIELDS[slugOf(details)];
-  if (pointer) return pointer === "/duration" && kindOf(asked) === "round" ? "/time" : pointer;
-  const isNear = ({ name }: Obstacle) => details.pair?.includes(name);
-  const obstacle = obstaclesListed(asked).findIndex(isNear);
-  return obstacle >= 0 ? join("scene", "obstacles", obstacle) : null;
+  return pointer === "/duration" && kindOf(asked) === "round" ? "/time" : (pointer ?? null);
 }
 
 /** Shows what went wrong with a request, at its fields where they are known. */
@@ -50,17 +58,16 @@ export function tell(error: unknown, asked: ApiRequest = request.value): void {
       text: factor === 1 || !/\d/.test(msg) ? msg : `${msg} (in SI units, not ${sign})`,
     };
   });
-  const pointer = pointerOf(details, asked);
   const said = error instanceof Error ? error.message : String(error);
   const text = fields.length ? "Correct what is marked." : asShown(said);
-  if (pointer !== null && !fields.length) fields.push({ pointer, text });
+  if (!fields.length)
+    fields.push(...pointersOf(details, asked).map((pointer) => ({ pointer, text })));
   trouble.value = {
     title: details.title ?? "Something went wrong",
     text,
     link: details.type?.includes("/problems/")
       ? details.type.slice(details.type.indexOf("problems/"))
       : null,
-    pointer,
     fields,
   };
 }

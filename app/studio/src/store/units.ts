@@ -82,6 +82,7 @@ export const asShown = (text: string): string =>
   text
     .replace(/\b[a-z0-9_]+_joint\b/g, jointName)
     .replaceAll("stops/", "stop ")
+    .replace("give it in metres, not millimetres, or ", "") // lengths are typed in millimetres
     .replace(/(\d+(?:\.\d+)?(?:e-?\d+)?) m\b(?![²³])/g, (whole, metres: string) =>
       Number(metres) < LONGEST ? `${figure(Number(metres) * 1000, 2)} mm` : whole,
     );

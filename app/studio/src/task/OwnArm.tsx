@@ -18,6 +18,8 @@ function tipsOf(urdf: string): string[] {
     .concat(links.filter((name) => parents.has(name)).reverse());
 }
 
+const NO_LINK = { field: "urdf", text: "The file describes no link: choose a URDF file." };
+
 /** A robot of the user's own: its URDF, its meshes, and what a URDF does not say. */
 export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
   const [urdf, setUrdf] = useState("");
@@ -34,25 +36,19 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
     const found = tipsOf(text);
     setUrdf(text);
     setTips(found);
-    setForm({
-      ...form,
-      tip: found[0] ?? "",
-      name:
-        form.name ||
-        file.name
-          .replace(/\.\w+$/, "")
-          .toLowerCase()
-          .replace(/[^a-z0-9_-]+/g, "_"),
-    });
-    setWhy(found.length ? [] : [{ field: "urdf", text: "No link was found: choose a URDF file." }]);
+    const stem = file.name.replace(/\.\w+$/, "").toLowerCase();
+    const name = stem.replace(/[^a-z0-9_-]+/g, "_");
+    setForm((now) => ({ ...now, tip: found[0] ?? "", name: now.name || name }));
+    setWhy(found.length ? [] : [NO_LINK]);
   };
   const add = async () => {
     const [acceleration, payload] = [parseNumber(form.acceleration), parseNumber(form.payload)];
     const missing = [
       !urdf && { field: "urdf", text: "Choose the URDF file." },
+      urdf && !tips.length && NO_LINK,
       acceleration === null && { field: "acceleration", text: "Give a number, as 10." },
       payload === null && { field: "payload", text: "Give a number of kg." },
-    ].filter((each) => each !== false);
+    ].filter((each) => each !== false && each !== "");
     setWhy(missing);
     if (missing.length) return;
     setBusy(true);

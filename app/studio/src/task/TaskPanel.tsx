@@ -1,8 +1,8 @@
 import { Button } from "../ui/Button";
 import { Errors } from "../ui/Errors";
 import { Segment } from "../ui/Segment";
-import { asKind } from "../store/edits";
-import { asJson, edit, kind, request } from "../store/state";
+import { chooseKind } from "../store/kinds";
+import { asJson, kind } from "../store/state";
 import { JsonEditor } from "./JsonEditor";
 import { MoreFields } from "./MoreFields";
 import { PathFields } from "./PathFields";
@@ -25,12 +25,7 @@ export function TaskPanel() {
   return (
     <aside class="task" id="task" aria-label="Task">
       <div class="task-head">
-        <Segment
-          label="Kind of task"
-          options={KINDS}
-          value={kind.value}
-          onChange={(next) => edit(asKind(request.value, next))}
-        />
+        <Segment label="Kind of task" options={KINDS} value={kind.value} onChange={chooseKind} />
         <Button
           kind="quiet"
           small

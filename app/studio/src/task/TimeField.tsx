@@ -1,11 +1,11 @@
 import { Errors } from "../ui/Errors";
 import { NumberCell } from "../ui/NumberCell";
+import { PlainNumber } from "../ui/PlainNumber";
 import { Section } from "../ui/Section";
 import { Segment } from "../ui/Segment";
 import { at, put } from "../store/pointer";
 import { isObject } from "../store/request";
 import { answered, economics, edit, kind, request, typed } from "../store/state";
-import { parseNumber } from "../store/units";
 import type { ApiRequest } from "../store/types";
 
 type Choice = "free" | "cycle" | "most" | "exact" | "other";
@@ -82,24 +82,17 @@ export function TimeField() {
 
 /** "One move every … s": it prices the wait, and changes nothing of the motion. */
 function Every() {
-  const value = economics.value.cycle;
-  const set = (text: string) => {
-    const number = parseNumber(text);
-    if (text.trim() === "" || (number !== null && number > 0))
-      economics.value = { ...economics.value, cycle: text.trim() === "" ? null : number };
-  };
   return (
-    <label class="every">
+    <span class="every">
       one {kind.value === "round" ? "round" : "move"} every{" "}
-      <input
-        type="text"
-        inputMode="decimal"
-        aria-label="One move every so many seconds"
-        placeholder="–"
-        value={value ?? ""}
-        onChange={(event) => set(event.currentTarget.value)}
+      <PlainNumber
+        label="One move every so many seconds"
+        value={economics.value.cycle}
+        least="above zero"
+        empty="–"
+        onValue={(cycle) => (economics.value = { ...economics.value, cycle })}
       />{" "}
       s
-    </label>
+    </span>
   );
 }

@@ -2,7 +2,7 @@ import { signal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { put } from "../store/pointer";
 import { edit, request } from "../store/state";
-import { toolList, toolName, toolNow, type ToolSummary } from "../store/tools";
+import { toolList, toolName, toolNow, toolWhy, type ToolSummary } from "../store/tools";
 import { tell } from "../store/trouble";
 import type { Parameter } from "../store/types";
 import { figure } from "../store/units";
@@ -45,6 +45,11 @@ export function ToolPicker() {
           )}
         </select>
       </label>
+      {toolWhy.value && (
+        <p class="error" role="alert">
+          {toolWhy.value}
+        </p>
+      )}
       {toolNow.value && <Figures />}
     </>
   );
