@@ -138,12 +138,12 @@ function Assumptions() {
       <span>{text}</span>
       <PlainNumber
         label={`${text} in ${unit}`}
+        unit={unit}
         value={value}
         least="zero"
         empty={empty}
         onValue={take}
       />
-      <small>{unit}</small>
       <small class="source">{source}</small>
     </div>
   );

@@ -87,12 +87,12 @@ function Every() {
       one {kind.value === "round" ? "round" : "move"} every{" "}
       <PlainNumber
         label="One move every so many seconds"
+        unit="s"
         value={economics.value.cycle}
         least="above zero"
         empty="–"
         onValue={(cycle) => (economics.value = { ...economics.value, cycle })}
-      />{" "}
-      s
+      />
     </span>
   );
 }

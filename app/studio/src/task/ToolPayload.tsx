@@ -22,6 +22,7 @@ export function ToolPayload() {
   const named = typeof asked.tool === "string";
   const own = dressed(asked, toolNow.value).tcp;
   const tcp = isObject(own) ? (own as Pose) : NO_TURN;
+  const isKnown = !named || toolNow.value?.name === asked.tool;
   const [x = 0, y = 0, z = 0] = listOf<number>(tcp.position);
   const mass = at(asked, "/payload/mass");
   const count = listOf(at(asked, "/tool/capsules")).length;
@@ -37,14 +38,14 @@ export function ToolPayload() {
           </b>
           <small>
             {named
-              ? `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm`
+              ? isKnown && `TCP ${figure(Math.hypot(x, y, z) * 1000)} mm`
               : count
                 ? `${count} capsules`
                 : "no shape"}
           </small>
         </summary>
         <ToolPicker />
-        <TcpCells tcp={tcp} />
+        {isKnown && <TcpCells tcp={tcp} />}
         {!named && <Capsules />}
       </details>
       <div class="field payload">

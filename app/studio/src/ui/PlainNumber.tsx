@@ -3,6 +3,7 @@ import { parseNumber } from "../store/units";
 
 interface Props {
   label: string;
+  unit: string;
   value: number | null;
   /** The least number that is taken; zero itself is refused where it is `"above zero"`. */
   least: "zero" | "above zero";
@@ -12,7 +13,7 @@ interface Props {
 }
 
 /** A number beside the request, such as a price: a text that is none stays, with a sentence. */
-export function PlainNumber({ label, value, least, empty, onValue }: Props) {
+export function PlainNumber({ label, unit, value, least, empty, onValue }: Props) {
   const [wrong, setWrong] = useState<string | null>(null);
   const commit = (text: string) => {
     const number = parseNumber(text);
@@ -32,6 +33,7 @@ export function PlainNumber({ label, value, least, empty, onValue }: Props) {
         value={wrong ?? value ?? ""}
         onChange={(event) => commit(event.currentTarget.value)}
       />
+      <small>{unit}</small>
       {wrong !== null && (
         <small class="error" role="alert">
           Enter a number {least === "zero" ? "of at least 0" : "above 0"}
