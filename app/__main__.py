@@ -10,7 +10,12 @@ from types import FrameType
 
 def main() -> None:
     """Serves until SIGTERM or Ctrl-C, then exits with 0; with 1 and a message if a setting is
-    wrong, or if another program has the address."""
+    wrong, if there are arguments, or if another program has the address."""
+    if len(sys.argv) > 1:
+        sys.exit(
+            f"The service takes no arguments, but {sys.argv[1]!r} was given: set JOULEPATH_… in the "
+            "environment, or use the commands of `joulepath --help`."
+        )
     # for the time before uvicorn handles signals, and after: when it is done, it raises the signal
     # again
     signal.signal(signal.SIGTERM, _exit)

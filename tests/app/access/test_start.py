@@ -49,6 +49,11 @@ def test_the_process_ends_with_the_remedies() -> None:
     assert b"Traceback" not in ended.stderr
 
 
+def test_arguments_are_refused_and_not_ignored() -> None:
+    ended = run(("joulepath.app", "--port", "80"), os.environ | {"PORT": "0"}, EXIT)
+    assert ended.returncode == 1 and b"takes no arguments" in ended.stderr
+
+
 @pytest.mark.parametrize(
     ("host", "level", "to"),
     [
