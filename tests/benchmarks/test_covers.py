@@ -42,5 +42,5 @@ def test_what_another_cover_contains_is_no_excess() -> None:
 
 def test_a_robot_without_readable_meshes_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["--meshes", "gen3=."])
-    assert "gen3" in capsys.readouterr().err
+        main(["--meshes", "ur15=."])
+    assert "ur15" in capsys.readouterr().err
