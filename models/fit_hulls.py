@@ -25,27 +25,23 @@ from joulepath.models.robot import Array, LinkHull, Robot
 def fitted_hulls(folder: Path, robot: Robot, link: int) -> list[LinkHull]:
     """The hulls around the parts of a link."""
     radius = robot.figures["hulls"]["radius"]["value"]
-    triangles = _surface(folder, robot, link)
-    parts = divided(triangles, radius, _within_neighbours(folder, robot, link, radius))
+    surfaces = list(link_surfaces(folder, robot.name, link).values())
+    parts = divided(surfaces, radius, _within_neighbours(folder, robot, link, radius))
     return [
         LinkHull(link, hull_around(part.reshape(-1, 3), radius=radius), radius) for part in parts
     ]
-
-
-def _surface(folder: Path, robot: Robot, link: int) -> Array:
-    """Triangles (t, 3, 3) [m] of all meshes of a link."""
-    return np.concatenate(list(link_surfaces(folder, robot.name, link).values()))
 
 
 def _within_neighbours(folder: Path, robot: Robot, link: int, radius: float) -> Inside:
     """Whether points are within the hull of a neighbouring link at every angle of the joint: in the
     hollow ends of links, where no obstacle can be.
     """
-    planes = {
-        other: ConvexHull(hull_around(_surface(folder, robot, other).reshape(-1, 3))).equations
-        for other in (link - 1, link + 1)
-        if 1 <= other <= robot.nq
-    }
+    planes = dict[int, Array]()
+    for other in (link - 1, link + 1):
+        if 1 <= other <= robot.nq:
+            surfaces = link_surfaces(folder, robot.name, other).values()
+            corners = np.concatenate([each.reshape(-1, 3) for each in surfaces])
+            planes[other] = ConvexHull(hull_around(corners)).equations
 
     def inside(points: Array) -> Mask:
         found = np.zeros(len(points), dtype=bool)

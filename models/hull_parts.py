@@ -23,18 +23,18 @@ class PartSettings:
 
     most: int = 5
     """Most parts of a link: each is another distance per obstacle."""
-    p99: float = 3e-3
-    """99th percentile of the excess of the grown hulls over the surface [m] from which on no part
-    is divided."""
-    maximum: float = 7e-3
-    """Largest such excess [m], below the 8 mm that `benchmarks.covers` requires at more points."""
+    p99: float = 1.5e-3
+    """99th percentile of the excess of the parts' hulls, before they are grown, over the surface
+    [m] from which on no part is divided."""
+    maximum: float = 5.5e-3
+    """Largest such excess [m]."""
     free: float = 0.5e-3
     """Excess [m] that costs nothing: about the distance between the points of the surface."""
     overlap: float = 1e-4
     """Distance [m] by which both parts reach beyond their plane, so that the proof of the cover
     ends at triangles of this size."""
-    surface: int = 100_000
-    """Points of the surface, from which distances are measured."""
+    surface: int = 200_000
+    """Points of every mesh, from which distances are measured."""
     density: float = 12_000.0
     """Points of a hull per m², at which its excess is measured."""
     offsets: int = 9
@@ -80,8 +80,9 @@ def below(triangles: Array, normal: Array, offset: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Triangles of a part, the planes of its hull, points of the hull's surface with their distances
-    from the surface of the link, and the area [m²] of each. Those farther than `free` come first.
+    """Triangles of a part, the planes of its hull, points of the hull's surface with their
+    distances from the surface of the link, and the area [m²] of each. The `far` ones, farther than
+    `free`, come first.
     """
 
     triangles: Array
@@ -117,7 +118,7 @@ class Division:
         hull = ConvexHull(triangles.reshape(-1, 3))
         count = int(PARTS.density * hull.area) + 1
         points = sampled(hull.points[hull.simplices], count, np.random.default_rng(0))
-        distances = self.tree.query(points)[0]
+        distances = np.asarray(self.tree.query(points)[0])
         order = (-distances).argsort()
         points, distances = points[order], distances[order]
         far = int((distances > PARTS.free).sum())
@@ -164,8 +165,8 @@ class Division:
 
         for normal in DIRECTIONS:
             ends = np.quantile(corners @ normal, [0, 1])
-            for offset in np.linspace(*ends, PARTS.offsets + 2)[1:-1]:
-                attempt(normal, float(offset))
+            for share in np.linspace(0.0, 1.0, PARTS.offsets + 2)[1:-1]:
+                attempt(normal, float(ends[0] + share * (ends[1] - ends[0])))
         for spread in PARTS.spreads:
             assert best is not None, "a body with a volume has a plane through it"
             _, normal, offset, _ = best
@@ -178,13 +179,15 @@ class Division:
         return best[3]
 
 
-def divided(triangles: Array, radius: float, inside: Inside, most: int = PARTS.most) -> list[Array]:
-    """Parts of the surface of a link, whose hulls cover it together.
+def divided(
+    surfaces: Sequence[Array], radius: float, inside: Inside, most: int = PARTS.most
+) -> list[Array]:
+    """Parts of the surfaces of a link, whose hulls cover them together.
 
     The part that costs the most is divided again, until the excess of all is within the limits.
 
     Args:
-        triangles: the surface (t, 3, 3) [m].
+        surfaces: triangles (t, 3, 3) [m] of every mesh.
         radius: radius by which the hulls will be grown [m].
         inside: the places where the excess does not count.
         most: the largest number of parts.
@@ -193,10 +196,11 @@ def divided(triangles: Array, radius: float, inside: Inside, most: int = PARTS.m
         The triangles (k, 3, 3) [m] of every part.
 
     Raises:
-        QhullError: the surface is flat.
+        QhullError: the surfaces are flat.
     """
     rng = np.random.default_rng(0)
-    division = Division(cKDTree(sampled(triangles, PARTS.surface, rng)), inside, radius, rng)
+    near = np.concatenate([sampled(each, PARTS.surface, rng) for each in surfaces])
+    division, triangles = Division(cKDTree(near), inside, radius, rng), np.concatenate(surfaces)
     parts = [division.part(triangles)]
     while len(parts) < most:
         rest = [[each for each in parts if each is not part] for part in parts]
@@ -204,7 +208,7 @@ def divided(triangles: Array, radius: float, inside: Inside, most: int = PARTS.m
         p99, maximum = np.percentile(
             np.concatenate([division.distances(*pair) for pair in pairs]), [99, 100]
         )
-        if p99 <= PARTS.p99 - radius and maximum <= PARTS.maximum - radius:
+        if p99 <= PARTS.p99 and maximum <= PARTS.maximum:
             break
         cost = [division.cost(*pair) for pair in pairs]
         worst = int(np.argmax(cost))

@@ -38,7 +38,7 @@ SHIFTS = {
 # kuka_agilus_support/meshes/kr10_r1100_2 in github.com/kroshu/kuka_robot_descriptions,
 # xarm_description/meshes/xarm7 in github.com/xArm-Developer/xarm_ros2, and
 # kortex_description/arms/gen3/7dof/meshes in github.com/Kinovarobotics/ros2_kortex
-MESH_FILES = {
+MESH_FILES: dict[str, list[tuple[str, ...]]] = {
     "panda": [(f"visual/link{k}", f"collision/link{k}") for k in range(8)],
     "iiwa14": [(f"collision/link_{k}",) for k in range(8)],
     "kr10_r1100": [(f"collision/{k}",) for k in ("base_link", *(f"link_{k}" for k in range(1, 7)))],
