@@ -33,8 +33,10 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, LinkHull, Robot
 from joulepath.models.tools.registry import tool_figures
 
-# limits of the excess of hulls [m]: 99th percentile over the surface of an arm, and maximum
+# limits of the excess of hulls [m]: 99th percentile over the surface of an arm, and maximum; of
+# bent links, which have several hulls, hollows remain that planes do not divide well
 P99, MOST = 3e-3, 8e-3
+BENT_P99, BENT_MOST = 4.5e-3, 16e-3
 # points of a cover's surface per m², of every mesh, and directions that stand for a ball
 DENSITY, MESH_POINTS, DIRECTIONS = 100_000, 200_000, 2_000
 
@@ -156,6 +158,16 @@ def _row(name: str, link: str, kind: str, bodies: int, missed: int, excess: Arra
     return Excess(name, link, kind, bodies, missed, p50, p99, most)
 
 
+def exceeds(row: Excess, rows: Sequence[Excess]) -> bool:
+    """Whether the hulls of an arm or tool leave a piece uncovered, or exceed the limits."""
+    bent = any(
+        (each.robot, each.kind) == (row.robot, row.kind) and each.link != "all" and each.bodies > 1
+        for each in rows
+    )
+    p99, most = (BENT_P99, BENT_MOST) if bent else (P99, MOST)
+    return row.uncovered > 0 or row.p99 > p99 or row.maximum > most
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; returns the exit code."""
     command = parser(__doc__)
@@ -184,8 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 flush=True,
             )
     write_json(given.json, {"rows": [asdict(row) for row in rows]})
-    hulls = [row for row in rows if row.kind == "hulls" and row.link == "all"]
-    return int(any(row.uncovered or row.p99 > P99 or row.maximum > MOST for row in hulls))
+    return int(any(exceeds(row, rows) for row in rows if row.kind == "hulls" and row.link == "all"))
 
 
 if __name__ == "__main__":

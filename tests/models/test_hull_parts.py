@@ -24,8 +24,8 @@ def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Ar
     return np.asarray(corners[ConvexHull(corners).simplices])
 
 
-BENT = np.concatenate([box((0, 0, 0), (0.1, 0.03, 0.03)), box((0, 0, 0), (0.03, 0.1, 0.03))])
-"""Two arms of 0.1 m at a right angle."""
+BENT = np.concatenate([box((0, 0, 0), (0.05, 0.015, 0.015)), box((0, 0, 0), (0.015, 0.05, 0.015))])
+"""Two arms of 5 cm at a right angle."""
 
 
 def nowhere(points: Array) -> Mask:
@@ -67,17 +67,17 @@ def test_both_sides_of_a_plane_are_the_whole_surface() -> None:
 
 
 def test_two_hulls_hold_a_bent_link_closely() -> None:
-    """One hull reaches 3 cm into the bend."""
+    """One hull reaches 16 mm into the bend."""
     parts = divided([BENT], RADIUS, nowhere)
     hulls = hulls_of(parts)
     assert len(hulls) == 2
     assert not len(not_held(BENT, hulls))
     assert excess(hulls, BENT).max() < PARTS.maximum + SAMPLED
-    assert excess(hulls_of([BENT]), BENT).max() > 0.03
+    assert excess(hulls_of([BENT]), BENT).max() > 0.016
 
 
 def test_more_parts_than_allowed_are_not_made() -> None:
-    arms = [BENT, BENT + np.array([0.0, 0.0, 0.07]), box((0, 0, 0), (0.03, 0.03, 0.1))]
+    arms = [BENT, BENT + np.array([0.0, 0.0, 0.035]), box((0, 0, 0), (0.015, 0.015, 0.05))]
     triangles = np.concatenate(arms)
     parts = divided(arms, RADIUS, nowhere, most=3)
     assert len(parts) == 3
@@ -86,7 +86,7 @@ def test_more_parts_than_allowed_are_not_made() -> None:
 
 def test_what_needs_no_division_is_one_part() -> None:
     """A convex body, and a bent one where no obstacle can be."""
-    assert len(divided([box((0, 0, 0), (0.1, 0.03, 0.03))], RADIUS, nowhere)) == 1
+    assert len(divided([box((0, 0, 0), (0.05, 0.015, 0.015))], RADIUS, nowhere)) == 1
     assert len(divided([BENT], RADIUS, everywhere)) == 1
 
 
