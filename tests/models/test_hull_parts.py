@@ -76,6 +76,7 @@ def test_two_hulls_hold_a_bent_link_closely() -> None:
     assert excess(hulls_of([BENT]), BENT).max() > 0.016
 
 
+@pytest.mark.long
 def test_more_parts_than_allowed_are_not_made() -> None:
     arms = [BENT, BENT + np.array([0.0, 0.0, 0.035]), box((0, 0, 0), (0.015, 0.015, 0.05))]
     triangles = np.concatenate(arms)
