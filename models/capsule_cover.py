@@ -12,14 +12,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
 
 from joulepath.models.hull_cover import from_hull
-from joulepath.models.robot import Array, LinkCapsule, LinkHull
+from joulepath.models.robot import Array, LinkCapsule, LinkHull, Robot
 
 LinkCover = LinkCapsule | LinkHull
 SMALLEST = 2e-5
 """Longest edge [m] below which a piece is not bisected further: it lies outside, or where two
 of the covers touch."""
+TURNS = 8
+"""Angles of a joint, evenly distributed, at which neighbouring links are compared."""
 
 
 def outside(points: Array, covers: Sequence[LinkCover]) -> Array:
@@ -36,6 +39,18 @@ def outside(points: Array, covers: Sequence[LinkCover]) -> Array:
         share = np.clip(from_begin @ along / max(float(along @ along), 1e-18), 0.0, 1.0)
         distances.append(np.linalg.norm(from_begin - share[:, None] * along, axis=1) - cover.radius)
     return np.array(distances)
+
+
+def turned_into(robot: Robot, link: int, other: int, points: Array) -> list[Array]:
+    """Points (k, 3) [m] of the frame of a link in that of the next or the previous link, at each of
+    TURNS angles of the joint between them.
+    """
+    found, joint = list[Array](), robot.model.jointPlacements[max(link, other)]
+    for angle in 2 * np.pi * np.arange(TURNS) / TURNS:
+        T = joint * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3))
+        T = T.inverse() if other > link else T
+        found.append(points @ T.rotation.T + T.translation)
+    return found
 
 
 def not_held(triangles: Array, covers: Sequence[LinkCover]) -> Array:

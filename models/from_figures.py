@@ -130,15 +130,14 @@ def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, .
 
 
 def _hulls(figures: dict[str, Any], model: pin.Model) -> tuple[LinkHull, ...]:
-    """Hulls of the links of the section `hulls`, from the base on. Raises ValueError."""
-    rows = {
-        link: figures[name]["value"]
-        for link, name in enumerate(link_names(model))
-        if name in figures
-    }
+    """Hulls of the links of the section `hulls`, from the base on; those of a link in the order of
+    its figure. Raises ValueError.
+    """
     return tuple(
         LinkHull(link, read_only(points, (len(points), 3), "A hull"), figures["radius"]["value"])
-        for link, points in rows.items()
+        for link, name in enumerate(link_names(model))
+        if name in figures
+        for points in figures[name]["value"]
     )
 
 

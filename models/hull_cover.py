@@ -19,8 +19,8 @@ class HullFitSettings:
     """Settings of the fit."""
 
     radius: float = 0.0027
-    """Radius by which hulls are grown [m]. The larger it is, the fewer points a hull needs, and
-    the farther it reaches beyond the link."""
+    """Radius by which hulls are grown [m], unless figures have another. The larger it is, the fewer
+    points a hull needs, and the farther it reaches beyond the link."""
     digit: float = 1e-4
     """Last digit of the points [m]."""
 
@@ -65,15 +65,20 @@ def _from_faces(points: Array, hull: ConvexHull) -> Array:
     return result
 
 
-def hull_around(points: Array, most: float = np.inf, checkpoint: Checkpoint = unwatched) -> Array:
-    """Points (n, 3) [m] whose hull, grown by the radius, contains points (k, 3) [m].
+def hull_around(
+    points: Array,
+    most: float = np.inf,
+    checkpoint: Checkpoint = unwatched,
+    radius: float = HULL_FIT.radius,
+) -> Array:
+    """Points (n, 3) [m] whose hull, grown by the radius [m], contains points (k, 3) [m].
 
     The point that is the farthest outside is added until none is, or until there are more than
     `most`: then the hull is too small. Raises QhullError for flat points.
     """
     points = points[ConvexHull(points).vertices]
     # Rounding moves a point, and with it the hull, by at most half of a cell's diagonal.
-    reach = HULL_FIT.radius - np.sqrt(3) / 2 * HULL_FIT.digit
+    reach = radius - np.sqrt(3) / 2 * HULL_FIT.digit
     chosen = _spanning(points)
     while True:
         checkpoint()

@@ -1,10 +1,10 @@
 """Triangles of the meshes covered by the capsules of a robot, in link frames.
 
-The meshes are not part of this package. A folder contains `visual/NAME` and `collision/NAME`, each
+The meshes are not part of this package. A folder contains them as the maker's repository does, each
 as OBJ, STL or COLLADA. For arms of Universal Robots, these are the folders of the package
 `airo-models` on PyPI, or meshes/ur10e in
-github.com/UniversalRobots/Universal_Robots_ROS2_Description. For the Panda, they are
-meshes/robot_arms/fer in github.com/frankaemika/franka_description.
+github.com/UniversalRobots/Universal_Robots_ROS2_Description, and for the others those of
+MESH_FILES.
 """
 
 from __future__ import annotations
@@ -32,8 +32,45 @@ SHIFTS = {
     "ur10e": (0.1762, 0.0393, -0.135, -0.12, -0.1168),
     "ur16e": (0.176, 0.04, -0.135, -0.12, -0.1168),
 }
-# the arm whose meshes are in the frames of the links
-PANDA = "panda"
+# the files of the links of the other arms, base first, in these folders:
+# meshes/robot_arms/fer in github.com/frankaemika/franka_description,
+# iiwa_description/meshes/iiwa14 in github.com/RobotLocomotion/models,
+# kuka_agilus_support/meshes/kr10_r1100_2 in github.com/kroshu/kuka_robot_descriptions,
+# xarm_description/meshes/xarm7 in github.com/xArm-Developer/xarm_ros2, and
+# kortex_description/arms/gen3/7dof/meshes in github.com/Kinovarobotics/ros2_kortex
+MESH_FILES: dict[str, list[tuple[str, ...]]] = {
+    "panda": [(f"visual/link{k}", f"collision/link{k}") for k in range(8)],
+    "iiwa14": [(f"collision/link_{k}",) for k in range(8)],
+    "kr10_r1100": [(f"collision/{k}",) for k in ("base_link", *(f"link_{k}" for k in range(1, 7)))],
+    "xarm7": [(f"visual/link{k}",) for k in ("_base", *range(1, 8))],
+    "gen3": [
+        (name,)
+        for name in (
+            "base_link",
+            "shoulder_link",
+            "half_arm_1_link",
+            "half_arm_2_link",
+            "forearm_link",
+            "spherical_wrist_1_link",
+            "spherical_wrist_2_link",
+            "bracelet_no_vision_link",
+        )
+    ],
+}
+# x, y, z [m] and roll, pitch, yaw [rad] of the meshes in the link frames, base first, from
+# kuka_agilus_support/urdf/kr10_r1100_2_macro.xacro; the meshes of the other arms of MESH_FILES are
+# in these frames
+_PLACED = {
+    "kr10_r1100": (
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.208, np.pi, 0.0, 0.0),
+        (-0.4, -0.025, -0.0907, np.pi / 2, 0.0, np.pi / 2),
+        (-0.025, 0.96, -0.0865, np.pi / 2, 0.0, 0.0),
+        (-0.985, 0.0, 0.221, 0.0, np.pi / 2, 0.0),
+        (-0.54, 0.985, -0.0505, np.pi / 2, 0.0, 0.0),
+        (-0.985, 0.0, 0.6015, 0.0, np.pi / 2, 0.0),
+    )
+}
 # files of the links, base first, and roll, pitch, yaw [rad] of the meshes in the link frames
 _ALONG = (np.pi / 2, 0.0, -np.pi / 2)
 _UPRIGHT = (np.pi / 2, 0.0, 0.0)
@@ -62,15 +99,17 @@ def mesh_placement(robot: str, link: int) -> pin.SE3:
 
 
 def link_surfaces(folder: Path, robot: str, link: int) -> dict[str, Array]:
-    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link; of a COLLADA file, the
-    triangles of its convex hull. `robot` is one of SHIFTS or PANDA.
+    """Triangles (t, 3, 3) [m] of each mesh of a link, in its frame, by kind or file; of a COLLADA
+    file, the triangles of its convex hull. `robot` is one of SHIFTS or MESH_FILES.
     """
-    if robot == PANDA:
-        return {kind: surface(folder / kind / f"link{link}") for kind in KINDS}
-    T = mesh_placement(robot, link)
-    return {
-        kind: surface(folder / kind / _FILES[link]) @ T.rotation.T + T.translation for kind in KINDS
-    }
+    if robot in SHIFTS:
+        T = mesh_placement(robot, link)
+        found = {kind: surface(folder / kind / _FILES[link]) for kind in KINDS}
+    else:
+        row = _PLACED[robot][link] if robot in _PLACED else (0.0,) * 6
+        T = pin.SE3(pin.rpy.rpyToMatrix(*row[3:]), np.array(row[:3]))
+        found = {file: surface(folder / file) for file in MESH_FILES[robot][link]}
+    return {kind: each @ T.rotation.T + T.translation for kind, each in found.items()}
 
 
 def sampled(triangles: Array, count: int, rng: np.random.Generator) -> Array:
@@ -103,8 +142,9 @@ def surface(stem: Path) -> Array:
     file, those of its convex hull.
     """
     for suffix, read in _READERS.items():
-        if (path := stem.with_suffix(suffix)).is_file():
-            return read(path)
+        for written in (suffix, suffix.upper()):
+            if (path := stem.with_suffix(written)).is_file():
+                return read(path)
     raise FileNotFoundError(f"no mesh {stem} as {', '.join(_READERS)}")
 
 

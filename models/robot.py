@@ -197,8 +197,9 @@ class Robot:
     content of `GET /robots/{name}`: every figure with its unit, source and trust letter.
     `default_motion` is None if the controller's defaults are unknown.
 
-    The `capsules` cover the meshes of the links. A hull in `hulls` covers its link more closely:
-    distances to obstacles are those of hulls, and distances between links those of capsules.
+    The `capsules` cover the meshes of the links. The `hulls` of a link, one or several, cover it
+    more closely: distances to obstacles are those of hulls, and distances between links those of
+    capsules.
     `never_in_collision` has pairs of non-adjacent links which cannot touch in any configuration.
     `elbow` is the capsule around the elbow, for its speed limit; None for an arm without an elbow.
     `torque_side` is `motor` if the torque limits include rotor and friction, `link` if they exclude

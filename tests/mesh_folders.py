@@ -4,7 +4,8 @@ environment names.
 The package `airo-models` ships those of UR3e and UR5e. No package ships those of UR10e and UR16e:
 tests of theirs run where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in
 `joulepath.models.meshes`: the maker's files, as OBJ. Parts that a UR16e shares with the UR10e are
-in both.
+in both. A test of the hulls of other arms runs for each that this folder has: `panda`, `iiwa14`,
+`kr10_r1100`, `xarm7`, `gen3`.
 """
 
 from __future__ import annotations

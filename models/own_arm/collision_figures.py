@@ -92,7 +92,7 @@ def _hull_figures(
     if not found:
         return {}
     note = "x, y, z in the link frame. Obstacles are compared with it, except clouds."
-    figures = {name: stated(description, points, "m", note) for name, points in found.items()}
+    figures = {name: stated(description, [points], "m", note) for name, points in found.items()}
     radius = stated(description, HULL_FIT.radius, "m", "Grows the hulls of the points.")
     return {"hulls": {"radius": radius} | figures}
 

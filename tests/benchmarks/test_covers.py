@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from benchmarks.covers import beyond, main
+from benchmarks.covers import beyond, main, within_neighbours
+from joulepath.models.meshes import MESH_FILES
+from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, LinkHull
+from tests.mesh_folders import meshes
 
 # m; between samples of the mesh, and of the ball by flat triangles
 SAMPLED = 4e-4
@@ -42,5 +49,30 @@ def test_what_another_cover_contains_is_no_excess() -> None:
 
 def test_a_robot_without_readable_meshes_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["--meshes", "gen3=."])
-    assert "gen3" in capsys.readouterr().err
+        main(["--meshes", "ur15=."])
+    assert "ur15" in capsys.readouterr().err
+
+
+ARMS = [name for name in MESH_FILES if (Path(os.environ.get("ROBOT_MESHES", "")) / name).is_dir()]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ARMS)
+def test_the_hulls_of_an_arm_are_proven_and_within_the_limits(name: str) -> None:
+    assert main(["--meshes", f"{name}={meshes(name)}"]) == 0
+
+
+def test_points_within_a_neighbour_at_every_angle_are_no_excess() -> None:
+    """A ball around the origin of the next link's joint hides what lies on this joint's axis, and
+    not what lies beside its reach at any angle.
+    """
+    robot = load_robot("ur5e")
+    joint = robot.model.jointPlacements[3]
+    axis = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.2]])
+    off_axis = LinkCapsule(3, np.array([[0.03, 0.0, 0.0], [0.03, 0.0, 0.0]]), 0.05)
+    points = axis @ joint.rotation.T + joint.translation
+    assert within_neighbours(robot, 2, [off_axis], points).tolist() == [True, False]
+    # inside the ball at some angles only
+    beside = np.array([[0.06, 0.0, 0.0]]) @ joint.rotation.T + joint.translation
+    assert not within_neighbours(robot, 2, [off_axis], beside).any()
+    assert not within_neighbours(robot, 2, [replace(off_axis, link=4)], points).any()

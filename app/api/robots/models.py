@@ -102,9 +102,9 @@ class RobotDetail(RobotSummary):
         "z1, x2, y2, z2, radius]: both ends of its axis in the link frame."
     )
     hulls: Parameters | None = part(
-        "Convex hulls that hold each link more closely, and are compared with obstacles: points "
-        "[x, y, z] in the link frame, whose hull is grown by `radius`; null for a robot without "
-        "hulls."
+        "Convex hulls that hold each link more closely, and are compared with obstacles: for each "
+        "hull of a link, points [x, y, z] in the link frame, whose hull is grown by `radius`; null "
+        "for a robot without hulls."
     )
     drives: Parameters = part("Motors, gears and inverters.")
     electronics: Parameters = part(

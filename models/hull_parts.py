@@ -1,0 +1,216 @@
+"""Surfaces of bent links, divided by planes into parts that are nearly convex."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from joulepath.models.meshes import sampled
+from joulepath.models.robot import Array
+
+Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+Inside = Callable[[Array], Mask]
+"""Whether each of the points (k, 3) [m] lies where no obstacle can be."""
+
+
+@dataclass(frozen=True)
+class PartSettings:
+    """Settings of the division."""
+
+    most: int = 5
+    """Most parts of a link: each is another distance per obstacle."""
+    p99: float = 1.5e-3
+    """99th percentile of the excess of the parts' hulls, before they are grown, over the surface
+    [m] from which on no part is divided."""
+    maximum: float = 5.5e-3
+    """Largest such excess [m]."""
+    free: float = 0.5e-3
+    """Excess [m] that costs nothing: about the distance between the points of the surface."""
+    overlap: float = 1e-4
+    """Distance [m] by which both parts reach beyond their plane, so that the proof of the cover
+    ends at triangles of this size."""
+    surface: int = 200_000
+    """Points of every mesh, from which distances are measured."""
+    density: float = 12_000.0
+    """Points of a hull per m², at which its excess is measured."""
+    offsets: int = 9
+    """Planes of each of the thirteen directions."""
+    trials: int = 40
+    """Random planes around the best one, for each of `spreads`."""
+    spreads: tuple[float, ...] = (0.3, 0.1)
+    """Standard deviations of the normal [rad]."""
+    shift: float = 0.03
+    """Standard deviation of the offset per spread [m]: some tenths of the width of a link."""
+
+
+PARTS = PartSettings()
+DIRECTIONS = [
+    np.array(each) / np.linalg.norm(each)
+    for each in product((-1.0, 0.0, 1.0), repeat=3)
+    if each > (0.0, 0.0, 0.0)
+]
+"""Normals of the first planes: along axes and diagonals of the link frame."""
+
+
+def below(triangles: Array, normal: Array, offset: float) -> Array:
+    """The pieces (k, 3, 3) of triangles (t, 3, 3) with `normal · x <= offset`."""
+    height = triangles @ normal - offset
+    is_below = height <= 0
+    count = is_below.sum(axis=1)
+    pieces = [triangles[count == 3]]
+    for corners in (1, 2):
+        cut, h = triangles[count == corners], height[count == corners]
+        is_lone = is_below[count == corners] == (corners == 1)
+        rows, first = np.arange(len(cut)), is_lone.argmax(axis=1)
+        (a, b, c), (ha, hb, hc) = (
+            [each[rows, (first + k) % 3] for k in range(3)] for each in (cut, h)
+        )
+        to_b = a + (b - a) * (ha / (ha - hb))[:, None]
+        to_c = a + (c - a) * (ha / (ha - hc))[:, None]
+        if corners == 1:
+            pieces.append(np.stack([a, to_b, to_c], axis=1))
+        else:
+            pieces += [np.stack([to_b, b, c], axis=1), np.stack([to_b, c, to_c], axis=1)]
+    return np.concatenate(pieces)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Triangles of a part, the planes of its hull, points of the hull's surface with their
+    distances from the surface of the link, and the area [m²] of each. The `far` ones, farther than
+    `free`, come first.
+    """
+
+    triangles: Array
+    planes: Array
+    points: Array
+    distances: Array
+    far: int
+    area: float
+
+    def above(self, points: Array) -> Array:
+        """Heights (k,) [m] of points above the hull."""
+        return np.asarray((points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Division:
+    """A division of the surface of one link.
+
+    Attributes:
+        tree: points of the surface.
+        inside: the places that do not count.
+        radius: radius by which the hulls are grown [m].
+        rng: of the random planes.
+    """
+
+    tree: cKDTree
+    inside: Inside
+    radius: float
+    rng: np.random.Generator
+
+    def part(self, triangles: Array) -> _Part:
+        """A part of these triangles. Raises QhullError for flat ones."""
+        hull = ConvexHull(triangles.reshape(-1, 3))
+        count = int(PARTS.density * hull.area) + 1
+        points = sampled(hull.points[hull.simplices], count, np.random.default_rng(0))
+        distances = np.asarray(self.tree.query(points)[0])
+        order = (-distances).argsort()
+        points, distances = points[order], distances[order]
+        far = int((distances > PARTS.free).sum())
+        counts = np.ones(count, dtype=bool)
+        counts[:far] = ~self.inside(points[:far])
+        return _Part(
+            triangles,
+            hull.equations,
+            points[counts],
+            distances[counts],
+            int(counts[:far].sum()),
+            hull.area / count,
+        )
+
+    def distances(self, part: _Part, others: Sequence[_Part], most: int | None = None) -> Array:
+        """Distances (k,) [m] of the first `most` points of a part that are outside the others."""
+        counts = np.ones(len(part.points[:most]), dtype=bool)
+        for other in others:
+            counts[counts] = other.above(part.points[:most][counts]) >= self.radius
+        return np.asarray(part.distances[:most][counts])
+
+    def cost(self, part: _Part, others: Sequence[_Part]) -> float:
+        """Integral of the squared excess over the surface [m⁴]."""
+        excess = self.distances(part, others, part.far) - PARTS.free
+        return float(part.area * (excess**2).sum())
+
+    def halves(self, part: _Part, others: Sequence[_Part]) -> tuple[_Part, _Part]:
+        """The two parts of a part by the plane of the least cost that was found."""
+        corners = part.triangles.reshape(-1, 3)
+        best: tuple[float, Array, float, tuple[_Part, _Part]] | None = None
+
+        def attempt(normal: Array, offset: float) -> None:
+            nonlocal best
+            try:
+                first, second = (
+                    self.part(below(part.triangles, sign * normal, sign * offset + PARTS.overlap))
+                    for sign in (1.0, -1.0)
+                )
+            except (QhullError, ValueError):
+                return  # flat, or without a triangle
+            cost = self.cost(first, [second, *others]) + self.cost(second, [first, *others])
+            if best is None or cost < best[0]:
+                best = cost, normal, offset, (first, second)
+
+        for normal in DIRECTIONS:
+            ends = np.quantile(corners @ normal, [0, 1])
+            for share in np.linspace(0.0, 1.0, PARTS.offsets + 2)[1:-1]:
+                attempt(normal, float(ends[0] + share * (ends[1] - ends[0])))
+        for spread in PARTS.spreads:
+            assert best is not None, "a body with a volume has a plane through it"
+            _, normal, offset, _ = best
+            middle = corners[np.abs(corners @ normal - offset).argsort()[:20]].mean(axis=0)
+            for _ in range(PARTS.trials):
+                turned = normal + spread * self.rng.normal(size=3)
+                turned /= np.linalg.norm(turned)
+                attempt(turned, middle @ turned + spread * PARTS.shift * self.rng.normal())
+        assert best is not None
+        return best[3]
+
+
+def divided(
+    surfaces: Sequence[Array], radius: float, inside: Inside, most: int = PARTS.most
+) -> list[Array]:
+    """Parts of the surfaces of a link, whose hulls cover them together.
+
+    The part that costs the most is divided again, until the excess of all is within the limits.
+
+    Args:
+        surfaces: triangles (t, 3, 3) [m] of every mesh.
+        radius: radius by which the hulls will be grown [m].
+        inside: the places where the excess does not count.
+        most: the largest number of parts.
+
+    Returns:
+        The triangles (k, 3, 3) [m] of every part.
+
+    Raises:
+        QhullError: the surfaces are flat.
+    """
+    rng = np.random.default_rng(0)
+    near = np.concatenate([sampled(each, PARTS.surface, rng) for each in surfaces])
+    division, triangles = Division(cKDTree(near), inside, radius, rng), np.concatenate(surfaces)
+    parts = [division.part(triangles)]
+    while len(parts) < most:
+        rest = [[each for each in parts if each is not part] for part in parts]
+        pairs = list(zip(parts, rest, strict=True))
+        p99, maximum = np.percentile(
+            np.concatenate([division.distances(*pair) for pair in pairs]), [99, 100]
+        )
+        if p99 <= PARTS.p99 and maximum <= PARTS.maximum:
+            break
+        cost = [division.cost(*pair) for pair in pairs]
+        worst = int(np.argmax(cost))
+        parts = [*rest[worst], *division.halves(parts[worst], rest[worst])]
+    return [part.triangles for part in parts]
