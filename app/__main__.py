@@ -13,8 +13,8 @@ def main() -> None:
     wrong, if there are arguments, or if another program has the address."""
     if len(sys.argv) > 1:
         sys.exit(
-            f"The service takes no arguments, but {sys.argv[1]!r} was given: set JOULEPATH_… in the "
-            "environment, or use the commands of `joulepath --help`."
+            f"The service takes no arguments, but {sys.argv[1]!r} was given: set JOULEPATH_… in "
+            "the environment, or use the commands of `joulepath --help`."
         )
     # for the time before uvicorn handles signals, and after: when it is done, it raises the signal
     # again
