@@ -10,10 +10,12 @@ from joulepath.app.schemas.common import Response, described, part
 class Parameter(Response):
     """One parameter of a robot. A list has one entry per joint or link, from base to flange."""
 
-    value: float | str | list[float] | list[list[float]] | list[str] = described(
-        "Value of the parameter; a word or names, where it is no number.",
-        None,
-        [150.0, 150.0, 150.0, 28.0, 28.0, 28.0],
+    value: float | str | list[float] | list[list[float]] | list[list[list[float]]] | list[str] = (
+        described(
+            "Value of the parameter; a word or names, where it is no number.",
+            None,
+            [150.0, 150.0, 150.0, 28.0, 28.0, 28.0],
+        )
     )
     unit: str = described("Unit; `1` if it has none.", None, "N·m")
     source: str = described(
