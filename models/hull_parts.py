@@ -14,7 +14,7 @@ from joulepath.models.robot import Array
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 Inside = Callable[[Array], Mask]
-"""Whether each of the points (k, 3) [m] lies where no obstacle can be."""
+"""Whether points (k, 3) [m] lie where no obstacle can be."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class PartSettings:
     """Settings of the division."""
 
     most: int = 5
-    """Most parts of a link: each is another distance per obstacle."""
+    """Largest number of parts of a link. Every part adds a distance per obstacle."""
     p99: float = 1.5e-3
     """99th percentile of the excess of the parts' hulls, before they are grown, over the surface
     [m] from which on no part is divided."""
@@ -31,16 +31,16 @@ class PartSettings:
     free: float = 0.5e-3
     """Excess [m] that costs nothing: about the distance between the points of the surface."""
     overlap: float = 1e-4
-    """Distance [m] by which both parts reach beyond their plane, so that the proof of the cover
-    ends at triangles of this size."""
+    """Distance [m] by which both parts reach beyond the plane. The proof of the cover then ends at
+    triangles of this size."""
     surface: int = 200_000
     """Points of every mesh, from which distances are measured."""
     density: float = 12_000.0
     """Points of a hull per m², at which its excess is measured."""
     offsets: int = 9
-    """Planes of each of the thirteen directions."""
+    """Planes per direction, of thirteen directions."""
     trials: int = 40
-    """Random planes around the best one, for each of `spreads`."""
+    """Random planes around the best plane, per entry of `spreads`."""
     spreads: tuple[float, ...] = (0.3, 0.1)
     """Standard deviations of the normal [rad]."""
     shift: float = 0.03
@@ -80,9 +80,9 @@ def below(triangles: Array, normal: Array, offset: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Triangles of a part, the planes of its hull, points of the hull's surface with their
-    distances from the surface of the link, and the area [m²] of each. The `far` ones, farther than
-    `free`, come first.
+    """A part of a surface: triangles, planes of the hull, points on the hull in order of decreasing
+    distance from the surface of the link, and the area [m²] per point. The first `far` points are
+    farther away than `PARTS.free`.
     """
 
     triangles: Array
@@ -134,7 +134,7 @@ class Division:
         )
 
     def distances(self, part: _Part, others: Sequence[_Part], most: int | None = None) -> Array:
-        """Distances (k,) [m] of the first `most` points of a part that are outside the others."""
+        """Distances (k,) [m] of the first `most` points of a part, without points inside the others."""
         counts = np.ones(len(part.points[:most]), dtype=bool)
         for other in others:
             counts[counts] = other.above(part.points[:most][counts]) >= self.radius
@@ -146,7 +146,7 @@ class Division:
         return float(part.area * (excess**2).sum())
 
     def halves(self, part: _Part, others: Sequence[_Part]) -> tuple[_Part, _Part]:
-        """The two parts of a part by the plane of the least cost that was found."""
+        """Divide a part into two, by the best plane found."""
         corners = part.triangles.reshape(-1, 3)
         best: tuple[float, Array, float, tuple[_Part, _Part]] | None = None
 
@@ -182,9 +182,9 @@ class Division:
 def divided(
     surfaces: Sequence[Array], radius: float, inside: Inside, most: int = PARTS.most
 ) -> list[Array]:
-    """Parts of the surfaces of a link, whose hulls cover them together.
+    """Divide the surfaces of a link into parts; the hulls of the parts cover the link.
 
-    The part that costs the most is divided again, until the excess of all is within the limits.
+    The part of the largest cost is divided again, until the excess is within the limits.
 
     Args:
         surfaces: triangles (t, 3, 3) [m] of every mesh.
