@@ -134,7 +134,7 @@ class Division:
         )
 
     def distances(self, part: _Part, others: Sequence[_Part], most: int | None = None) -> Array:
-        """Distances (k,) [m] of the first `most` points of a part, without points inside the others."""
+        """Distances (k,) [m] of the first `most` points of a part, but those inside the others."""
         counts = np.ones(len(part.points[:most]), dtype=bool)
         for other in others:
             counts[counts] = other.above(part.points[:most][counts]) >= self.radius
