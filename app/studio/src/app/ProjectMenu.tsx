@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
+import { useDraft } from "../ui/draft";
 import { Menu } from "../ui/Menu";
 import { newId } from "../store/persist";
 import { robotName } from "../store/request";
@@ -20,6 +21,7 @@ export function ProjectMenu() {
       project: { id: newId(), name: "New cell" },
       request: { ...EMPTY, robot: robotName(request.value) },
     });
+  const { field } = useDraft(project.value.name);
   const pick = (index: string) => {
     const example = known?.[Number(index)];
     if (index === "first") void openFirst();
@@ -31,7 +33,7 @@ export function ProjectMenu() {
         type="text"
         class="project-name"
         aria-label="Name of the project"
-        value={project.value.name}
+        {...field}
         onChange={(event) =>
           (project.value = { ...project.value, name: event.currentTarget.value || "Untitled cell" })
         }

@@ -85,7 +85,7 @@ export function NewJob({ onClose }: { onClose: () => void }) {
           <input
             type="text"
             value={name}
-            onChange={(event) => {
+            onInput={(event) => {
               setName(event.currentTarget.value);
               setWhy("");
             }}

@@ -71,8 +71,10 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
   useEffect(() => {
     robotList().then(setRobots, (error) => tell(error));
   }, []);
-  const set = (field: keyof typeof settings) => (event: { currentTarget: { value: string } }) =>
-    setSettings({ ...settings, [field]: event.currentTarget.value });
+  const set =
+    (field: keyof typeof settings) =>
+    ({ currentTarget: { value } }: { currentTarget: { value: string } }) =>
+      setSettings((now) => ({ ...now, [field]: value }));
   const send = async () => {
     const { mass, columns, ...plain } = settings;
     const weight = parseNumber(mass);
@@ -131,7 +133,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
       <div class="fields">
         {told("file")}
         <label>
-          Name <input type="text" value={settings.name} onChange={set("name")} />
+          Name <input type="text" value={settings.name} onInput={set("name")} />
         </label>
         {told("name")}
         <label>
@@ -152,7 +154,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
             inputMode="decimal"
             placeholder="unknown"
             value={settings.mass}
-            onChange={set("mass")}
+            onInput={set("mass")}
           />
         </label>
         {told("payload")}
@@ -168,7 +170,7 @@ export function AddLog({ file, onClose }: { file: File; onClose: () => void }) {
             type="text"
             value={settings.columns}
             placeholder="found by themselves"
-            onChange={set("columns")}
+            onInput={set("columns")}
           />
         </label>
         {told("columns")}

@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { Button } from "../ui/Button";
+import { useDraft } from "../ui/draft";
 import { Section } from "../ui/Section";
 import { tool } from "../picture/drag";
 import { IDENTITY } from "../store/chain";
@@ -51,14 +52,11 @@ export function PlaceLooked() {
             <span aria-hidden="true">
               {name} {UNITS[UNIT[name]].sign}
             </span>
-            <input
-              type="text"
-              inputMode="decimal"
-              aria-label={`Base ${name} in ${UNITS[UNIT[name]].sign}`}
-              aria-invalid={wrong === name ? "true" : undefined}
-              value={shown(values[name], UNIT[name])}
-              onChange={(event) => go(name, event.currentTarget.value)}
-              onKeyDown={(event) => event.key === "Enter" && event.currentTarget.blur()}
+            <BaseCell
+              name={name}
+              text={shown(values[name], UNIT[name])}
+              isWrong={wrong === name}
+              onText={(text) => go(name, text)}
             />
           </label>
         ))}
@@ -110,4 +108,25 @@ function against(energy: number, here: number | null): string {
   const saving = 1 - energy / here;
   if (Math.abs(saving) < 0.0005) return ", as much as now";
   return `, ${percent(Math.abs(saving))} ${saving > 0 ? "less" : "more"} than now`;
+}
+
+/** A coordinate of the base; what is typed stays while the energy of another place comes. */
+function BaseCell(props: {
+  name: Coordinate;
+  text: string;
+  isWrong: boolean;
+  onText: (text: string) => void;
+}) {
+  const { field } = useDraft(props.text);
+  return (
+    <input
+      type="text"
+      inputMode="decimal"
+      aria-label={`Base ${props.name} in ${UNITS[UNIT[props.name]].sign}`}
+      aria-invalid={props.isWrong ? "true" : undefined}
+      {...field}
+      onChange={(event) => props.onText(event.currentTarget.value)}
+      onKeyDown={(event) => event.key === "Enter" && event.currentTarget.blur()}
+    />
+  );
 }

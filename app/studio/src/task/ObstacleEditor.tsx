@@ -1,4 +1,5 @@
 import { Button } from "../ui/Button";
+import { useDraft } from "../ui/draft";
 import { NumberCell } from "../ui/NumberCell";
 import { tool, untyped } from "../picture/drag";
 import { withObstacle } from "../store/edits";
@@ -13,6 +14,7 @@ const AXES = ["X", "Y", "Z"];
 /** The fields of one obstacle. */
 export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
   const obstacle = at(request.value, pointer);
+  const name = useDraft(isObject(obstacle) ? String(obstacle.name) : "");
   if (!isObject(obstacle)) return null;
   const given = obstacle as unknown as Obstacle;
   const pose: Pose = isObject(given.pose)
@@ -31,7 +33,7 @@ export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
         <span>Name</span>
         <input
           type="text"
-          value={String(given.name)}
+          {...name.field}
           onChange={(event) =>
             edit(put(request.value, `${pointer}/name`, event.currentTarget.value))
           }

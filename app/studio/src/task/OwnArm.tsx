@@ -28,8 +28,10 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
   const [form, setForm] = useState({ name: "", tip: "", acceleration: "10", payload: "" });
   const [why, setWhy] = useState<{ field: string; text: string }[]>([]);
   const [busy, setBusy] = useState(false);
-  const set = (field: keyof typeof form) => (event: { currentTarget: { value: string } }) =>
-    setForm({ ...form, [field]: event.currentTarget.value });
+  const set =
+    (field: keyof typeof form) =>
+    ({ currentTarget: { value } }: { currentTarget: { value: string } }) =>
+      setForm((now) => ({ ...now, [field]: value }));
   const read = async (file: File | undefined) => {
     if (!file) return;
     const text = await file.text();
@@ -106,7 +108,7 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
         {said("meshes")}
       </label>
       <label>
-        Name <input type="text" value={form.name} onChange={set("name")} />
+        Name <input type="text" value={form.name} onInput={set("name")} />
         {said("name")}
       </label>
       <label>
@@ -124,13 +126,13 @@ export function OwnArm({ onAdded }: { onAdded: (name: string) => void }) {
           type="text"
           inputMode="decimal"
           value={form.acceleration}
-          onChange={set("acceleration")}
+          onInput={set("acceleration")}
         />
         {said("acceleration")}
       </label>
       <label>
         Largest payload, kg{" "}
-        <input type="text" inputMode="decimal" value={form.payload} onChange={set("payload")} />
+        <input type="text" inputMode="decimal" value={form.payload} onInput={set("payload")} />
         {said("payload")}
       </label>
       {why

@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { parseNumber } from "../store/units";
+import { useDraft } from "./draft";
 
 interface Props {
   label: string;
@@ -15,7 +16,9 @@ interface Props {
 /** A number beside the request, such as a price: a text that is none stays, with a sentence. */
 export function PlainNumber({ label, unit, value, least, empty, onValue }: Props) {
   const [wrong, setWrong] = useState<string | null>(null);
+  const { field, end } = useDraft(wrong ?? `${value ?? ""}`);
   const commit = (text: string) => {
+    end();
     const number = parseNumber(text);
     const isEmpty = empty !== undefined && !text.trim();
     const isTaken = number !== null && (least === "zero" ? number >= 0 : number > 0);
@@ -30,7 +33,7 @@ export function PlainNumber({ label, unit, value, least, empty, onValue }: Props
         aria-label={label}
         aria-invalid={wrong === null ? undefined : "true"}
         placeholder={empty}
-        value={wrong ?? value ?? ""}
+        {...field}
         onChange={(event) => commit(event.currentTarget.value)}
       />
       <small>{unit}</small>
