@@ -8,7 +8,7 @@ FOLDER contains the meshes of a robot as `joulepath.models.meshes` describes, or
 the package `airo-models`. For every moving link, the table has
 the number of uncovered pieces of the meshes' triangles, and the excess: the distance of points of
 the cover's surface from the nearest point of any mesh of the link. Points within the covers of a
-neighbouring link at every angle of the joint between them do not count. The exit code is 1 if a
+neighbouring link at eight angles of the joint between them do not count. The exit code is 1 if a
 hull leaves a piece uncovered or exceeds the limits below.
 """
 
@@ -90,7 +90,7 @@ def beyond(
 
 def within_neighbours(robot: Robot, link: int, covers: Sequence[LinkCover], points: Array) -> Mask:
     """Whether points (k, 3) [m] of the frame of a link are within the covers of the next or the
-    previous moving link at every angle of the joint between them, where no obstacle can be.
+    previous moving link at TURNS angles of the joint between them, where no obstacle can be.
     """
     found = np.zeros(len(points), dtype=bool)
     for other in (link - 1, link + 1):

@@ -33,8 +33,8 @@ def fitted_hulls(folder: Path, robot: Robot, link: int) -> list[LinkHull]:
 
 
 def _within_neighbours(folder: Path, robot: Robot, link: int, radius: float) -> Inside:
-    """Whether points are within the hull of a neighbouring link at every angle of the joint: in the
-    hollow ends of links, where no obstacle can be.
+    """Whether points are within the hull of a neighbouring link at TURNS angles of the joint: in
+    the hollow ends of links, where no obstacle can be.
     """
     planes = dict[int, Array]()
     for other in (link - 1, link + 1):

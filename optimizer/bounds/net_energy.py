@@ -52,23 +52,21 @@ def electrical(
     bus:
 
     - shared: drawn = max(P_net, 0) ≥ P_net. If a share below 1 is given back, max(P_net, 0) - share
-      · max(-P_net, 0) = P_net + (1 - share) max(-P_net, 0) ≥ P_net. A recuperating bus is the same
-      case, its share is the efficiency.
+      · max(-P_net, 0) = P_net + (1 - share) max(-P_net, 0) ≥ P_net. On a recuperating bus, the
+      share is the efficiency.
     - isolated: drawn = base + Σ max(P_j, 0) ≥ base + Σ P_j = P_net.
     - storage: let s be the net surplus, c ≤ s its part that charges the store. The total is
       ∫ (max(P_net, 0) - efficiency · c - share · (s - c)) dt (see `energy.bus_flow`) ≥ ∫ P_net dt,
       as neither factor exceeds 1. The total contains the fall of the charge, so the bound holds for
       any initial charge.
 
-    **Load.** If friction grows with the load, its loss is at least v · tau_f(v) of an unloaded
-    joint. The share that grows with the load is left out.
+    **Load.** Friction that grows with the load is left out: only that of an unloaded joint counts.
 
-    **Copper.** Let c = (copper + quadratic inverter loss) / torque_constant² [W/(N·m)²] of each
-    joint and η ≥ 0 the same for all joints. Then c (tau + tau_f)² ≥ 2 η v (tau + tau_f) - η² v² /
-    c, because the difference is a square. Σ v (tau + tau_f) is the rate of kinetic and potential
-    energy plus friction. So copper and quadratic inverter loss are at least 2 η (potential gain +
-    friction) - η² Σ ∫ v² / c dt. The rest of the loss of holding against gravity is left out, and
-    inverter loss beyond its constant and quadratic parts.
+    **Copper.** Let c = (copper + quadratic inverter loss) / torque_constant² [W/(N·m)²] per joint,
+    and η ≥ 0 one number for all joints. Then c (tau + tau_f)² ≥ 2 η v (tau + tau_f) - η² v² / c,
+    because the difference is a square. Σ v (tau + tau_f) is the rate of mechanical energy plus
+    friction, so the loss is at least 2 η (potential gain + friction) - η² Σ ∫ v² / c dt. Other
+    losses of holding against gravity and of the inverter are left out.
 
     **Friction.** v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit, with the convex function g(v) = v
     (curved asinh(v / speed) + viscous v). The Coulomb part is at least coulomb · |displacement|.

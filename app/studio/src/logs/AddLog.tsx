@@ -5,7 +5,7 @@ import { Problem } from "../store/client";
 import { robotName } from "../store/request";
 import { robotList, type RobotSummary } from "../store/service";
 import { request } from "../store/state";
-import { tell } from "../store/trouble";
+import { linkOf, slugOf, tell } from "../store/trouble";
 import { parseNumber } from "../store/units";
 import { addLog, chosen, openedIdentification, openedLog } from "./model";
 
@@ -40,16 +40,16 @@ const NAMED: Field[] = ["name", "robot", "payload", "units", "current_units", "e
 /** What went wrong with a log, at the fields of this dialog; what none of them caused is at the file. */
 function reasonsOf(error: unknown): Why[] {
   const details = error instanceof Problem ? error.details : {};
-  const at = details.type?.indexOf("problems/") ?? -1;
-  const link = at < 0 ? null : details.type!.slice(at);
+  const link = linkOf(details);
   const told = (details.errors ?? []).map(({ loc, msg }) => ({
     field: NAMED.find((each) => each === loc[1]) ?? "file",
     text: inWords(msg),
     link,
   }));
   if (told.length) return told;
-  const slug = details.type?.split("/").at(-1) ?? "";
-  return [{ field: FIELDS[slug] ?? "file", text: inWords((error as Error).message), link }];
+  return [
+    { field: FIELDS[slugOf(details)] ?? "file", text: inWords((error as Error).message), link },
+  ];
 }
 
 /** How a file is to be read. */

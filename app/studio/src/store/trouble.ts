@@ -20,7 +20,11 @@ const FIELDS: Record<string, Pointer> = {
   "cycle-too-short": "/time",
 };
 
-const slugOf = (details: ProblemDetails) => details.type?.split("/").at(-1) ?? "";
+export const slugOf = (details: ProblemDetails) => details.type?.split("/").at(-1) ?? "";
+
+/** The page that explains a problem; null if it has none. */
+export const linkOf = ({ type }: ProblemDetails): string | null =>
+  type?.includes("/problems/") ? type.slice(type.indexOf("problems/")) : null;
 
 /** The fields that a problem is about: the target or setting, and the obstacle that is hit. */
 function pointersOf(details: ProblemDetails, asked: ApiRequest): Pointer[] {
@@ -65,9 +69,7 @@ export function tell(error: unknown, asked: ApiRequest = request.value): void {
   trouble.value = {
     title: details.title ?? "Something went wrong",
     text,
-    link: details.type?.includes("/problems/")
-      ? details.type.slice(details.type.indexOf("problems/"))
-      : null,
+    link: linkOf(details),
     fields,
   };
 }
