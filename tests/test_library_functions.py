@@ -124,6 +124,7 @@ def test_compare_refuses_methods_that_are_none(methods: list[typing.Any]) -> Non
     assert caught.value.field == "methods"
 
 
+@pytest.mark.long
 def test_pareto() -> None:
     front = joulepath.pareto(replace(problem(), objective="mechanical", duration_max=2.0), 2)
     durations, energies = zip(

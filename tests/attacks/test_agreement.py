@@ -142,6 +142,7 @@ def test_short_peaks_of_the_tools_speed_are_no_refusal() -> None:
     assert energy(found) < (1 + AGREED) * energy(solved(SLOW_TOOL, method="lagrange"))
 
 
+@pytest.mark.long
 def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_limits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

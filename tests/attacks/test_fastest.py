@@ -139,6 +139,7 @@ def test_a_cycle_takes_any_time_from_the_fastest_one_on() -> None:
         assert all(move.solution.certificate.valid for move in found.moves)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("index", long_but([5], range(16)))
 def test_no_motion_in_hand_is_faster(index: int) -> None:
     """Moves of ±1.5 rad, every other one with 4 kg: of 118 alike, 16 were refused for up to ten
@@ -331,6 +332,7 @@ def test_the_words_of_a_refusal_are_enough() -> None:
     assert optimize(replace(asked, **fixed(told))).certificate.valid
 
 
+@pytest.mark.long
 def test_a_refusal_is_the_same_whatever_was_asked_for() -> None:
     errors = [refused(local(), duration) for duration in (0.1, 0.3, 0.7301)]
     assert all(a.shortest == b.shortest for a, b in itertools.pairwise(errors))

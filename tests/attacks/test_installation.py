@@ -328,6 +328,7 @@ def test_a_busy_port_is_told_with_its_remedy(tmp_path: Path, host: str) -> None:
     assert len(done.stderr.splitlines()) == 1 and not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_a_request_under_a_locale_without_unicode(tmp_path: Path) -> None:
     """`LC_ALL=C PYTHONUTF8=0`: Python reads files without a named encoding as ASCII."""
     code = (

@@ -192,6 +192,7 @@ def kept_answers(client: TestClient) -> list[dict[str, Any]]:
     return [optimized, a_cycle, *(client.get(path).json()["answer"] for path in paths)]
 
 
+@pytest.mark.long
 def test_the_id_in_an_answer_is_that_of_the_kept_answer(client: TestClient) -> None:
     for answer in kept_answers(client):
         stored = client.get(f"/answers/{answer['id']}")

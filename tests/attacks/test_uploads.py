@@ -356,6 +356,7 @@ def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, A
     assert sorted(client.app.state.engine.worker_pids) == workers  # type: ignore[attr-defined]
 
 
+@pytest.mark.long
 def test_a_scene_of_40000_groups_is_an_obstacle(client: TestClient) -> None:
     pose = {"position": [0.6, 0.6, 0.0], "rpy": [0, 0, 0]}
     bin_ = {

@@ -17,6 +17,7 @@ def workers() -> Iterator[list[Worker]]:
         each.end()
 
 
+@pytest.mark.long
 def test_every_planner_takes_time_for_every_task(workers: list[Worker]) -> None:
     walls = measured(workers[0], workers[1:], 2, 1)
     assert walls.shape == (2, 2)

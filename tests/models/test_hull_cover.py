@@ -98,6 +98,7 @@ def test_flat_points_have_no_hull() -> None:
 LINKS = [(name, link) for name in FOUND for link in range(1, 7)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "link"), long_but(LINKS[:2], LINKS))
 def test_the_hull_of_a_link_holds_every_surface(name: str, link: int) -> None:
     """Every triangle of the maker's meshes; 1 mm less, and a surface is outside. A fit repeats the

@@ -25,6 +25,7 @@ from tests.optimizer.moves import (
 from tests.selection import long_but
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "given",
     [{}, pytest.param({"payload": PAYLOAD, "friction": "coulomb_viscous"}, marks=pytest.mark.long)],

@@ -127,6 +127,7 @@ def test_boxes_keep_the_configurations_of_a_pose(arm: Arm) -> None:
         assert least <= min(plant.potential(each) for each in inside)
 
 
+@pytest.mark.long
 def test_a_cycle_is_planned_and_exported(arm: Arm) -> None:
     pick = Stop(name="pick", target=Pose(tcp_pose(arm, START)))
     place = Stop(name="place", target=ConeOrientedPose(tcp_pose(arm, GOAL)[:3, 3]))

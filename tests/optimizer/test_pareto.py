@@ -119,6 +119,7 @@ def test_every_point_is_certified(asked_and_found: tuple[Problem, Front]) -> Non
         assert 0 < point.lower_bound <= objective(asked, point)
 
 
+@pytest.mark.long
 def test_every_point_is_at_least_as_good_as_a_fresh_answer(
     asked_and_found: tuple[Problem, Front],
 ) -> None:
@@ -196,6 +197,7 @@ HARD = problem(
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "given",
     [

@@ -85,6 +85,7 @@ def shuffled(works: Sequence[Work], seed: int) -> list[Work]:
     return random.Random(seed).sample(list(works), len(works))
 
 
+@pytest.mark.long
 @pytest.mark.timeout(2 * PATIENCE)
 def test_threads_give_what_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every thread does the same quick work; the rest goes round. Two threads plan paths at the

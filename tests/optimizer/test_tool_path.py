@@ -378,6 +378,7 @@ def test_a_given_goal_is_met_in_its_own_turns() -> None:
             assert found.certificate.valid and (found.goal.q == there).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([0], range(10)))
 def test_the_bound_holds_for_starts_that_were_not_sampled(seed: int) -> None:
     """Seven joints: every posture at the start leads along the path to another one at its end."""

@@ -66,6 +66,7 @@ def axes_and_positions(found: Solution, arm: Arm) -> tuple[Array, Array]:
     return T[:, :3, 2], T[:, :3, 3]
 
 
+@pytest.mark.long
 def test_a_tool_that_may_turn_follows_what_no_other_can(crossed: Solution) -> None:
     with pytest.raises(PathInfeasible):
         optimize(over_the_base(path=ToolPath()))

@@ -42,6 +42,7 @@ def test_a_file_that_is_not_there_never_means_open(tmp_path: Path) -> None:
             check_access(Settings(host=host, open=True, api_keys_file=tmp_path / "keys.yaml"))
 
 
+@pytest.mark.long
 def test_the_process_ends_with_the_remedies() -> None:
     ended = run(("joulepath.app",), os.environ | {"JOULEPATH_HOST": "0.0.0.0", "PORT": "0"}, EXIT)
     assert ended.returncode == 1

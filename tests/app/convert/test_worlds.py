@@ -226,6 +226,7 @@ def file_of(count: int, seed: int) -> str:
     return base64_of(trimesh.Trimesh(corners, faces, process=False).export(file_type="stl"))
 
 
+@pytest.mark.long
 def test_the_mesh_that_rested_longest_leaves_a_full_cache() -> None:
     kept, fit = mesh_file._mesh, MOST_KEPT_TRIANGLES // CLOUD_RANGES.max_triangles
     kept.cache_clear()

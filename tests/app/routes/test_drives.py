@@ -44,6 +44,7 @@ def total(content: dict[str, Any]) -> float:
     return value
 
 
+@pytest.mark.long
 def test_every_bus_is_answered(client: TestClient) -> None:
     answers = {
         name: answered(client, DOWN | {"bus": bus})

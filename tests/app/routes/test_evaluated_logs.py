@@ -285,6 +285,7 @@ def test_the_table_has_the_measured_energies(client: TestClient, recording: Reco
     assert all(float(row.split(",")[low]) < float(row.split(",")[high]) for row in rows)
 
 
+@pytest.mark.long
 def test_the_command_sets_measured_against_predicted(recording: Recording, tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_bytes(rtde(recording))

@@ -49,6 +49,7 @@ def test_an_unknown_robot(client: TestClient, name: str) -> None:
     refused(client.get(f"/robots/{name}/meshes.glb"), UnknownRobot)
 
 
+@pytest.mark.long
 def test_two_processes_make_one_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Were the file written twice, one of them would have seen another inode."""
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))

@@ -69,6 +69,7 @@ def found(client: TestClient) -> Json:
     return placed(client, ASKED)
 
 
+@pytest.mark.long
 def test_a_place_is_accepted_by_its_own_request(client: TestClient, found: Json) -> None:
     assert found["nominal"] is not None
     for place in (found["best"], found["nominal"]):
@@ -215,6 +216,7 @@ def test_a_job_answers_as_the_endpoint_does(client: TestClient, found: Json) -> 
     assert cycle["kind"] == "cycle"
 
 
+@pytest.mark.long
 def test_joint_positions_and_edges_are_remarked(client: TestClient) -> None:
     stops = [CYCLE["stops"][0], {"name": "home", "target": {"q": HOME}}]
     asked = {

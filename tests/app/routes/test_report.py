@@ -144,6 +144,7 @@ def test_a_pdf_has_the_same_documents(client: TestClient) -> None:
     assert checked(file, again=False, request_id="test").agrees
 
 
+@pytest.mark.long
 def test_where_nothing_keeps_every_limit_no_saving_is_claimed(client: TestClient) -> None:
     # nearly as fast as any motion can be: ways with rests are too slow, the others break the limit
     body = move(limits={"tcp_speed": 0.05})

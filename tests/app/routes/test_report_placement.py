@@ -54,6 +54,7 @@ def test_the_page_says_what_the_answer_says(page: bytes, answer: Json) -> None:
     assert text.count('class="claimed saves"') == 2
 
 
+@pytest.mark.long
 def test_it_agrees_with_itself_and_with_its_cycles_answered_anew(page: bytes) -> None:
     found = checked(page, again=True, request_id="test")
     assert found.agrees, found.lines

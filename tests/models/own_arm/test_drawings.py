@@ -42,6 +42,7 @@ def answered(arm: Robot, convention: Convention) -> tuple[str, float, float]:
     return found.status, found.energy.electrical.total, found.lower_bound
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", long_but((5,), (5, 50)))
 @pytest.mark.parametrize("arm", long_but([UR5E], [UR5E, KUKA]), ids=lambda each: each.name)
 def test_a_motion_costs_the_same_in_every_drawing(arm: Robot, count: int) -> None:
@@ -60,7 +61,7 @@ def test_rounded_figures_are_the_arm_that_they_stand_for(
     arm: Robot, figure: Callable[[float], str]
 ) -> None:
     rng = np.random.default_rng(22)
-    for drawing in (right_angled, inclined) * 2:
+    for drawing in (right_angled, inclined):
         convention = drawing(6, rng)
         made = robot(described(drawn(arm, convention, figure)))
         assert required_inverse_kinematics(made, "goal").complete

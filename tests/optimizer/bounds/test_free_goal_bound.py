@@ -63,6 +63,7 @@ def bound_of_samples(task: Problem, pose: ConeOrientedPose, count: int) -> float
     return float(lower_bounds(made, displacement, potential_gain)[0].min())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("half_angle", "condition"),
     [

@@ -137,6 +137,7 @@ def test_between_poses_and_among_several_targets() -> None:
     assert whole(start, AnyOf((other, two))) <= whole(start, two) * (1 + ROUNDING)
 
 
+@pytest.mark.long
 def test_no_configuration_on_a_singularity_is_below() -> None:
     """Given by their joints: what traces curves may well miss them."""
     rng, (start, _) = np.random.default_rng(9), tasks("gen3", 1)[0]

@@ -136,6 +136,7 @@ def known(prepared: PreparedProblem) -> list[Candidate]:
     return pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", long_but((1,), (1, 40)))
 @pytest.mark.parametrize(
     "robot",
@@ -159,6 +160,7 @@ def test_no_pair_of_configurations_is_below(robot: Robot, count: int) -> None:
     assert np.median(ratios) > NEAR
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", long_but([COMMON[0]], COMMON))
 def test_a_bound_to_given_joint_positions_is_that_of_the_way_back(robot: Robot) -> None:
     rng = np.random.default_rng(9)

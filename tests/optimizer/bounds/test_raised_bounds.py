@@ -53,6 +53,7 @@ def raise_all(
         candidate.lower_bound = value
 
 
+@pytest.mark.long
 def test_a_heavy_arm_that_holds_its_weight_gains_much() -> None:
     asked = problem(OUT, TURNED, robot=load_robot("ur20"))
     _, (plain,) = bounded(asked)

@@ -95,6 +95,7 @@ def test_the_plain_bound_stays_where_the_dual_one_does_not_help(name: str) -> No
         assert tight.lower_bound == plain.lower_bound
 
 
+@pytest.mark.long
 def test_it_is_never_below_the_plain_one() -> None:
     """Of random moves to poses, in the whole of the search."""
     for start, goal in random_moves(SEED, MOVES):

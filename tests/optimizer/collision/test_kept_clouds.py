@@ -32,6 +32,7 @@ def test_a_repeated_obstacle_is_built_once() -> None:
     assert cloud_of(Points(points(500, 21)[:-1], 0.01)) is not first
 
 
+@pytest.mark.long
 def test_the_cloud_that_rested_longest_leaves_a_full_cache() -> None:
     scans = [Points(points(CLOUDS.max_kept_parts // FIT, seed), 0.01) for seed in range(FIT + 1)]
     made = [cloud_of(scan) for scan in scans[:FIT]]

@@ -193,6 +193,7 @@ def _brute(on: Array, cost: Array) -> tuple[float, int]:
     return np.inf, 0
 
 
+@pytest.mark.long
 def test_what_no_configuration_reaches_cannot_be_divided() -> None:
     far = replace(BEAD, goal=down(0.2, 1.5, 0.2))
     with pytest.raises(PathInfeasible) as refusal:

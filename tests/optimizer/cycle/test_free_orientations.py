@@ -76,6 +76,7 @@ def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_orientations, "FREE_ORIENTATIONS", settings)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_angles")
 @pytest.mark.parametrize(
     ("free_start", "free_goal"),

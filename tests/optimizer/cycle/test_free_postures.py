@@ -44,6 +44,7 @@ def cycle_of(robot: str) -> tuple[Cycle, Array]:
     return Cycle(arm=arm, start=start, stops=stops, windings=False, deadline=AMPLE), np.array(q)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("robot", "stops"), long_but([("ur5e", 1)], [("ur5e", 1), ("ur5e", 2), ("panda", 2)])
 )

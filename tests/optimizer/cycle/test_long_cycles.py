@@ -50,6 +50,7 @@ def whole() -> Whole:
     return found, events, clock.now
 
 
+@pytest.mark.long
 def test_a_long_cycle_tells_what_it_finds_on_the_way(whole: Whole) -> None:
     found, events, _ = whole
     told = [each for each in events if isinstance(each, Improved)]

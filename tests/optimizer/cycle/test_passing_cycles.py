@@ -163,6 +163,7 @@ def test_a_cycle_of_passes_alone_comes_back() -> None:
     assert found.energy.electrical.total < 0.97 * stopping.electrical
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", long_but([0.99], [1.25, 0.99]))
 def test_in_a_given_time_it_is_not_worse_either(factor: float) -> None:
     stops = [Stop(name=f"{k}", target=q, via=k < 2, dwell=0.2 * (k == 2)) for k, q in enumerate(Q)]
@@ -180,6 +181,7 @@ def test_in_a_given_time_it_is_not_worse_either(factor: float) -> None:
         assert "stopping" not in against(found) and found.price_of_time >= 0
 
 
+@pytest.mark.long
 def test_a_time_that_even_passing_does_not_keep_is_too_short() -> None:
     with pytest.raises(CycleTooShort) as caught:
         plan_cycle(

@@ -320,6 +320,7 @@ def test_the_fastest_cycle_is_no_slower_than_ours_at_full_speed() -> None:
 REFUSALS = {"no time": DeadlineExceeded([]), "no motion": NoTrajectory([])}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("where", "problem"),
     long_but(

@@ -274,6 +274,7 @@ def test_what_the_request_gives_is_known() -> None:
     assert interval is not None and interval.shares["inverter_linear"] == 0.0
 
 
+@pytest.mark.long
 def test_mechanical_work_has_no_interval_of_its_saving() -> None:
     found = optimize(problem(objective="mechanical", duration_max=2.0))
     assert found.energy.electrical.interval is not None

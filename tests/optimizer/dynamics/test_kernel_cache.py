@@ -276,6 +276,7 @@ def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
     assert workshop.libraries == [str(target)] and not workshop.leftovers()
 
 
+@pytest.mark.long
 def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
     """It has its answer from the virtual machine and does not wait for the compiler, nor stumble
     over it.

@@ -375,6 +375,7 @@ def test_broken_files_name_the_place(recording: Recording, name: str) -> None:
     assert (caught.value.row, caught.value.column) == (row, column)
 
 
+@pytest.mark.long
 def test_bombs_are_defused(recording: Recording) -> None:
     bomb = gzip.compress(csv_of(recording) + b"0," * 6000 + b"\n" + (b"0," * 6000 + b"\n") * 999)
     with pytest.raises(LogTooLarge, match="bytes"):

@@ -133,6 +133,7 @@ def test_advice_asks_for_what_the_links_do_not_tell(heavier: tuple[Robot, Log]) 
     assert 0 < advice.share <= 1 and "power" in advice.do
 
 
+@pytest.mark.long
 def test_power_tells_the_friction_that_torques_behind_the_gears_do_not() -> None:
     truth = truth_of(PANDA, 3)
     recording = recorded(PANDA, truth, moves=14, seed=3)

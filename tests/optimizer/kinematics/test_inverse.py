@@ -160,6 +160,7 @@ def test_a_full_turn_keeps_the_label(q: Array, turns: list[int]) -> None:
 
 @given(q=angles, direction=st.lists(st.floats(-1, 1), min_size=6, max_size=6).map(np.array))
 # most random paths meet a singularity
+@pytest.mark.long
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 def test_label_is_constant_along_a_branch(q: Array, direction: Array) -> None:
     """Along a path without a singularity, adjacent solutions have the same label."""

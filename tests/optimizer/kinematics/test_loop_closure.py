@@ -65,6 +65,7 @@ def test_every_pattern_of_axes_has_its_configurations_among_the_roots() -> None:
     assert unreached <= 0.05 * count
 
 
+@pytest.mark.long
 def test_eaik_alone_has_as_many_configurations_as_there_are_roots() -> None:
     rng, patterns, alone = np.random.default_rng(13), list(product(RELATIONS, repeat=5)), 0
     for _ in range(400):

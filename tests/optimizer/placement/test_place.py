@@ -162,6 +162,7 @@ def test_places_without_a_decision_are_no_proof_that_there_is_none() -> None:
         place_robot(placement, clock=lambda: 0.02 * next(ticks), progress=False)
 
 
+@pytest.mark.long
 def test_progress_is_told() -> None:
     events = list[Event]()
     found = place(two_stops(), Places([at(-0.05), at(-3.0)]), deadline=AMPLE, tell=events.append)

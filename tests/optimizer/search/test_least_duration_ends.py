@@ -36,6 +36,7 @@ def asked(robot: str, seed: int, free: bool) -> Problem:
     return Problem(arm=arm, start=start, goal=target, deadline=AMPLE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("robot", "free"), [("panda", False), ("ur5e", True)])
 def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
     helped = 0

@@ -77,6 +77,7 @@ CASES = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "kind", "seed"),
     long_but((("xarm7", "about", 0),), [*CASES, ("ur5e", "free", 0), ("iiwa14", "free", 1)]),
