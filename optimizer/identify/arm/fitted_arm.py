@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.arm.friction_columns import COUPLED, column
+from joulepath.optimizer.identify.arm.friction_columns import (
+    COUPLED,
+    LAW_TERMS,
+    column,
+    deciding_term,
+)
 from joulepath.optimizer.identify.arm.power_model import (
     PowerParameters,
     TorqueParts,
@@ -17,8 +23,6 @@ from joulepath.optimizer.identify.arm.power_model import (
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.options import Coupling
 from joulepath.optimizer.identify.rows.fit_rows import Rows
-
-FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,35 +171,33 @@ def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
 
 
 def with_torques(
-    arm: FittedArm, names: tuple[Name, ...], value: Array, couplings: tuple[Coupling, ...]
+    arm: FittedArm, reasons: Mapping[Name, str], value: Array, couplings: tuple[Coupling, ...]
 ) -> FittedArm:
     """The arm with some figures replaced.
 
-    A joint with a newly fitted viscous friction loses its own curved part, unless that is fitted
-    too.
+    A joint whose friction is fitted loses the terms of its own law that are not among the figures.
 
     Args:
         arm: the arm.
-        names: names of the figures.
+        reasons: names of the figures, each with the reason for keeping the robot's own value, or
+            an empty one.
         value: values (p,) of the figures.
         couplings: motors shared by several joints.
     """
     parts = {
         name: getattr(arm, name).copy()
-        for name in (*FRICTION_TERMS, "rotor_inertia", "torque_constant", "speed")
+        for name in (*LAW_TERMS, "offset", "rotor_inertia", "torque_constant", "speed")
     }
     shared = [(each, dict[str, float]()) for each in couplings]
-    fitted = {name for name, _ in names}
-    for (figure, joint), found in zip(names, value.tolist(), strict=True):
+    fitted = {name for name, _ in reasons}
+    deciding = deciding_term(fitted)
+    for ((figure, joint), reason), found in zip(reasons.items(), value.tolist(), strict=True):
         assert joint is not None
         if figure.startswith(COUPLED):
             shared[joint][1][figure.removeprefix(COUPLED)] = found
-        else:
-            if (
-                figure == "viscous"
-                and "curved" not in fitted
-                and found != float(arm.viscous[joint])
-            ):
-                parts["curved"][joint] = 0.0
-            parts[figure][joint] = found
+            continue
+        parts[figure][joint] = found
+        if figure == deciding and not reason:
+            for term in set(LAW_TERMS) - fitted:
+                parts[term][joint] = 0.0
     return replace(arm, **parts, couplings=tuple(shared))

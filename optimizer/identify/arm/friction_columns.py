@@ -6,7 +6,7 @@ rotor_inertia·a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -20,6 +20,8 @@ SENSOR_VISCOUS = "sensor_viscous"
 """Viscous friction behind it."""
 SENSOR_GAIN = "sensor_gain"
 """Share by which a torque sensor reads too much."""
+LAW_TERMS = ("viscous", "curved", "coulomb", "load")
+"""Terms of the friction law of a joint."""
 UNBOUNDED = ("offset", SENSOR_GAIN)
 """Coefficients that may be negative."""
 
@@ -47,6 +49,12 @@ def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: floa
         return np.asarray(np.arcsinh(v / speed))
     smooth_sign = v / np.hypot(v, knee)
     return np.asarray(smooth_sign * np.abs(rigid) if term == "load" else smooth_sign)
+
+
+def deciding_term(terms: Collection[str]) -> str | None:
+    """The first of the `LAW_TERMS` among `terms`: a joint where it is held keeps the terms of the
+    robot's own law that are not among them. None if none of them is a term of the law."""
+    return next((term for term in LAW_TERMS if term in terms), None)
 
 
 def columns(

@@ -18,7 +18,7 @@ from joulepath.optimizer.identify.choices import Estimator
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, solve_bounded
 from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
-from joulepath.optimizer.identify.fits.block import own_value
+from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations, own_value
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
 from joulepath.optimizer.identify.fits.determined import (
     DETERMINED,
@@ -86,6 +86,15 @@ class BaseTerms:
         ]
         return BaseTerms((*names, *friction), np.array(own_values), base, expressed)
 
+    @property
+    def of_joints(self) -> Mask:
+        """Which unknowns (p,) are rotors or terms of friction, and no base parameters."""
+        return np.arange(len(self.names)) >= len(self.expressed)
+
+    def names_of(self, chosen: Mask) -> set[Name]:
+        """Names of some unknowns (p,)."""
+        return {self.names[k] for k in np.flatnonzero(chosen)}
+
     def columns(self, arm: WholeArmRegression) -> Array:
         """Columns (n, p) of the unknowns, chosen from the columns of the whole arm."""
         bodies = arm.bodies.shape[1]
@@ -118,10 +127,9 @@ def fit_base(
 ) -> Estimate:
     """Fit base parameters and friction by ordinary, weighted or reweighted least squares.
 
-    With the method `essential_parameters`, undetermined unknowns are held at the robot's own
-    values, the least determined first, until all others are determined. An unknown whose own value
-    the logs reject is not held. The other methods assume nothing of the arm: they have a reason for
-    undetermined unknowns, and fit them.
+    Undetermined friction and rotors are held at the robot's own values, the least determined first,
+    until all others are determined; with the method `essential_parameters`, undetermined base
+    parameters, too. An unknown whose own value the logs reject is not held.
 
     Args:
         robot: the robot with its own figures.
@@ -148,33 +156,34 @@ def _fit(
     arm = base_regression(robot, rows, torque, clusters, options, speeds)
     terms = base_terms(robot, arm, options)
     columns, lower, block = terms.columns(arm), terms.lower, arm.block
-    weight = np.ones_like(arm.values)
+    weight, every = np.ones_like(arm.values), (columns, block.unrequested_columns)
     for _ in range(BASE_FIT.passes(options.estimator)):
-        grouped = GroupedEquations.of(columns, arm.values, weight, block.cluster, clusters.count)
-        value = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), lower)
-        weight = inverse_variance_weights(
-            block.joint, arm.values - columns @ value, options.estimator == "irls"
+        equations = LawEquations(
+            GroupedEquations.of(every, arm.values, weight, block.cluster, clusters.count), robot.nq
         )
-    return hold_undetermined(terms, grouped, options)
+        grouped = equations.keeping(block.keeps(()))
+        value = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), lower)
+        residuals = arm.values - block.kept_torque(()) - columns @ value
+        weight = inverse_variance_weights(block.joint, residuals, options.estimator == "irls")
+    return _hold_undetermined(terms, block, equations, options)
 
 
-def hold_undetermined(
-    terms: BaseTerms,
-    grouped: GroupedEquations,
-    options: IdentificationOptions,
+def _hold_undetermined(
+    terms: BaseTerms, block: JointBlock, equations: LawEquations, options: IdentificationOptions
 ) -> Estimate:
-    """Solve for the unknowns, and hold or only name those that the rows do not determine.
+    """Solve for the unknowns, and hold those that the rows do not determine.
 
     Args:
         terms: the unknowns.
-        grouped: normal equations.
+        block: the terms of the joints.
+        equations: normal equations.
         options: the method.
     """
     own, lower = terms.own, terms.lower
-    free, reasons, remarks = np.ones(len(own), dtype=bool), [""] * len(own), [""] * len(own)
-    holds = options.method == "essential_parameters"
-    judged = holds | (np.arange(len(own)) >= len(terms.expressed))
+    free, reasons = np.ones(len(own), dtype=bool), [""] * len(own)
+    judged = terms.of_joints | (options.method == "essential_parameters")
     while True:
+        grouped = equations.keeping(block.keeps(terms.names_of(~free)))
         part, value = _free_equations(grouped, own, free), own.copy()
         gram, moment = part.gram.sum(axis=0), part.moment.sum(axis=0)
         value[free] = solve_bounded(gram, moment, lower[free])
@@ -183,7 +192,7 @@ def hold_undetermined(
         solution = unbounded(part, value[free], inside, ~inside, gradient)
         rejected, sd = np.zeros(len(own)), np.zeros(len(own))
         rejected[free], sd[free] = rejections(solution, own[free]), solution.sd
-        relative = _relative_sd(terms.names, value, sd, free & judged)
+        relative = relative_deviations(terms.names, value, sd, free & judged)
         doubted = relative > DETERMINED.max_relative_sd
         reason = {
             k: reason_of(float(value[k]), float(sd[k])) for k in np.flatnonzero(doubted).tolist()
@@ -193,9 +202,7 @@ def hold_undetermined(
             for k in range(len(own))
         ]
         open_terms = np.flatnonzero(doubted & (rejected == 0))
-        if not holds:
-            reasons = [reason[k] if k in open_terms else "" for k in range(len(own))]
-        if not holds or not len(open_terms):
+        if not len(open_terms):
             break
         worst = int(open_terms[np.argmax(relative[open_terms])])
         free[worst], reasons[worst] = False, reason[worst]
@@ -239,7 +246,7 @@ def _free_equations(grouped: GroupedEquations, own: Array, free: Mask) -> Groupe
     return GroupedEquations(grouped.gram[:, free][:, :, free], (grouped.moment - held)[:, free])
 
 
-def _relative_sd(names: tuple[Name, ...], value: Array, sd: Array, free: Mask) -> Array:
+def relative_deviations(names: tuple[Name, ...], value: Array, sd: Array, free: Mask) -> Array:
     """Standard deviations (p,) over values; 0 for held unknowns and for offsets, which are kept
     with any standard deviation."""
     counts = free & np.array([term != "offset" for term, _ in names])

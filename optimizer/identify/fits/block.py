@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joulepath.models.robot import Array, Mask, Robot
+from joulepath.models.robot import Array, FrictionLaw, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import (
     COUPLED,
     SENSOR_COULOMB,
+    LAW_TERMS,
     column,
+    deciding_term,
     lower_bounds,
 )
 from joulepath.optimizer.identify.choices import Estimator
@@ -73,6 +75,43 @@ class JointBlock:
     """Speeds (nq,) at which the curved terms bend [rad/s]."""
     nuisances: frozenset[str]
     """Terms that are no figures of the robot."""
+    unrequested: Array
+    """Torque (n,) of the terms of the robot's own law that are not requested [N·m]. A joint whose
+    deciding term is held keeps them; the law of any other joint has the requested terms alone."""
+    deciding: str | None
+    """That term; None if no friction is fitted."""
+
+    def keeps(self, held: Container[Name]) -> Mask:
+        """Whether joints (nq,) keep the terms that are not requested, for terms that are held."""
+        return np.array(
+            [self.deciding is None or (self.deciding, j) in held for j in range(len(self.speed))]
+        )
+
+    @property
+    def unrequested_columns(self) -> Array:
+        """Torques (n, nq) of the terms that are not requested [N·m], each in its joint's rows."""
+        return np.where(
+            self.joint[:, None] == np.arange(len(self.speed)), self.unrequested[:, None], 0
+        )
+
+    def kept_torque(self, held: Container[Name]) -> Array:
+        """Torque (n,) [N·m] of terms that are not requested and kept, for terms that are held."""
+        return np.where(self.keeps(held)[self.joint], self.unrequested, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class LawEquations:
+    """Normal equations of G groups for p unknowns, by the joints that keep unrequested terms."""
+
+    every: GroupedEquations
+    """With the unknowns first, and then the torques (nq,) of unrequested terms."""
+    nq: int
+
+    def keeping(self, joints: Mask) -> GroupedEquations:
+        """Equations if some joints (nq,) keep their unrequested terms."""
+        gram, moment, p = self.every.gram, self.every.moment, self.every.gram.shape[1] - self.nq
+        kept = gram[:, :p, p:][:, :, joints].sum(axis=2)
+        return GroupedEquations(gram[:, :p, :p], moment[:, :p] - kept)
 
 
 def terms_of(options: IdentificationOptions) -> list[str]:
@@ -103,6 +142,7 @@ def joint_block(
         speed: speeds (nq,) of the curved terms [rad/s]; None for the robot's own.
     """
     terms, knee = terms_of(options), robot.friction.knee if options.knee is None else options.knee
+    unrequested = _unrequested_law(robot, terms, knee)
     couplings = [
         (k, each) for k, each in enumerate(options.couplings) if set(each.joints) <= set(joints)
     ]
@@ -110,7 +150,7 @@ def joint_block(
     names = [(term, joint) for joint in joints for term in terms]
     names += [(COUPLED + term, k) for k, _ in couplings for term in coupled]
     speed = robot.friction.speed if speed is None else speed
-    parts = list[tuple[Array, Array, int, IntArray]]()
+    parts = list[tuple[Array, Array, int, IntArray, Array]]()
     known, spread = _known_torque(robot, rows, options), dict[int | None, float]()
     for at, joint in enumerate(joints):
         use = moving_rows(rows, torque, joint, options.velocity_threshold, options.couplings)
@@ -130,7 +170,9 @@ def joint_block(
                 columns[:, place] = ratios[joint] * column(
                     term, v @ ratios, a @ ratios, rigid[:, joint], knee
                 )
-        parts.append((columns, torque[use, joint] - known[use, joint], joint, clusters.of_row[use]))
+        rest = unrequested.torque(v, rigid)[:, joint]
+        values = torque[use, joint] - known[use, joint]
+        parts.append((columns, values, joint, clusters.of_row[use], rest))
     return JointBlock(
         names=tuple(names),
         columns=np.concatenate([part[0] for part in parts]),
@@ -142,7 +184,16 @@ def joint_block(
         spread=spread,
         speed=speed,
         nuisances=options.nuisances,
+        unrequested=np.concatenate([part[4] for part in parts]),
+        deciding=deciding_term(terms),
     )
+
+
+def _unrequested_law(robot: Robot, terms: Sequence[str], knee: float) -> FrictionLaw:
+    """The terms of the robot's own law that are not among those of a fit."""
+    law, none = robot.friction, np.zeros(robot.nq)
+    parts = {name: none for name in LAW_TERMS if name in terms}
+    return replace(law, **parts, knee=knee)
 
 
 def moving_rows(
@@ -194,11 +245,8 @@ def own_value(robot: Robot, name: Name) -> float:
 
 
 def _known_torque(robot: Robot, rows: Rows, options: IdentificationOptions) -> Array:
-    """Torque (n, nq) [N·m] of all parts that are not fitted: rigid bodies, and the robot's own
-    friction or rotors."""
+    """Torque (n, nq) [N·m] of the rigid bodies, and of rotors that are not fitted."""
     known = np.zeros_like(rows.rigid) if "torque_constant" in options.targets else rows.rigid.copy()
-    if "friction" not in options.targets:
-        known += robot.friction.torque(rows.v, rows.rigid)
     if "rotor" not in options.targets:
         known += robot.drives.rotor_inertia * rows.a
     return known

@@ -15,6 +15,7 @@ from joulepath.optimizer.identify.arm.power_model import PowerParameters, packed
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
+from joulepath.optimizer.identify.fits.block import terms_of
 from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.link_side import (
     kept_drives,
@@ -108,7 +109,8 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitRes
     if options.method == "base_wrench":
         return _with_wrench(robot, rows, fitted, options)
     errors = np.zeros((0, 0))
-    if np.isfinite(torque).any():
+    of_torques = options.needs_regressor or terms_of(options)
+    if of_torques and np.isfinite(torque).any():
         fitted, errors = _with_torque(robot, rows, torque, fitted, options)
     if with_power:
         return _with_power(robot, rows, fitted, errors, options)
@@ -131,15 +133,14 @@ def _with_torque(
         fit = fit_whole if options.refit else fit_base if options.reduced else fit_torques
         found = fit(robot, rows, torque, fitted.clusters, options)
     of_links = np.array([joint is None or name.startswith(LINK) for name, joint in found.names])
-    terms = tuple(
-        name for name, of_link in zip(found.names, of_links.tolist(), strict=True) if not of_link
-    )
+    named = zip(found.names, found.reasons, of_links.tolist(), strict=True)
+    terms = {name: reason for name, reason, of_link in named if not of_link}
     matrix, before = _link_changes(robot, options)
 
     def arm(values: Array) -> FittedArm:
         if rows.link_side:
             changed = replace(
-                own, sensor=sensor_of(robot.nq, terms, values[~of_links], options.reversal)
+                own, sensor=sensor_of(robot.nq, [*terms], values[~of_links], options.reversal)
             )
         else:
             changed = with_torques(own, terms, values[~of_links], tuple(options.couplings))
@@ -217,8 +218,8 @@ def _with_power(
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
     torque_known = len(fitted.estimate.names) > 0
-    friction_known = torque_known and not rows.link_side
-    prior = power_prior(robot, friction_known, links_known=torque_known)
+    known = torque_known and not rows.link_side, torque_known
+    prior = power_prior(robot, *known)
     fit = fit_power(
         arm.torque_parts(part),
         part.power,
@@ -233,7 +234,7 @@ def _with_power(
     shifts = moved[len(others) :]
     by_torques = moved[: len(others)] if torque_known else 0.0
     without, by_rows = fit.without_cluster + by_torques, fit.row_replicates + by_torques
-    matrix, constant, names = _figures_of_power(robot, prior, friction_known, torque_known)
+    matrix, constant, names = _figures_of_power(robot, prior, *known)
     estimate = _with_hardly_known(
         Estimate(
             names,
@@ -247,17 +248,13 @@ def _with_power(
     relative = _covariance_scale(robot.nq, fit.value)
     return replace(
         fitted,
-        arm=_with_parameters(arm, fit.value, friction_known),
+        arm=_with_parameters(arm, fit.value, *known),
         estimate=join_estimates(
             [fitted.estimate, estimate], errors.T @ shifts @ matrix.T if torque_known else None
         ),
-        arms_without_cluster=_each_with_parameters(
-            fitted.arms_without_cluster, without, friction_known
-        ),
-        row_error_arms=_each_with_parameters(fitted.row_error_arms, by_rows, friction_known),
-        prior_error_arms=_each_with_parameters(
-            fitted.prior_error_arms, fit.value + shifts, friction_known
-        ),
+        arms_without_cluster=_each_with_parameters(fitted.arms_without_cluster, without, known),
+        row_error_arms=_each_with_parameters(fitted.row_error_arms, by_rows, known),
+        prior_error_arms=_each_with_parameters(fitted.prior_error_arms, fit.value + shifts, known),
         prior_covariance=np.outer(relative, relative) * fit.prior_covariance,
         covariance_increase=np.outer(relative, relative) * fit.covariance_increase,
     )
@@ -298,15 +295,18 @@ def _covariance_scale(nq: int, value: Array) -> Array:
 
 
 def _each_with_parameters(
-    arms: Sequence[FittedArm], values: Array, friction_known: bool
+    arms: Sequence[FittedArm], values: Array, known: tuple[bool, bool]
 ) -> tuple[FittedArm, ...]:
     return tuple(
-        _with_parameters(arm, each, friction_known) for arm, each in zip(arms, values, strict=True)
+        _with_parameters(arm, each, *known) for arm, each in zip(arms, values, strict=True)
     )
 
 
-def _with_parameters(arm: FittedArm, values: Array, friction_known: bool) -> FittedArm:
-    """The arm with packed figures, whose factors and increments change its own figures."""
+def _with_parameters(
+    arm: FittedArm, values: Array, friction_known: bool, links_known: bool
+) -> FittedArm:
+    """The arm with packed figures, whose factors and increments change its own figures, unless
+    these are known."""
     found = PowerParameters.unpacked(values)
     nominal = PowerParameters.nominal(found.idle, found.copper, found.inverter)
     if friction_known:
@@ -319,7 +319,7 @@ def _with_parameters(arm: FittedArm, values: Array, friction_known: bool) -> Fit
         rotor_inertia=found.rotor_factor * arm.rotor_inertia,
         load=arm.load + found.load_increment,
         offset=arm.offset + found.offset_increment,
-        link_scale=arm.link_scale * found.link_scale,
+        link_scale=1.0 if links_known else found.link_scale,
         power_parameters=nominal,
     )
 

@@ -7,6 +7,7 @@ the bearings behind them. Friction and rotors of the drives stay the robot's own
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -97,7 +98,7 @@ def _best_reversal(rows: Rows, torque: Array, options: IdentificationOptions) ->
     return int(np.argmin(cost))
 
 
-def sensor_of(nq: int, names: tuple[Name, ...], value: Array, reversal: int) -> LinkSensor:
+def sensor_of(nq: int, names: Sequence[Name], value: Array, reversal: int) -> LinkSensor:
     """What sensors see beside the bodies, from fitted terms with values (p,)."""
     terms = (SENSOR_COULOMB, SENSOR_VISCOUS, SENSOR_GAIN, "offset")
     parts = {term: np.zeros(nq) for term in terms}

@@ -16,9 +16,14 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.errors import MethodNotApplicable
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import solve_bounded
-from joulepath.optimizer.identify.fits.base_fit import BaseTerms, base_regression, base_terms
+from joulepath.optimizer.identify.fits.base_fit import (
+    BaseTerms,
+    base_regression,
+    base_terms,
+    relative_deviations,
+)
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
-from joulepath.optimizer.identify.fits.determined import with_reasons
+from joulepath.optimizer.identify.fits.determined import DETERMINED, reason_of, with_reasons
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -118,23 +123,36 @@ def fit_periodic(
 def _most_likely(
     terms: BaseTerms, arm: WholeArmRegression, noise: MeasuredNoise, clusters: Clusters
 ) -> tuple[Estimate, float]:
-    """Most likely unknowns, and the mean square of the residuals over that of the noise."""
+    """Most likely unknowns, and the mean square of the residuals over that of the noise.
+
+    Undetermined friction and rotors are held at the robot's own values, the least determined first.
+    """
     deviation = np.maximum(noise.deviation[arm.block.joint], PERIODIC.min_noise)
     deviation = deviation / np.sqrt(noise.periods)
-    columns, values = terms.columns(arm) / deviation[:, None], arm.values / deviation
-    gram = columns.T @ columns
-    value = solve_bounded(gram, columns.T @ values, terms.lower)
-    inside = value > terms.lower
-    covariance = np.zeros_like(gram)
-    covariance[np.ix_(inside, inside)] = np.linalg.pinv(
-        gram[np.ix_(inside, inside)], hermitian=True
-    )
-    residuals = values - columns @ value
+    columns, own = terms.columns(arm) / deviation[:, None], terms.own
+    free, reasons = np.ones(len(own), dtype=bool), [""] * len(own)
+    while True:
+        kept = arm.block.kept_torque(terms.names_of(~free))
+        values = (arm.values - kept) / deviation - columns[:, ~free] @ own[~free]
+        part, value = columns[:, free], own.copy()
+        value[free] = solve_bounded(part.T @ part, part.T @ values, terms.lower[free])
+        inside = free & (value > terms.lower)
+        part = columns[:, inside]
+        covariance = np.zeros((len(own), len(own)))
+        covariance[np.ix_(inside, inside)] = np.linalg.pinv(part.T @ part, hermitian=True)
+        relative = relative_deviations(
+            terms.names, value, np.sqrt(np.diag(covariance)), free & terms.of_joints
+        )
+        worst = int(np.argmax(relative))
+        if relative[worst] <= DETERMINED.max_relative_sd:
+            break
+        reasons[worst] = reason_of(float(value[worst]), float(np.sqrt(covariance[worst, worst])))
+        free[worst] = False
+    residuals = values - columns[:, free] @ value[free]
     excess = float(residuals @ residuals / (len(values) - int(inside.sum())))
     without = np.tile(value, (clusters.count, 1))
-    found = Estimate(terms.names, value, without, ("",) * len(value), covariance)
-    judged = [k for k, (term, _) in enumerate(terms.names) if term != "offset"]
-    return with_reasons(found, judged), excess
+    found = Estimate(terms.names, value, without, tuple(reasons), covariance)
+    return with_reasons(found, np.flatnonzero(~terms.of_joints).tolist()), excess
 
 
 def mean_period(rows: Rows, count: int) -> Rows:

@@ -148,7 +148,7 @@ def _fit_block(
             block,
             names=tuple(block.names[k] for k in free),
             columns=block.columns[:, free],
-            values=block.values - block.columns @ own - _own_curve(robot, block, held),
+            values=block.values - block.columns @ own - block.kept_torque(held),
             lower=block.lower[free],
         )
         value, weight = weighted_solution(part, clusters, options)
@@ -233,23 +233,6 @@ def undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:
                     "N·m."
                 )
     return held
-
-
-def _own_curve(robot: Robot, block: JointBlock, held: dict[Name, str]) -> Array:
-    """Curved part (n,) [N·m] of the robot's own law, for joints whose viscous part is held and
-    whose curved part is not fitted."""
-    total = np.zeros_like(block.values)
-    for k, (term, joint) in enumerate(block.names):
-        if (
-            term == "viscous"
-            and (term, joint) in held
-            and joint is not None
-            and ("curved", joint) not in block.names
-        ):
-            law = robot.friction
-            rise = law.curved[joint] * np.arcsinh(block.columns[:, k] / law.speed[joint])
-            total += np.where(block.joint == joint, rise, 0.0)
-    return total
 
 
 class Doubt(NamedTuple):

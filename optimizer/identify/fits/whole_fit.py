@@ -20,7 +20,7 @@ from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
 from joulepath.optimizer.identify.estimates.robust import bisquare_weights
-from joulepath.optimizer.identify.fits.block import JointBlock
+from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
 from joulepath.optimizer.identify.fits.determined import (
@@ -99,11 +99,11 @@ def _fit(
         now = replace(rows, rigid=rows.rigid + bodies @ change)
         arm = whole_arm_regression(robot, now, torque, clusters, options, bodies, change, speeds)
         held |= undetermined(robot, arm.block)
-        grouped = _weighted(robot, arm, clusters, options, held)
+        equations = _weighted(robot, arm, clusters, options, held)
         # the columns are large, and those of the next pass need the memory
         block = replace(arm.block, columns=np.zeros((0, len(arm.block.names))))
         del arm, now
-        solution = _determined(robot, block, grouped, options, held)
+        solution = _determined(robot, block, equations, options, held)
         change = solution.value[: len(own)] - own
     return _estimate(robot, solution, block.names, held)
 
@@ -141,7 +141,7 @@ def _estimate(
 def _determined(
     robot: Robot,
     block: JointBlock,
-    grouped: GroupedEquations,
+    equations: LawEquations,
     options: IdentificationOptions,
     held: dict[Name, str],
 ) -> _Solution:
@@ -153,15 +153,16 @@ def _determined(
     Args:
         robot: the robot with its own figures.
         block: names and bounds of the terms beside the links.
-        grouped: weighted normal equations.
+        equations: weighted normal equations.
         options: weight of the prior.
         held: reasons of the held terms, to which further ones are added.
     """
     bodies = PARAMETERS_PER_BODY * robot.nq
     lower, (mean, precision) = _lower(block, bodies), _prior(robot, block, options)
-    gram = grouped.gram.sum(axis=0) + precision
-    moment = grouped.moment.sum(axis=0) + precision @ mean
     while True:
+        grouped = equations.keeping(block.keeps(held))
+        gram = grouped.gram.sum(axis=0) + precision
+        moment = grouped.moment.sum(axis=0) + precision @ mean
         free = _free(block, bodies, held)
         value = _solution_of(gram, moment, mean, free, robot.nq, lower)
         inverse = np.zeros_like(gram)
@@ -246,24 +247,26 @@ def _weighted(
     clusters: Clusters,
     options: IdentificationOptions,
     held: Mapping[Name, str],
-) -> GroupedEquations:
+) -> LawEquations:
     """Normal equations, weighted by the residuals of a solution with some terms `held`."""
     block = arm.block
     mean, precision = _prior(robot, block, options)
     bodies = arm.bodies.shape[1]
     free, lower = _free(block, bodies, held), _lower(block, bodies)
-    value, weight = mean, _weights(arm, arm.values - arm.torque(mean), clusters, False)
+    values = arm.values - block.kept_torque(held)
+    value, weight = mean, _weights(arm, values - arm.torque(mean), clusters, False)
+    columns = (arm.bodies, block.columns, block.unrequested_columns)
     for _ in range(WHOLE_FIT.weight_passes):
-        grouped = GroupedEquations.of(
-            (arm.bodies, block.columns), arm.values, weight, block.cluster, clusters.count
+        equations = LawEquations(
+            GroupedEquations.of(columns, arm.values, weight, block.cluster, clusters.count),
+            robot.nq,
         )
+        grouped = equations.keeping(block.keeps(held))
         gram = grouped.gram.sum(axis=0) + precision
         moment = grouped.moment.sum(axis=0) + precision @ mean
         value = _solution_of(gram, moment, mean, free, robot.nq, lower)
-        weight = _weights(
-            arm, arm.values - arm.torque(value), clusters, options.estimator == "irls"
-        )
-    return grouped
+        weight = _weights(arm, values - arm.torque(value), clusters, options.estimator == "irls")
+    return equations
 
 
 def _weights(arm: WholeArmRegression, residuals: Array, clusters: Clusters, robust: bool) -> Array:

@@ -45,11 +45,6 @@ def figures_of(
     """
     told = {(each.figure, each.joint) for each in parameters if each.identified}
     own, values = _own(robot), _values(robot, fitted, options)
-    if options.reduced:
-        for each in parameters:
-            if not each.identified and each.figure in values and each.joint is not None:
-                # not the previous value, which may be a base parameter, with its rounding error
-                values[each.figure][each.joint] = own[each.figure][each.joint]
     identified = {
         name: _identified(robot.nq, name, told, value != own[name] if name in own else True)
         for name, value in values.items()

@@ -19,24 +19,12 @@ from joulepath.optimizer.identify.results import IdentifiedParameter
 def parameters_of(
     robot: Robot, estimate: Estimate, options: IdentificationOptions
 ) -> tuple[IdentifiedParameter, ...]:
-    """Parameters of an estimate, with the reason for every parameter that is not identified.
-
-    Methods for base parameters fit all friction and rotors; undetermined ones are not used beyond
-    the fit, where the robot's own values stay.
-    """
+    """Parameters of an estimate, with the reason for every parameter that is not identified."""
     base = BaseTerms.of(robot, [], options) if options.reduced else None
     own = {} if base is None else dict(zip(base.names, base.own.tolist(), strict=True))
     deviations = np.sqrt(np.diag(estimate.covariance)).tolist()
     values, remarks = estimate.value.tolist(), estimate.remarks or ("",) * len(estimate.names)
-    expressed = 0 if base is None else len(base.expressed)
     previous = [own[n] if n in own else _own_value(robot, n) for n in estimate.names]
-    if options.reduced:
-        values = [
-            before if why and k >= expressed else value
-            for k, (value, before, why) in enumerate(
-                zip(values, previous, estimate.reasons, strict=True)
-            )
-        ]
     return tuple(
         IdentifiedParameter(name[0], name[1], value, sd, before, not reason, reason or remark)
         for name, value, sd, before, reason, remark in zip(
