@@ -40,10 +40,10 @@ _INERTIALS = {"mass": "kg", "center_of_mass": "m", "inertia": "kg·m²"}
 IDENTIFIED = "B"
 LINK_MASS = "inertials.m"
 UNDETERMINED = (
-    "The logs hardly determine joints {}: their values are the most probable ones, given the logs "
-    "and the ranges of the robot's own figures."
+    "The logs hardly determine {}: what they do not determine has its most probable value, given "
+    "the logs and the range of the robot's own."
 )
-KEPT = "Joints {} keep the robot's own values, of trust {}: {}"
+KEPT = "Of {}, the robot's own values of trust {} are kept: {}"
 
 
 def document_of(
@@ -69,7 +69,10 @@ def document_of(
             if name in figures.values
         }
 
-    friction = section(_LAW_UNITS, own["friction_laws"][law])
+    own_law = own["friction_laws"][law]
+    without_load = {"value": np.zeros(len(figures.session_sd)).tolist(), "unit": "1"}
+    without_load |= {name: own_law["coulomb"][name] for name in ("source", "trust")}
+    friction = section(_LAW_UNITS, {"load": without_load} | own_law)
     drives = section(_DRIVES, own["drives"])
     electronics = section({"idle_power": "W"}, own["electronics"])
     inertials = section(_INERTIALS, own["inertials"])
@@ -110,9 +113,11 @@ def _figure(
     if own is not None and not np.all(identified):
         letters.append(own["trust"])
         for joints, text in ((changed & ~identified, UNDETERMINED), (~changed, KEPT)):
-            if np.ndim(joints) and joints.any():
-                numbers = numbers_of_joints(np.flatnonzero(joints).tolist())
-                notes.append(text.format(numbers, own["trust"], own["source"]))
+            if np.any(joints):
+                which = "this figure"
+                if np.ndim(joints):
+                    which = f"joints {numbers_of_joints(np.flatnonzero(joints).tolist())}"
+                notes.append(text.format(which, own["trust"], own["source"]))
     content: dict[str, Any] = {
         "value": value.tolist(),
         "unit": unit,

@@ -68,13 +68,13 @@ def fit_wrench(
         value = solve_consistent(
             gram, moment, len(own) // PARAMETERS_PER_BODY, np.full(len(own), -np.inf)
         )
-    spread = np.linalg.solve(gram, precision)
+    root = np.linalg.solve(gram, np.linalg.cholesky(precision))
     found = Estimate(
         names=tuple((LINK + part, joint) for joint in range(robot.nq) for part in LINKS),
         value=value,
         replicates=leave_one_out(grouped, value, np.ones(len(own), dtype=bool), precision),
         reasons=("",) * len(own),
-        prior_covariance=spread @ np.linalg.inv(gram),
+        prior_covariance=root @ root.T,
     )
     return with_reasons(found, range(len(own)))
 

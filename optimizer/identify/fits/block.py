@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from joulepath.models.robot import Array, FrictionLaw, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import (
     COUPLED,
-    SENSOR_COULOMB,
     LAW_TERMS,
+    SENSOR_COULOMB,
     column,
     deciding_term,
     lower_bounds,
@@ -192,7 +193,7 @@ def joint_block(
 def _unrequested_law(robot: Robot, terms: Sequence[str], knee: float) -> FrictionLaw:
     """The terms of the robot's own law that are not among those of a fit."""
     law, none = robot.friction, np.zeros(robot.nq)
-    parts = {name: none for name in LAW_TERMS if name in terms}
+    parts: dict[str, Any] = {name: none for name in LAW_TERMS if name in terms}
     return replace(law, **parts, knee=knee)
 
 

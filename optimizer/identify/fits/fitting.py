@@ -218,8 +218,8 @@ def _with_power(
     use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
     part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
     torque_known = len(fitted.estimate.names) > 0
-    known = torque_known and not rows.link_side, torque_known
-    prior = power_prior(robot, *known)
+    friction_known = torque_known and not rows.link_side
+    prior = power_prior(robot, friction_known, links_known=torque_known)
     fit = fit_power(
         arm.torque_parts(part),
         part.power,
@@ -234,7 +234,7 @@ def _with_power(
     shifts = moved[len(others) :]
     by_torques = moved[: len(others)] if torque_known else 0.0
     without, by_rows = fit.without_cluster + by_torques, fit.row_replicates + by_torques
-    matrix, constant, names = _figures_of_power(robot, prior, *known)
+    matrix, constant, names = _figures_of_power(robot, prior, friction_known, torque_known)
     estimate = _with_hardly_known(
         Estimate(
             names,
@@ -248,13 +248,17 @@ def _with_power(
     relative = _covariance_scale(robot.nq, fit.value)
     return replace(
         fitted,
-        arm=_with_parameters(arm, fit.value, *known),
+        arm=_with_parameters(arm, fit.value, friction_known),
         estimate=join_estimates(
             [fitted.estimate, estimate], errors.T @ shifts @ matrix.T if torque_known else None
         ),
-        arms_without_cluster=_each_with_parameters(fitted.arms_without_cluster, without, known),
-        row_error_arms=_each_with_parameters(fitted.row_error_arms, by_rows, known),
-        prior_error_arms=_each_with_parameters(fitted.prior_error_arms, fit.value + shifts, known),
+        arms_without_cluster=_each_with_parameters(
+            fitted.arms_without_cluster, without, friction_known
+        ),
+        row_error_arms=_each_with_parameters(fitted.row_error_arms, by_rows, friction_known),
+        prior_error_arms=_each_with_parameters(
+            fitted.prior_error_arms, fit.value + shifts, friction_known
+        ),
         prior_covariance=np.outer(relative, relative) * fit.prior_covariance,
         covariance_increase=np.outer(relative, relative) * fit.covariance_increase,
     )
@@ -295,18 +299,15 @@ def _covariance_scale(nq: int, value: Array) -> Array:
 
 
 def _each_with_parameters(
-    arms: Sequence[FittedArm], values: Array, known: tuple[bool, bool]
+    arms: Sequence[FittedArm], values: Array, friction_known: bool
 ) -> tuple[FittedArm, ...]:
     return tuple(
-        _with_parameters(arm, each, *known) for arm, each in zip(arms, values, strict=True)
+        _with_parameters(arm, each, friction_known) for arm, each in zip(arms, values, strict=True)
     )
 
 
-def _with_parameters(
-    arm: FittedArm, values: Array, friction_known: bool, links_known: bool
-) -> FittedArm:
-    """The arm with packed figures, whose factors and increments change its own figures, unless
-    these are known."""
+def _with_parameters(arm: FittedArm, values: Array, friction_known: bool) -> FittedArm:
+    """The arm with packed figures, whose factors and increments change its own figures."""
     found = PowerParameters.unpacked(values)
     nominal = PowerParameters.nominal(found.idle, found.copper, found.inverter)
     if friction_known:
@@ -319,7 +320,7 @@ def _with_parameters(
         rotor_inertia=found.rotor_factor * arm.rotor_inertia,
         load=arm.load + found.load_increment,
         offset=arm.offset + found.offset_increment,
-        link_scale=1.0 if links_known else found.link_scale,
+        link_scale=arm.link_scale * found.link_scale,
         power_parameters=nominal,
     )
 

@@ -73,6 +73,8 @@ class PowerPrior:
 
     mean: Array
     precision: Array
+    known: Mask
+    """Figures (p,) that count as known and keep their mean."""
 
 
 def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerPrior:
@@ -131,7 +133,8 @@ def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerP
     mean = np.concatenate(
         [[idle_mean], copper_mean, inverter_mean, np.ones(3 * nq), load_mean, np.zeros(nq), [1.0]]
     )
-    return PowerPrior(mean, np.asarray(np.linalg.inv(variance)))
+    known = np.diag(variance) <= known_sd**2
+    return PowerPrior(mean, np.asarray(np.linalg.inv(variance)), known)
 
 
 def _range(robot: Robot, name: str, section: str, figure: str) -> tuple[float, float]:
@@ -220,6 +223,7 @@ def fit_power(
         change, value = float(np.abs(new - value).max()), new
         if iteration > 1 and change < settings.step_tolerance * (1 + np.abs(value).max()):
             break
+    value = np.where(prior.known, prior.mean, value)
     free = value > least
     posterior = _inverse(precision, free)
     replicates = residual_replicates(grouped, value, free, prior.precision)

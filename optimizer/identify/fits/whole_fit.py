@@ -166,7 +166,10 @@ def _determined(
         free = _free(block, bodies, held)
         value = _solution_of(gram, moment, mean, free, robot.nq, lower)
         inverse = np.zeros_like(gram)
-        inverse[np.ix_(free, free)] = np.linalg.inv(gram[np.ix_(free, free)])
+        unit = 1 / np.sqrt(np.diag(gram)[free])
+        inverse[np.ix_(free, free)] = np.outer(unit, unit) * np.linalg.inv(
+            gram[np.ix_(free, free)] * np.outer(unit, unit)
+        )
         # an interior-point method ends beside a bound, not at it
         inside = free & (value - lower > WHOLE_FIT.bound_sds * np.sqrt(np.diag(inverse)))
         value = np.where(inside | ~free, value, lower)
@@ -189,7 +192,9 @@ def _determined(
             )
             held[worst] = doubts[worst].reason
     moved = inverse @ gram[:, ~free] * own_deviations(block, block.names)[~free[bodies:]]
-    by_prior = inverse @ precision @ inverse + moved @ moved.T
+    # as squares, which are positive whatever the rounding errors of a log without noise are
+    root = np.hstack([inverse @ np.linalg.cholesky(precision), moved])
+    by_prior = root @ root.T
     remarks = {
         name: REJECTED.format(doubt.reason, block.own[name], rejected[name])
         for name, doubt in doubts.items()

@@ -45,8 +45,11 @@ def figures_of(
     """
     told = {(each.figure, each.joint) for each in parameters if each.identified}
     own, values = _own(robot), _values(robot, fitted, options)
+    fitted_names = {figure for figure, _ in fitted.estimate.names}
     identified = {
-        name: _identified(robot.nq, name, told, value != own[name] if name in own else True)
+        name: _identified(
+            robot.nq, name, told, name in LAW and name not in fitted_names and value != own[name]
+        )
         for name, value in values.items()
     }
     same = {
@@ -141,16 +144,14 @@ def _powers(robot: Robot, arm: FittedArm) -> dict[str, Array]:
     }
 
 
-def _identified(nq: int, name: str, told: AbstractSet[Name], differs: Mask | bool) -> Mask:
+def _identified(nq: int, name: str, told: AbstractSet[Name], replaced: Mask | bool) -> Mask:
     """Whether the logs identify a figure of each joint (nq,), or of the whole arm ().
-
-    With the friction of a joint, its other terms are replaced: they belong to the same law.
 
     Args:
         nq: number of joints.
         name: name of the figure.
         told: names of the identified parameters.
-        differs: whether the values differ from the robot's own.
+        replaced: whether the figure was no part of the fitted law, and so is 0 with it.
     """
     if name == "idle_power":
         return np.array((name, None) in told)
@@ -158,10 +159,8 @@ def _identified(nq: int, name: str, told: AbstractSet[Name], differs: Mask | boo
     found = np.array([any((part, joint) in told for part in parts) for joint in range(nq)])
     if name in INERTIALS:
         return np.asarray(found | ((LINK_MASS_SCALE, None) in told))
-    if name in LAW:
-        law = np.array([any((part, joint) in told for part in DRY) for joint in range(nq)])
-        return np.asarray(found | (law & differs & (name in ("curved", "speed", "load"))))
-    return found
+    law = np.array([any((part, joint) in told for part in DRY) for joint in range(nq)])
+    return np.asarray(found | (law & replaced))
 
 
 def _covariance_rows(robot: Robot, fitted: FitResult) -> Iterator[tuple[Name, Array]]:

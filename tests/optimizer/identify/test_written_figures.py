@@ -8,18 +8,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import rigid_torques
 from joulepath.optimizer.dynamics.losses import breakdown
-from joulepath.optimizer.identify.choices import Term
+from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Method, Term
+from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
+from joulepath.optimizer.identify.fits.block import LawEquations
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Arm
 from tests.identification_logs import Recording, recorded, truth_of, with_current
+from tests.identification_logs import rigid_torques as true_torques
 
 ROBOT = load_robot("ur10e")
 # relative; a few roundings of sums of some ten terms
@@ -86,6 +90,124 @@ def check(found: Identification, log: Log) -> None:
 def test_a_law_of_any_terms_is_written_as_it_was_fitted(terms: tuple[Term, ...]) -> None:
     log = log_of(power=None)
     check(identify(ROBOT, [log], IdentificationOptions(terms=terms, held_out=0.0)), log)
+
+
+@pytest.mark.parametrize("name", ["ur10e", "ur5e"])
+@pytest.mark.parametrize(
+    "terms", [("coulomb",), ("viscous", "offset"), ("coulomb", "curved"), ("coulomb", "viscous")]
+)
+def test_a_law_of_some_terms_is_the_best_one_of_these(name: str, terms: tuple[Term, ...]) -> None:
+    """Against least squares of its own, with bounds: the robot's own law has other terms, too."""
+    robot = load_robot(name)
+    log = log_of(robot, still=None, power=None)
+    options = IdentificationOptions(terms=terms, constants=False, held_out=0.0)
+    found = identify(robot, [log], options)
+    arm, rows = found.fitted.arm, rows_of(robot, [log])
+    error = rows.effort * robot.drives.torque_constant - arm.torque(rows)
+    told = dict.fromkeys(range(robot.nq), True)
+    for each in found.parameters:
+        if each.joint is not None and each.figure != "offset":
+            told[each.joint] &= each.identified
+    joints = [joint for joint, all_told in told.items() if all_told]
+    assert len(joints) >= 3
+    for joint in joints:
+        use = np.abs(rows.v[:, joint]) > options.velocity_threshold
+        v, a, error_of = rows.v[use, joint], rows.a[use, joint], error[use, joint]
+        columns = {
+            "coulomb": v / np.hypot(v, arm.knee),
+            "viscous": v,
+            "curved": np.arcsinh(v / arm.speed[joint]),
+            "offset": np.ones_like(v),
+        }
+        matrix = np.column_stack([*(columns[term] for term in terms), a])
+        measured = error_of + arm.friction_torque(rows)[use, joint] + arm.rotor_inertia[joint] * a
+        low = [-np.inf if term == "offset" else 0.0 for term in terms]
+        best = lsq_linear(matrix, measured, bounds=([*low, 0.0], np.inf))
+        assert error_of @ error_of == pytest.approx(2 * best.cost, rel=1e-6)
+
+
+def test_equations_of_joints_that_keep_other_terms_are_those_without_their_torque() -> None:
+    random = np.random.default_rng(0)
+    columns, kept = random.normal(size=(50, 3)), random.normal(size=(50, 2))
+    values, weight, group = random.normal(size=50), random.uniform(1, 2, 50), np.arange(50) % 4
+    equations = LawEquations(GroupedEquations.of((columns, kept), values, weight, group, 4), 2)
+    for joints in ([False, False], [True, False], [True, True]):
+        rest = values - kept @ np.array(joints)
+        direct = GroupedEquations.of(columns, rest, weight, group, 4)
+        found = equations.keeping(np.array(joints))
+        np.testing.assert_allclose(found.gram, direct.gram, rtol=EXACT)
+        np.testing.assert_allclose(found.moment, direct.moment, rtol=0, atol=1e-12 * len(values))
+
+
+@pytest.mark.parametrize("method", ["base_parameters", "essential_parameters"])
+@pytest.mark.parametrize("still", [5, None])
+def test_methods_without_links_write_the_other_figures_as_they_were_fitted(
+    method: Method, still: int | None
+) -> None:
+    """The log is of an arm with the robot's own links, so its energies follow, too."""
+    log = log_of(still=still)
+    found = identify(ROBOT, [log], IdentificationOptions(method=method, held_out=0.0))
+    arm, robot, rows = found.fitted.arm, written(found), rows_of(ROBOT, [log], regressor=True)
+    for name in ("coulomb", "viscous", "curved", "speed"):
+        np.testing.assert_array_equal(getattr(robot.friction, name), getattr(arm, name))
+    load = np.zeros(ROBOT.nq) if robot.friction.load is None else robot.friction.load
+    np.testing.assert_array_equal(load, arm.load)
+    np.testing.assert_array_equal(robot.drives.rotor_inertia, arm.rotor_inertia)
+    idle = next(each for each in found.parameters if each.figure == "idle_power")
+    assert idle.value == robot.electronics.idle_power
+    torque = rigid_torques(ROBOT.model, rows.q, rows.v, rows.a)
+    torque = torque + robot.drives.rotor_inertia * rows.a
+    energy = breakdown(rows.weight, rows.v, rows.a, torque, 0.0, Arm(robot=robot))
+    # of the base parameters, which the log does not determine exactly
+    assert energy.electrical.total == pytest.approx(arm.energy(rows), rel=2e-3)
+
+
+@pytest.mark.parametrize("terms", [DEFAULT_TERMS, CURVED])
+def test_figures_of_power_beside_torques_behind_the_gears_are_written_as_they_were_fitted(
+    terms: tuple[Term, ...],
+) -> None:
+    robot = load_robot("panda")
+    truth = truth_of(robot, 3)
+    recording = recorded(robot, truth, moves=6, seed=3)
+    rigid = true_torques(robot, truth, recording.q, recording.v, recording.a)
+    log = replace(recording.log("torque"), effort=rigid, torque_side="link")
+    found = identify(robot, [log], IdentificationOptions(held_out=0.0, terms=terms))
+    check(found, log)
+
+
+def test_power_alone_is_identified_where_efforts_were_logged() -> None:
+    log = log_of()
+    found = identify(ROBOT, [log], IdentificationOptions(fit=("power",), held_out=0.0))
+    without = replace(log, effort=None, effort_meaning=None)
+    same = identify(ROBOT, [without], IdentificationOptions(held_out=0.0))
+    values = [[each.value for each in one.parameters] for one in (found, same)]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+    check(found, log)
+
+
+def test_what_power_hardly_determines_keeps_its_letter_and_says_so() -> None:
+    log = recorded(ROBOT, truth_of(ROBOT, 1), moves=3, seed=1).log()
+    found = identify(
+        ROBOT,
+        [replace(log, effort=None, effort_meaning=None)],
+        IdentificationOptions(held_out=0.0),
+    )
+    document, told = found.document("2026-01-31"), found.figures().identified
+    sections = {
+        "friction_laws": ROBOT.figures["friction_laws"][ROBOT.friction.name],
+        "drives": ROBOT.figures["drives"],
+        "electronics": ROBOT.figures["electronics"],
+    }
+    seen = 0
+    for section, own in sections.items():
+        written_ones = document[section].get("identified", document[section])
+        for name, figure in written_ones.items():
+            if name in told and not told[name].all() and figure != own.get(name):
+                letter = own.get(name, own.get("coulomb"))["trust"]
+                assert figure["trust"] == max("B", letter, key="ABCTE".index), name
+                assert "hardly determine" in figure["note"] or "own values" in figure["note"]
+                seen += 1
+    assert seen >= 4
 
 
 @pytest.mark.parametrize(
@@ -168,7 +290,7 @@ def test_what_was_not_identified_keeps_the_robots_value_and_letter() -> None:
             assert getattr(robot.friction, part)[5] == getattr(ROBOT.friction, part)[5]
         letters = [law["coulomb"]["trust"], own["coulomb"]["trust"]]
         assert letters[0] == max("B", letters[1], key="ABCTE".index)
-        assert "keep the robot's own" in law["coulomb"]["note"]
+        assert "the robot's own values" in law["coulomb"]["note"]
         names = document["covariance"]["names"]
         assert "friction_laws.identified.coulomb.5" not in names
 
