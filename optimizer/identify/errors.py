@@ -19,8 +19,9 @@ class NotExcited(JoulepathError):
         "motor currents or the power of the arm's bus."
     )
     detail = (
-        "Nothing that was asked for can be identified from these logs: log motions in which every "
-        "joint moves, at several speeds and in both directions."
+        "Nothing that was asked for can be identified from these logs: log motor currents, torques "
+        "or the power of the arm's bus, and motions in which every joint moves, at several speeds "
+        "and in both directions."
     )
 
     parameters: list[str]

@@ -224,7 +224,10 @@ def _identified(
     """The identification from prepared logs."""
     last = len(logs) - 1
     if len(options.mains) not in (0, len(logs)):
-        raise InvalidProblem("mains", f"mains must have {len(logs)} readings, one for each log.")
+        given = len(options.mains)
+        raise InvalidProblem(
+            "mains", f"mains needs one reading for each log: {len(logs)} in all, and not {given}."
+        )
     rows = _rows(robot, logs, options)
     check_logs(robot, rows, logs, options)
     split = options.held_out and not rows.rest.all()

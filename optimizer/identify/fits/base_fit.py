@@ -13,7 +13,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, base_parameters
-from joulepath.optimizer.identify.arm.friction_columns import lower_bounds
+from joulepath.optimizer.identify.arm.friction_columns import COUPLED, lower_bounds
 from joulepath.optimizer.identify.choices import Estimator
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, solve_bounded
@@ -247,8 +247,10 @@ def _free_equations(grouped: GroupedEquations, own: Array, free: Mask) -> Groupe
 
 
 def relative_deviations(names: tuple[Name, ...], value: Array, sd: Array, free: Mask) -> Array:
-    """Standard deviations (p,) over values; 0 for held unknowns and for offsets, which are kept
-    with any standard deviation."""
-    counts = free & np.array([term != "offset" for term, _ in names])
+    """Standard deviations (p,) over values; 0 for held unknowns, and for offsets and couplings,
+    which the robot has no values of."""
+    counts = free & np.array(
+        [term != "offset" and not term.startswith(COUPLED) for term, _ in names]
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(counts, np.where(value != 0, sd / np.abs(value), np.inf), 0.0)

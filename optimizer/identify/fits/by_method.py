@@ -119,7 +119,7 @@ def _missing_requirement(logs: Sequence[Log], options: IdentificationOptions) ->
         case "base_wrench":
             if any(log.wrench is None for log in logs):
                 return "it needs the force and the torque beneath the base in every log."
-        case _ if any(log.effort is None for log in logs):
+        case _ if not all(log.carries_weight for log in logs):
             return "it needs motor currents or torques in every log."
         case "temperature":
             return _missing_temperature(logs)

@@ -109,8 +109,7 @@ def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitRes
     if options.method == "base_wrench":
         return _with_wrench(robot, rows, fitted, options)
     errors = np.zeros((0, 0))
-    of_torques = options.needs_regressor or terms_of(options)
-    if of_torques and np.isfinite(torque).any():
+    if np.isfinite(torque).any() and (options.needs_regressor or terms_of(options)):
         fitted, errors = _with_torque(robot, rows, torque, fitted, options)
     if with_power:
         return _with_power(robot, rows, fitted, errors, options)

@@ -31,7 +31,7 @@ def check_logs(
         NoPowerChannel: power is requested, and no log has it.
         NotExcited: the logs have no motion, or neither torques nor power.
     """
-    if any(log.effort_meaning == "external" for log in logs):
+    if any(log.effort_meaning == "external" and log.power is None for log in logs):
         raise EffortNotUsable(
             "The efforts of these logs are without gravity and identify nothing: log motor "
             "currents or torques.",

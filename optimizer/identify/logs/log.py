@@ -103,6 +103,11 @@ class Log:
             )
 
     @property
+    def carries_weight(self) -> bool:
+        """Whether efforts with gravity were logged, which identify figures."""
+        return self.effort_meaning in ("current", "torque")
+
+    @property
     def has_all_efforts(self) -> bool:
         """Whether the efforts of all joints were logged."""
         return self.effort is not None and bool(np.isfinite(self.effort[0]).all())

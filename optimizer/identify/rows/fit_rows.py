@@ -147,7 +147,7 @@ def rows_of(
                 "logs", f"A log is of {log.robot} ({log.joints} joints), not of {robot.name}."
             )
         _check_power(robot, log)
-    meanings = sorted({log.effort_meaning for log in logs if log.effort_meaning is not None})
+    meanings = sorted({str(log.effort_meaning) for log in logs if log.carries_weight})
     if len(meanings) > 1:
         raise InvalidProblem(
             "logs", f"The efforts of the logs must mean the same, not {' and '.join(meanings)}."
@@ -279,7 +279,7 @@ def _rows_of_log(
         "a": a,
         "rigid": rigid,
         "link_torques": links,
-        "effort": mean(log.effort, joints),
+        "effort": mean(log.effort if log.carries_weight else None, joints),
         "power": mean(log.power, ()),
         "temperature": mean(log.temperature, joints),
         "wrench": mean(log.wrench, (6,)),

@@ -10,7 +10,12 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, NothingHeldOut
+from joulepath.optimizer.identify.errors import (
+    MethodNotApplicable,
+    NoPowerChannel,
+    NotExcited,
+    NothingHeldOut,
+)
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
@@ -263,8 +268,19 @@ def test_a_repeated_log_is_on_one_side_of_the_split() -> None:
 
 def test_gravity_compensated_efforts_are_refused() -> None:
     log = recorded(ROBOT, truth_of(ROBOT), moves=2).log("torque")
+    external = replace(log, effort_meaning="external")
     with pytest.raises(EffortNotUsable):
-        identify(ROBOT, [replace(log, effort_meaning="external")])
+        identify(ROBOT, [without_power(external)])
+    with pytest.raises(MethodNotApplicable):
+        identify(ROBOT, [external], IdentificationOptions(method="base_parameters"))
+
+
+def test_a_log_with_gravity_compensated_efforts_is_identified_by_its_power() -> None:
+    log = recorded(ROBOT, truth_of(ROBOT), moves=6).log("torque")
+    found = identify(ROBOT, [replace(log, effort_meaning="external")])
+    alone = identify(ROBOT, [replace(log, effort=None, effort_meaning=None)])
+    assert [each.value for each in found.parameters] == [each.value for each in alone.parameters]
+    assert found.validation is not None and found.validation.fitted.torque is None
 
 
 def test_power_is_asked_of_logs_that_have_it() -> None:
