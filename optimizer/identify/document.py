@@ -1,8 +1,8 @@
 """Identified figures in the form of a robot's `figures.yaml`.
 
 A figure has a value, unit, source, trust letter and standard deviation. What the logs did not
-identify keeps the robot's own value, source and letter; a figure of some joints has the worst
-letter of its joints.
+identify keeps the robot's own value, source and letter; of the figures of a power, which are known
+only together, it keeps the letter. A figure of some joints has the worst letter of its joints.
 """
 
 from __future__ import annotations
