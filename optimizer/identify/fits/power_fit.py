@@ -51,6 +51,12 @@ class PowerFitSettings:
     """Prior standard deviation of a joint's offset over its Coulomb friction [1]."""
     known_sd: float = 1e-6
     """Prior standard deviation of a figure that counts as known [SI unit]."""
+    unknown_idle_sd: float = 30.0
+    """Prior standard deviation of an idle power whose own value is 0, which has no range [W]: about
+    the idle power of an arm."""
+    unknown_copper_sd: float = 0.5
+    """Prior standard deviation of a copper loss whose own value is 0 [W/A²]: about the loss of a
+    joint of an arm."""
     least_link_scale: float = 0.5
     """Smallest factor on the masses of the links [1], five standard deviations below the robot's
     own: links without a mass are no bodies, and no document of figures may have them."""
@@ -91,6 +97,7 @@ def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerP
     idle_mean, idle_sd = _lognormal_around(
         idle, *_range(robot, "idle_power", "electronics", "idle_power")
     )
+    idle_sd = idle_sd or POWER_FIT.unknown_idle_sd
     large, small = (
         _range(robot, each, "drives", "copper") for each in ("copper_large", "copper_small")
     )
@@ -99,6 +106,7 @@ def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerP
     copper_mean, copper_sd = np.transpose(
         [_lognormal_around(own, *(large if is_large else small)) for own, is_large in joints]
     )
+    copper_sd = np.where(copper_sd > 0, copper_sd, POWER_FIT.unknown_copper_sd)
     low, high = range_of("inverter_linear")
     inverter_mean = np.where(drives.inverter_linear > 0, drives.inverter_linear, (low + high) / 2)
     load_mean = np.zeros(nq)

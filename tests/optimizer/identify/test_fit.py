@@ -283,6 +283,18 @@ def test_a_log_with_gravity_compensated_efforts_is_identified_by_its_power() -> 
     assert found.validation is not None and found.validation.fitted.torque is None
 
 
+def test_power_figures_are_identified_though_the_robots_own_are_0() -> None:
+    """Of a robot of one's own, or of figures that an earlier fit has put at their bound."""
+    drives = replace(ROBOT.drives, copper=np.zeros(ROBOT.nq))
+    bare = replace(ROBOT, drives=drives, electronics=replace(ROBOT.electronics, idle_power=0.0))
+    truth = truth_of(ROBOT)
+    log = recorded(ROBOT, truth, moves=14).log()
+    found = identify(bare, [log], WITHOUT_SPLIT)
+    idle = next(each for each in found.parameters if each.figure == "idle_power")
+    assert idle.identified and abs(idle.value - truth.idle_power) < FAR * idle.sd
+    assert any(each.figure == "copper" and each.identified for each in found.parameters)
+
+
 def test_power_is_asked_of_logs_that_have_it() -> None:
     log = without_power(recorded(ROBOT, truth_of(ROBOT), moves=2).log())
     with pytest.raises(NoPowerChannel):
