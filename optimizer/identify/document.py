@@ -14,7 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.models.trust import TRUST
-from joulepath.models.uncertainty.document import DOCUMENT
+from joulepath.models.uncertainty.document import DOCUMENT, TOP
 from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES
 from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
 from joulepath.optimizer.identify.results import IdentifiedFigures
@@ -76,13 +76,15 @@ def document_of(
     drives = section(_DRIVES, own["drives"])
     electronics = section({"idle_power": "W"}, own["electronics"])
     inertials = section(_INERTIALS, own["inertials"])
+    # figures that a robot has from earlier logs are not those that it comes with
+    earlier = own if own.keys() & TOP else {}
     document: dict[str, Any] = {"robot": figures.robot}
-    if friction:
-        document["friction_laws"] = {FRICTION_LAW: friction}
-    if drives:
-        document["drives"] = drives
-    if electronics:
-        document["electronics"] = electronics
+    document |= {name: earlier[name] for name in ("inertials", "mains") if name in earlier}
+    if friction or earlier:
+        document["friction_laws"] = {FRICTION_LAW: friction or own_law}
+    for name, found in (("drives", drives), ("electronics", electronics)):
+        if found or earlier:
+            document[name] = {**earlier.get(name, {}), **found}
     if inertials:
         turned = {"value": np.zeros((len(figures.values["mass"]), 3)).tolist(), "unit": "rad"}
         document["inertials"] = inertials | {

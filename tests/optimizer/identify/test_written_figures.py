@@ -139,6 +139,16 @@ def test_equations_of_joints_that_keep_other_terms_are_those_without_their_torqu
         np.testing.assert_allclose(found.moment, direct.moment, rtol=0, atol=1e-12 * len(values))
 
 
+@pytest.mark.parametrize(
+    "options", [{}, {"terms": ("coulomb",)}, {"fit": ("rotor",)}, {"fit": ("power",)}]
+)
+def test_figures_beside_earlier_ones_are_written_as_fitted(options: dict[str, Any]) -> None:
+    """What a later log does not change is that of the earlier logs, not of the robot's maker."""
+    log = log_of()
+    first = identify(ROBOT, [log], IdentificationOptions(terms=CURVED, held_out=0.0))
+    check(identify(written(first), [log], IdentificationOptions(held_out=0.0, **options)), log)
+
+
 @pytest.mark.parametrize("method", ["base_parameters", "essential_parameters"])
 @pytest.mark.parametrize("still", [5, None])
 def test_methods_without_links_write_the_other_figures_as_they_were_fitted(
