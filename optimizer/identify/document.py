@@ -16,7 +16,7 @@ from joulepath.models.robot import Array
 from joulepath.models.trust import TRUST
 from joulepath.models.uncertainty.document import DOCUMENT, TOP
 from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES
-from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
+from joulepath.optimizer.identify.logs.log_warnings import named_joints
 from joulepath.optimizer.identify.results import IdentifiedFigures
 
 FRICTION_LAW = "identified"
@@ -118,7 +118,7 @@ def _figure(
             if np.any(joints):
                 which = "this figure"
                 if np.ndim(joints):
-                    which = f"joints {numbers_of_joints(np.flatnonzero(joints).tolist())}"
+                    which = named_joints(np.flatnonzero(joints).tolist())
                 notes.append(text.format(which, own["trust"], own["source"]))
     content: dict[str, Any] = {
         "value": value.tolist(),

@@ -11,7 +11,7 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.lag import smooth, without_spikes
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
+from joulepath.optimizer.identify.logs.log_warnings import named_joints
 from joulepath.optimizer.identify.logs.motion import LoggedMotion, smooth_sign, thinned
 
 
@@ -158,7 +158,7 @@ def effort_warnings(
     large = torque > settings.max_torque * robot.limits.tau_max
     if large.any():
         yield (
-            f"The efforts of joints {numbers_of_joints(np.flatnonzero(large).tolist())} are beyond "
+            f"The efforts of {named_joints(np.flatnonzero(large).tolist())} are beyond "
             f"{settings.max_torque:g} times the greatest torque of the joint: check their unit, "
             "column by column."
         )
@@ -169,7 +169,7 @@ def effort_warnings(
     ]
     if odd:
         yield (
-            f"The efforts of joints {numbers_of_joints(odd)} are not what the motion makes by the "
+            f"The efforts of {named_joints(odd)} are not what the motion makes by the "
             "robot's model: check the order of the joints, zeros and signs of the positions, "
             "units, payload and gravity."
         )

@@ -19,7 +19,7 @@ from joulepath.optimizer.identify.logs.head import head_of
 from joulepath.optimizer.identify.logs.header_columns import columns_of_rows
 from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
+from joulepath.optimizer.identify.logs.log_warnings import named_joints
 from joulepath.optimizer.identify.logs.possible import (
     check_coarse,
     check_leaps,
@@ -158,7 +158,7 @@ def _check_positions(
     channels["q"], turned = without_whole_turns(q, robot)
     if turned:
         remarks.append(
-            f"The positions of joints {numbers_of_joints(turned)} leap by whole turns, and are "
+            f"The positions of {named_joints(turned)} leap by whole turns, and are "
             "taken without the leaps."
         )
     q = channels["q"][grid.kept] if grid.repeated else channels["q"]

@@ -84,7 +84,7 @@ def _constant(log: Log) -> Iterator[str]:
             continue
         same = np.flatnonzero(np.ptp(values, axis=0) == 0)
         if same.size:
-            yield f"The {words} of joints {numbers_of_joints(same)} never changes."
+            yield f"The {words} of {named_joints(same)} never changes."
     if log.power is not None and np.ptp(log.power) == 0:
         yield "The power never changes."
 
@@ -99,8 +99,7 @@ def _saturated(log: Log) -> Iterator[str]:
     wrong = [joint for joint, effort in enumerate(log.effort.T) if _is_saturated(effort, moving)]
     if wrong:
         yield (
-            f"The effort of joints {numbers_of_joints(wrong)} stays at its greatest value: it "
-            "is cut off there."
+            f"The effort of {named_joints(wrong)} stays at its greatest value: it is cut off there."
         )
 
 
@@ -164,6 +163,7 @@ def held_warning(name: str, values: Array, v: Array, rate: float) -> list[str]:
     ]
 
 
-def numbers_of_joints(joints: Iterable[int]) -> str:
-    """Numbers of joints in a sentence, from 1."""
-    return ", ".join(str(j + 1) for j in joints)
+def named_joints(joints: Iterable[int]) -> str:
+    """Joints in a sentence, counted from 1: "joint 3" or "joints 1, 3"."""
+    numbers = [str(j + 1) for j in joints]
+    return f"{'joint' if len(numbers) == 1 else 'joints'} {', '.join(numbers)}"

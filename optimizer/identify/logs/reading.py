@@ -31,7 +31,7 @@ from joulepath.optimizer.identify.logs.log_report import LogReport
 from joulepath.optimizer.identify.logs.log_warnings import (
     held_warning,
     log_warnings,
-    numbers_of_joints,
+    named_joints,
 )
 from joulepath.optimizer.identify.logs.motion import LoggedMotion
 from joulepath.optimizer.identify.logs.moves import (
@@ -179,8 +179,7 @@ def _efforts(
         effort = effort.copy()
         effort[:, missing] = np.nan
         remarks.append(
-            f"The efforts of joints {numbers_of_joints(missing)} are not logged: these joints keep "
-            "their own figures."
+            f"The efforts of {named_joints(missing)} are not logged, and their figures are kept."
         )
     return _Efforts(group, effort, report)
 

@@ -10,7 +10,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.columns import Columns
 from joulepath.optimizer.identify.logs.filters import derivative, filtered, low_passed, noise
-from joulepath.optimizer.identify.logs.log_warnings import numbers_of_joints
+from joulepath.optimizer.identify.logs.log_warnings import named_joints
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def speeds_of(
     elif wrong := _inconsistent_speeds(q, v, rate, columns, remarks):
         v = _replaced(v, derivative(q[:, wrong], rate), wrong)
         remarks.append(
-            f"The speeds of joints {numbers_of_joints(wrong)} do not fit their positions, and are "
+            f"The speeds of {named_joints(wrong)} do not fit their positions, and are "
             "made from these: check units, signs and the order of the columns."
         )
     if a is None:
@@ -78,7 +78,7 @@ def speeds_of(
     odd = _inconsistent_accelerations(v, a, rate)
     if set(odd) - set(wrong):
         remarks.append(
-            f"The accelerations of joints {numbers_of_joints(odd)} are not the change of their "
+            f"The accelerations of {named_joints(odd)} are not the change of their "
             "speeds, and are made from these: check units, signs and the order of the columns, "
             "or leave them out."
         )

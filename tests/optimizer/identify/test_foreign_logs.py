@@ -304,7 +304,7 @@ def test_accelerations_that_are_none(recording: Recording, factor: float) -> Non
 def test_speeds_of_one_joint_that_are_none(recording: Recording) -> None:
     v = recording.v * (np.arange(6) != 1)
     reading = read_log(csv_of(replace(recording, v=v)), ROBOT)
-    assert any("speeds of joints 2 do not fit" in each for each in reading.report.warnings)
+    assert any("speeds of joint 2 do not fit" in each for each in reading.report.warnings)
     assert (
         np.abs(reading.log.v[:, 1] - recording.exact_v[:, 1]).std()
         < 0.02 * recording.exact_v[:, 1].std()
@@ -330,7 +330,7 @@ def test_efforts_of_small_joints_that_are_another_joints(recording: Recording) -
     )
     milli = with_current(recording, recording.current * np.array([1, 1, 1, 1, 1, 1000.0]))
     words = " ".join(read_log(csv_of(milli), ROBOT).report.warnings)
-    assert "efforts of joints 6 are beyond 3 times the greatest torque" in words
+    assert "efforts of joint 6 are beyond 3 times the greatest torque" in words
 
 
 def test_channels_that_are_written_again_and_again(recording: Recording) -> None:

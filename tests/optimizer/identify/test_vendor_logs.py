@@ -112,7 +112,7 @@ def test_a_nominal_clock_is_named_and_right_speeds_are_kept(ur: Recording) -> No
     v = exact.v.copy()
     v[:, 1] *= 0.62
     one = read_log(csv_of(replace(exact, v=v), without="aiP"), UR)
-    assert any("speeds of joints 2 do not fit" in text for text in one.report.warnings)
+    assert any("speeds of joint 2 do not fit" in text for text in one.report.warnings)
     with pytest.raises(InvalidTable, match="one unit"):
         read_log(csv_of(replace(exact, v=np.rad2deg(exact.v)), without="aiP"), UR)
 
