@@ -119,7 +119,6 @@ def test_every_point_is_certified(asked_and_found: tuple[Problem, Front]) -> Non
         assert 0 < point.lower_bound <= objective(asked, point)
 
 
-@pytest.mark.long
 def test_every_point_is_at_least_as_good_as_a_fresh_answer(
     asked_and_found: tuple[Problem, Front],
 ) -> None:
