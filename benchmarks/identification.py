@@ -110,7 +110,7 @@ def _draws(robot: Robot, rows: Rows, options: IdentificationOptions) -> float:
 
 
 def tx40_torque(place: Path | None, _: int) -> list[Gate]:
-    """Friction and torques of the TX40; its second half leaves two joints their own friction."""
+    """Friction and torques of the TX40."""
     assert place is not None
     robot, log = tx40(place)
     rows = rows_of(robot, [log], regressor=True)
@@ -120,7 +120,7 @@ def tx40_torque(place: Path | None, _: int) -> list[Gate]:
     for name, half in (("first", first), ("second", ~first)):
         arm, rest = fit_rows(robot, rows.take(half), TX40_OPTIONS).arm, rows.take(~half)
         error = rest.effort - arm.torque(rest)
-        for joint, most in enumerate((10.0, 8.0, 15.0, 15.0, 22.0, 20.0)):
+        for joint, most in enumerate((10.0, 8.0, 13.0, 12.0, 22.0, 20.0)):
             of = moving_rows(
                 rest, rest.effort, joint, TX40_OPTIONS.velocity_threshold, TX40_OPTIONS.couplings
             )

@@ -143,7 +143,6 @@ def joint_block(
         speed: speeds (nq,) of the curved terms [rad/s]; None for the robot's own.
     """
     terms, knee = terms_of(options), robot.friction.knee if options.knee is None else options.knee
-    unrequested = _unrequested_law(robot, terms, knee)
     couplings = [
         (k, each) for k, each in enumerate(options.couplings) if set(each.joints) <= set(joints)
     ]
@@ -164,16 +163,11 @@ def joint_block(
                 if term != SENSOR_COULOMB or rows.drags is None
                 else rows.drags[use, joint, options.reversal]
             )
-        for c, (_, coupling) in enumerate(couplings):
-            ratios = coupling.ratios
-            for k, term in enumerate(coupled):
-                place = len(joints) * len(terms) + c * len(coupled) + k
-                columns[:, place] = ratios[joint] * column(
-                    term, v @ ratios, a @ ratios, rigid[:, joint], knee
-                )
-        rest = unrequested.torque(v, rigid)[:, joint]
-        values = torque[use, joint] - known[use, joint]
-        parts.append((columns, values, joint, clusters.of_row[use], rest))
+        columns[:, len(joints) * len(terms) :] = _coupled_columns(
+            v, a, rigid, joint, coupled, [each for _, each in couplings], knee
+        )
+        rest = _unrequested_law(robot, terms, knee).torque(v, rigid)[:, joint]
+        parts.append((columns, (torque - known)[use, joint], joint, clusters.of_row[use], rest))
     return JointBlock(
         names=tuple(names),
         columns=np.concatenate([part[0] for part in parts]),
@@ -188,6 +182,25 @@ def joint_block(
         unrequested=np.concatenate([part[4] for part in parts]),
         deciding=deciding_term(terms),
     )
+
+
+def _coupled_columns(
+    v: Array,
+    a: Array,
+    rigid: Array,
+    joint: int,
+    terms: Sequence[str],
+    couplings: Sequence[Coupling],
+    knee: float,
+) -> Array:
+    """Columns (n, p) of the terms of every coupling in the rows of a joint, with v, a and rigid
+    torques (n, nq)."""
+    found = [
+        each.ratios[joint] * column(term, v @ each.ratios, a @ each.ratios, rigid[:, joint], knee)
+        for each in couplings
+        for term in terms
+    ]
+    return np.stack(found, axis=1) if found else np.zeros((len(v), 0))
 
 
 def _unrequested_law(robot: Robot, terms: Sequence[str], knee: float) -> FrictionLaw:

@@ -165,11 +165,7 @@ def _determined(
         moment = grouped.moment.sum(axis=0) + precision @ mean
         free = _free(block, bodies, held)
         value = _solution_of(gram, moment, mean, free, robot.nq, lower)
-        inverse = np.zeros_like(gram)
-        unit = 1 / np.sqrt(np.diag(gram)[free])
-        inverse[np.ix_(free, free)] = np.outer(unit, unit) * np.linalg.inv(
-            gram[np.ix_(free, free)] * np.outer(unit, unit)
-        )
+        inverse = _inverse(gram, free)
         # an interior-point method ends beside a bound, not at it
         inside = free & (value - lower > WHOLE_FIT.bound_sds * np.sqrt(np.diag(inverse)))
         value = np.where(inside | ~free, value, lower)
@@ -200,6 +196,15 @@ def _determined(
         for name, doubt in doubts.items()
     }
     return _Solution(value, solution.replicates, by_prior, remarks)
+
+
+def _inverse(gram: Array, free: Mask) -> Array:
+    """Inverse (p, p) of the equations of the `free` unknowns, which have different units; 0 for the
+    others."""
+    inverse, unit = np.zeros_like(gram), 1 / np.sqrt(np.diag(gram)[free])
+    scale, of_free = np.outer(unit, unit), np.ix_(free, free)
+    inverse[of_free] = scale * np.linalg.inv(gram[of_free] * scale)
+    return inverse
 
 
 def _prior(robot: Robot, block: JointBlock, options: IdentificationOptions) -> tuple[Array, Array]:
