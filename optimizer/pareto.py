@@ -95,7 +95,7 @@ def pareto(
     if not PARETO.least_points <= points <= PARETO.most_points:
         allowed = f"between {PARETO.least_points} and {PARETO.most_points}"
         raise InvalidProblem("points", f"points must lie {allowed}.")
-    if problem.duration_min is not None and problem.duration_min == problem.duration_max:
+    if problem.has_fixed_duration:
         raise InvalidProblem(
             "duration", "A front runs over durations: leave duration out or give a range."
         )

@@ -135,6 +135,11 @@ class Problem:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
 
+    @property
+    def has_fixed_duration(self) -> bool:
+        """Whether only one duration is allowed."""
+        return self.duration_min is not None and self.duration_min == self.duration_max
+
 
 def narrowed(problem: Problem, start: int, goal: int) -> Problem:
     """The problem with a single start and goal: those of the given indices."""

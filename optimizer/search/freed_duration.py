@@ -62,7 +62,7 @@ def start_from_free_duration(state: SearchState, best: Candidate) -> None:
 def _applies(state: SearchState) -> bool:
     """Whether the duration is fixed, and a motion of free duration has a duration of its own."""
     problem = state.problem
-    fixed = problem.duration_min == problem.duration_max and not state.deadline.passed
+    fixed = problem.has_fixed_duration and not state.deadline.passed
     plain = problem.objective == "electrical" and problem.dwell is None and not state.uses_storage
     return fixed and plain and state.method.free_control_points
 

@@ -58,9 +58,8 @@ def explore_least_work(state: SearchState, explore: Callable[[], object]) -> boo
     if state.deadline.left < LEAST_WORK.least_time or not state.prepared.kernel.compiled:
         return False
     families = families_of(state)
-    fixed = asked.duration_max is not None and asked.duration_min == asked.duration_max
     free = state.prepared.path is None and not asked.passes and asked.tool_path is None
-    if not (families and fixed and free) or any(
+    if not (families and asked.has_fixed_duration and free) or any(
         each.attempt for family in families for each in family
     ):
         return False

@@ -27,12 +27,17 @@ from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 class RefinementSettings:
     """Settings of the refinement of a motion."""
 
-    surplus_shares: tuple[float, ...] = (0.75, 0.5, 0.25)
+    surplus_shares: tuple[float, ...] = (0.95, 0.9, 0.85, 0.8, 0.65, 0.5, 0.25)
     """Assumed values of a joule of surplus if the storage cannot take all of it.
 
     They are shares of the way from the price that the supply pays to the share that the storage
-    gives back.
+    gives back. The optimum often lies where the storage just takes all surplus. There the value is
+    nearly the highest one, and the energy is steep: of the energies of two moves, 1.3 % were saved
+    by shares above 0.75.
     """
+    least_charged: float = 1e-6
+    """Energy that a motion stores, as a share of the energy it needs, above which other values of a
+    joule of surplus are tried."""
 
 
 REFINEMENT = RefinementSettings()
@@ -97,16 +102,10 @@ def refine(state: SearchState, candidate: Candidate, graded_below: float = np.in
 
 
 def _start_otherwise(state: SearchState, candidate: Candidate) -> None:
-    """Improve a candidate by solves with other values of the surplus or the longest duration."""
+    """Improve a candidate by solves with other values of the surplus or other durations."""
     problem, deadline = state.problem, state.deadline
-    if state.uses_storage:
-        supply = problem.arm.regeneration
-        for share in REFINEMENT.surplus_shares:
-            if not deadline.passed:
-                value = supply + share * max(problem.arm.bus.efficiency - supply, 0.0)
-                solve_from(
-                    state, candidate, sampled(candidate.spline), fine=False, surplus_value=value
-                )
+    if _stores_energy(state, candidate):
+        _value_surplus_otherwise(state, candidate)
     longest, spline = problem.duration_max or 0.0, candidate.spline
     is_faster = spline.duration < longest * (1 - DURATION_TOLERANCE)
     if problem.objective == "mechanical" and is_faster and not deadline.passed:
@@ -114,6 +113,29 @@ def _start_otherwise(state: SearchState, candidate: Candidate) -> None:
         # `lasting` rounds otherwise, which leads the objective to other local optima
         slower = retimed(spline, longest / spline.duration)
         solve_from(state, candidate, sampled(slower), fine=False, duration=longest)
+
+
+def _stores_energy(state: SearchState, candidate: Candidate) -> bool:
+    """Whether the storage takes energy in a candidate's motion, so that its value matters."""
+    energy = state.prepared.energy(candidate.spline)
+    least = REFINEMENT.least_charged * abs(energy.electrical.total)
+    return energy.storage is not None and energy.storage.charged > least
+
+
+def _value_surplus_otherwise(state: SearchState, candidate: Candidate) -> None:
+    """Improve a candidate by solves with other values of the surplus.
+
+    With a free duration, the cost of each value has its optimum at a duration of its own. So the
+    candidate is also solved anew at the duration of the best of them, at the highest value.
+    """
+    arm, deadline = state.problem.arm, state.deadline
+    for share in REFINEMENT.surplus_shares:
+        if not deadline.passed:
+            value = arm.regeneration + share * max(arm.bus.efficiency - arm.regeneration, 0.0)
+            solve_from(state, candidate, sampled(candidate.spline), fine=False, surplus_value=value)
+    if not state.problem.has_fixed_duration and not deadline.passed:
+        duration = candidate.spline.duration
+        improve(state, candidate, lambda solver: solver.solve(), duration=duration)
 
 
 def start_from_fastest(
@@ -213,8 +235,7 @@ def refine_rivals(
     problem = state.problem
     if has_corners(problem.objective, problem.arm) or best.energy is None:
         return
-    in_time = problem.duration_max is not None and problem.duration_min == problem.duration_max
-    gain = settings.gain_in_time if in_time else settings.gain
+    gain = settings.gain_in_time if problem.has_fixed_duration else settings.gain
     most = best.energy + gain * (coarse - best.energy)
     graded_below = np.inf if saved is None else best.energy + gain * saved
     for rival in state.candidates:

@@ -60,7 +60,7 @@ def sharpen_cost(
         return
     if not state.method.free_control_points or not _is_imprecise(state, candidate, settings):
         return
-    is_fixed = problem.duration_max is not None and problem.duration_min == problem.duration_max
+    is_fixed = problem.has_fixed_duration
     for usual in duration_intervals(
         state.prepared,
         candidate.q_goal,

@@ -84,9 +84,7 @@ def explore_candidates(state: SearchState) -> None:
     """Solve candidates by their bounds; take the fastest motion if no motion is short enough."""
     problem = state.problem
     # rest does no work: any motion may rest for the time that is left
-    state.may_rest = (
-        problem.objective == "mechanical" and problem.duration_min != problem.duration_max
-    )
+    state.may_rest = problem.objective == "mechanical" and not problem.has_fixed_duration
     explore_or_find_fastest(state, lambda: explore(state), state.known, state.without_storage)
 
 
