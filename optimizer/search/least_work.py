@@ -59,9 +59,7 @@ def explore_least_work(state: SearchState, explore: Callable[[], object]) -> boo
         return False
     families = families_of(state)
     free = state.prepared.path is None and not asked.passes and asked.tool_path is None
-    if not (families and asked.has_fixed_duration and free) or any(
-        each.attempt for family in families for each in family
-    ):
+    if not (families and asked.has_fixed_duration and free):
         return False
     solver = CoarseSolver(state.prepared, float(asked.duration_max or 0.0))
     search = _LeastWorkSearch(state, families, solver)
