@@ -45,6 +45,9 @@ class GoalRefinementSettings:
 
     rounds: int = 8
     """Largest number of rounds."""
+    last_rounds: int = 2
+    """Largest number of rounds from a refined motion, which touches other limits than the coarse
+    motion: in 5 of 24 random requests, another goal then saved 0.08 to 0.2 %."""
     radius: float = 0.6
     """First trust region of a goal joint [rad]."""
     least_radius: float = 0.01
@@ -90,6 +93,17 @@ def refine_goals(state: SearchState) -> list[Candidate]:
         lambda each: (each.start.label, each.goal.label, each.goal.target),
         lambda each: refine_goal(state, each),
     )
+
+
+def refine_goal_again(state: SearchState, refined: Candidate) -> None:
+    """Append the refined candidate with its goal moved once more, if it needs less energy."""
+    if refined.goal.tolerance is None:
+        return
+    moved = refine_goal(state, refined, GOALS.last_rounds)
+    if moved is not refined:
+        moved.refined = True
+        state.candidates.append(moved)
+        state.tell_best()
 
 
 def refine_goal(state: SearchState, candidate: Candidate, rounds: int = GOALS.rounds) -> Candidate:

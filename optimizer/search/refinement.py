@@ -35,6 +35,10 @@ class RefinementSettings:
     nearly the highest one, and the energy is steep: of the energies of two moves, 1.3 % were saved
     by shares above 0.75.
     """
+    duration_ratios: tuple[float, ...] = (0.93, 0.95, 0.97, 0.985, 1.0, 1.015, 1.03)
+    """Fixed durations, in multiples of the one found, for which a motion that stores energy is
+    solved anew. With a free duration, no value of a joule leads to the optimum where the storage
+    just takes all surplus: it is 0.1 to 0.4 % better."""
     least_charged: float = 1e-6
     """Energy that a motion stores, as a share of the energy it needs, above which other values of a
     joule of surplus are tried."""
@@ -125,17 +129,20 @@ def _stores_energy(state: SearchState, candidate: Candidate) -> bool:
 def _value_surplus_otherwise(state: SearchState, candidate: Candidate) -> None:
     """Improve a candidate by solves with other values of the surplus.
 
-    With a free duration, the cost of each value has its optimum at a duration of its own. So the
-    candidate is also solved anew at the duration of the best of them, at the highest value.
+    With a free duration, the candidate is also solved anew at durations around that of the best of
+    them, at the highest value.
     """
     arm, deadline = state.problem.arm, state.deadline
     for share in REFINEMENT.surplus_shares:
         if not deadline.passed:
             value = arm.regeneration + share * max(arm.bus.efficiency - arm.regeneration, 0.0)
             solve_from(state, candidate, sampled(candidate.spline), fine=False, surplus_value=value)
-    if not state.problem.has_fixed_duration and not deadline.passed:
-        duration = candidate.spline.duration
-        improve(state, candidate, lambda solver: solver.solve(), duration=duration)
+    if state.problem.has_fixed_duration:
+        return
+    found = candidate.spline.duration
+    for ratio in REFINEMENT.duration_ratios:
+        if not deadline.passed:
+            improve(state, candidate, lambda solver: solver.solve(), duration=ratio * found)
 
 
 def start_from_fastest(

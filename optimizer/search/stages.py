@@ -105,6 +105,8 @@ def refine_best(state: SearchState) -> None:
     coarse = best.energy or 0.0
     saved = refine(state, best)
     refine_rivals(state, best, coarse, saved)
+    if state.method.most_solved is None:
+        free_goal.refine_goal_again(state, state.best() or best)
     start_from_free_duration(state, state.best() or best)
 
 
