@@ -13,13 +13,14 @@ from joulepath.optimizer.cycle.known_motions import KnownMotions
 from joulepath.optimizer.deadline import Clock, Deadline, end_if_stopped
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.placement.box_bound import box_bound
+from joulepath.optimizer.placement.checked_places import CheckedPlaces
 from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
 from joulepath.optimizer.placement.nearby_energy import NearbyEnergy
 from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.refinement import PATTERN, Box, refined
 from joulepath.optimizer.placement.region_bound import region_bound
 from joulepath.optimizer.placement.rounds import Reason, Round, Rounds
-from joulepath.optimizer.placement.space import Place, Space
+from joulepath.optimizer.placement.space import Key, Place, Space
 from joulepath.optimizer.placement.tolerances import tolerances
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell
 
@@ -32,6 +33,8 @@ class PlacementSearchSettings:
     """Share until which the nominal place is computed."""
     checked: float = 0.25
     """Share of the time then left for checks of the map's places for reach and bound."""
+    descended: float = 0.4
+    """Share until which places of least bound are sought between those of the map."""
     promising: float = 0.6
     """Share until which places are computed that may be better than the best one."""
     refined: float = 0.8
@@ -88,8 +91,9 @@ class PlacementSearch:
             np.array([axis.high for axis in axes]),
             np.array([axis.scale for axis in axes]),
         )
+        self.checked = CheckedPlaces(self.rounds, self.box, self.spacing)
         self._times = list[float]()
-        self._memo: dict[tuple[tuple[int, ...], bytes], Round] = {}
+        self._memo: dict[Key, Round] = {}
         self._known = KnownMotions()
         self.best: Round | None = None
         self.nominal: Round
@@ -106,6 +110,7 @@ class PlacementSearch:
         self.tell(CandidatesFound(len(self.points)))
         self.nominal = self._solved(self.space.nominal, self._until(SEARCH.nominal), compared=True)
         self._check_points()
+        self._solve_between(self._until(SEARCH.promising))
         self._solve_points(self._until(SEARCH.promising), only_better=True)
         if self.best is not None:
             self._refine(self._until(SEARCH.refined))
@@ -137,14 +142,22 @@ class PlacementSearch:
         """Least energy found [J]; inf without one."""
         return np.inf if self.best is None or self.best.energy is None else self.best.energy
 
-    def _may_be_better(self, found: Round) -> bool:
-        """Whether no bound excludes that a place is better than the best one."""
-        return found.bound is None or found.bound < self._least * (1 - SEARCH.same)
+    def _promises(self, found: Round) -> bool:
+        """Whether a place likely needs little more than the best one: its bound and its energy lie
+        as far apart as those of the place where they are closest.
+        """
+        most = self._least + SEARCH.near_best * abs(self._least)
+        ratios = [
+            each.energy / each.bound
+            for each in self._memo.values()
+            if each.energy is not None and each.bound is not None and each.bound > 0
+        ]
+        return found.bound is None or not ratios or min(ratios) * found.bound <= most
 
     def _solved(self, place: Place, end: Deadline, compared: bool = False) -> Round:
         """The rounds at a place, known ones or new ones; the best are kept."""
         end_if_stopped()
-        key = _key(place)
+        key = place.key
         if key in self._memo:
             return self._memo[key]
         if not compared and self._times:
@@ -176,9 +189,19 @@ class PlacementSearch:
             end_if_stopped()
             if end.passed:
                 return
-            self.map[k] = self.rounds.checked(self.points[k], end)
+            self.map[k] = self.checked.check(self.points[k], end)
             if self.map[k].reason is not None:
                 self._tell_point(k)
+
+    def _solve_between(self, end: Deadline) -> None:
+        """Compute the places of least bound between those of the map, the least bound first."""
+        sought = self.checked.least_bounds(self.map, self._until(SEARCH.descended))
+        found = {each.place.key: each for each in sought}
+        for each in sorted(found.values(), key=lambda each: each.bound or 0.0):
+            if end.passed:
+                return
+            if self._promises(each):
+                self._solved(each.place, end)
 
     def _solve_points(self, end: Deadline, only_better: bool) -> None:
         """Compute the places of the map, the one with the least bound first."""
@@ -186,7 +209,7 @@ class PlacementSearch:
         for k in sorted(open_, key=lambda k: self.map[k].bound or 0.0):
             if end.passed:
                 return
-            if only_better and not self._may_be_better(self.map[k]):
+            if only_better and not self._promises(self.map[k]):
                 continue
             bound = self.map[k].bound
             found = self._solved(self.points[k], end)
@@ -266,17 +289,12 @@ class PlacementSearch:
             self.best = found
 
     def _no_place(self) -> NoPlacement | DeadlineExceeded:
-        found = {_key(each.place): each.reason for each in [*self.map, self.nominal]}
+        found = {each.place.key: each.reason for each in [*self.map, self.nominal]}
         reasons = [reason for reason in found.values() if reason is not None]
         if len(reasons) < len(found):
             return DeadlineExceeded([])
         counts = ReasonCounts(**{name: reasons.count(name) for name in get_args(Reason)})
         return NoPlacement(counts, str(self.nominal.error))
-
-
-def _key(place: Place) -> tuple[tuple[int, ...], bytes]:
-    """What two places have in common that are the same but for rounding."""
-    return place.choice, (np.round(place.x, 9) + 0.0).tobytes()
 
 
 def _coarse_first(count: int) -> list[int]:

@@ -51,7 +51,9 @@ class Box:
     scale: Array
 
 
-def refined(energy: Energy, x: Array, box: Box, step: Array) -> tuple[Array, bool]:
+def refined(
+    energy: Energy, x: Array, box: Box, step: Array, finest: float = PATTERN.finest
+) -> tuple[Array, bool]:
     """The coordinates of a local minimum.
 
     Args:
@@ -59,6 +61,7 @@ def refined(energy: Energy, x: Array, box: Box, step: Array) -> tuple[Array, boo
         x: coordinates to begin with, shape (n,) [m, rad].
         box: ranges of the coordinates.
         step: first steps, shape (n,) [m, rad].
+        finest: step below which the search ends [m].
 
     Returns:
         The best coordinates (n,), and whether the search ended before its time was up.
@@ -66,7 +69,7 @@ def refined(energy: Energy, x: Array, box: Box, step: Array) -> tuple[Array, boo
     value, step = energy(x), step.copy()
     if value is None:
         return x, False
-    while len(x) and (step / box.scale).max() > PATTERN.finest:
+    while len(x) and (step / box.scale).max() > finest:
         polled = _polled(energy, x, value, box, step)
         if polled is None:
             return x, False

@@ -73,6 +73,9 @@ class Axis:
         return values[:-1] if is_turn and len(values) > 2 else values
 
 
+Key = tuple[tuple[int, ...], bytes]
+
+
 @dataclass(frozen=True, eq=False)
 class Place:
     """A place of everything that moves.
@@ -86,6 +89,11 @@ class Place:
     choice: tuple[int, ...]
     x: Array
     poses: tuple[Array, ...]
+
+    @property
+    def key(self) -> Key:
+        """What places have in common that are the same but for rounding."""
+        return self.choice, (np.round(self.x, 9) + 0.0).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
