@@ -7,6 +7,7 @@ and rotors that determine the torques (Gautier 1991), beside the terms of fricti
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,12 +23,12 @@ from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations, ow
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
 from joulepath.optimizer.identify.fits.determined import (
     DETERMINED,
-    REJECTED,
     reason_of,
-    rejections,
+    remarks_of,
     unbounded,
     with_reasons,
 )
+from joulepath.optimizer.identify.fits.own_ranges import own_deviations
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
@@ -56,6 +57,17 @@ class BaseFitSettings:
 BASE_FIT = BaseFitSettings()
 
 
+class Doubts(NamedTuple):
+    """Doubts about p unknowns."""
+
+    reasons: tuple[str, ...]
+    """Why an unknown is not determined, or empty."""
+    remarks: tuple[str, ...]
+    """Why such an unknown is not held, or empty."""
+    worst: int | None
+    """Number of the least determined one to be held; None if there is none."""
+
+
 @dataclass(frozen=True, eq=False)
 class BaseTerms:
     """Unknowns of a base fit: base parameters, single rotors, then terms of friction."""
@@ -64,6 +76,8 @@ class BaseTerms:
     """Names (p,); a base parameter is named by its expression."""
     own: Array
     """The robot's own values (p,)."""
+    own_sd: Array
+    """Standard deviations (p,) of these before the logs; 0 for base parameters."""
     base: BaseParameters
     """All base parameters."""
     expressed: tuple[int, ...]
@@ -79,12 +93,11 @@ class BaseTerms:
         expressed = tuple(k for k in range(base.count) if k not in single)
         names: list[Name] = [(base.expressions[k], None) for k in expressed]
         names += [(ROTOR, base.independent[k] - len(own)) for k in single]
-        own_values = [
-            *values[list(expressed)],
-            *values[list(single)],
-            *(own_value(robot, name) for name in friction),
-        ]
-        return BaseTerms((*names, *friction), np.array(own_values), base, expressed)
+        names += friction
+        of_friction = [own_value(robot, name) for name in friction]
+        own_values = np.concatenate([values[[*expressed, *single]], of_friction])
+        own_sd = own_deviations(robot, names, own_values)
+        return BaseTerms(tuple(names), own_values, own_sd, base, expressed)
 
     @property
     def of_joints(self) -> Mask:
@@ -108,6 +121,31 @@ class BaseTerms:
             :, [*kept, *(bodies + arm.block.names.index(name) for name in self.names[count:])]
         ]
 
+    def doubts(self, value: Array, lifted: Array, sd: Array, judged: Mask) -> Doubts:
+        """Doubts about some unknowns.
+
+        Args:
+            value: estimates (p,).
+            lifted: estimates (p,), each without its own bound.
+            sd: standard deviations (p,) of these.
+            judged: unknowns (p,) to judge, apart from offsets and couplings, which the robot has no
+                values of.
+        """
+        judged = judged & np.array(
+            [term != "offset" and not term.startswith(COUPLED) for term, _ in self.names]
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = np.where(value != 0, sd / np.abs(value), np.inf)
+        doubted = judged & (relative > DETERMINED.max_relative_sd)
+        reasons = [
+            reason_of(float(value[k]), float(sd[k])) if doubted[k] else ""
+            for k in range(len(value))
+        ]
+        remarks = remarks_of(reasons, lifted, sd, self.own, self.own_sd)
+        left = np.flatnonzero(doubted & (np.array(remarks) == ""))
+        worst = int(left[np.argmax(relative[left])]) if len(left) else None
+        return Doubts(tuple(reasons), tuple(remarks), worst)
+
     @property
     def lower(self) -> Array:
         """Lower bounds (p,) of the unknowns."""
@@ -129,7 +167,7 @@ def fit_base(
 
     Undetermined friction and rotors are held at the robot's own values, the least determined first,
     until all others are determined; with the method `essential_parameters`, undetermined base
-    parameters, too. An unknown whose own value the logs reject is not held.
+    parameters, too. An unknown is not held if the logs reject its own value, or know it better.
 
     Args:
         robot: the robot with its own figures.
@@ -190,26 +228,16 @@ def _hold_undetermined(
         inside = (value > lower)[free]
         gradient = gram @ value[free] - moment
         solution = unbounded(part, value[free], inside, ~inside, gradient)
-        rejected, sd = np.zeros(len(own)), np.zeros(len(own))
-        rejected[free], sd[free] = rejections(solution, own[free]), solution.sd
-        relative = relative_deviations(terms.names, value, sd, free & judged)
-        doubted = relative > DETERMINED.max_relative_sd
-        reason = {
-            k: reason_of(float(value[k]), float(sd[k])) for k in np.flatnonzero(doubted).tolist()
-        }
-        remarks = [
-            REJECTED.format(reason[k], own[k], rejected[k]) if k in reason else ""
-            for k in range(len(own))
-        ]
-        open_terms = np.flatnonzero(doubted & (rejected == 0))
-        if not len(open_terms):
+        lifted, sd = own.copy(), np.zeros(len(own))
+        lifted[free], sd[free] = solution.value, solution.sd
+        doubts = terms.doubts(value, lifted, sd, free & judged)
+        if doubts.worst is None:
             break
-        worst = int(open_terms[np.argmax(relative[open_terms])])
-        free[worst], reasons[worst] = False, reason[worst]
+        free[doubts.worst], reasons[doubts.worst] = False, doubts.reasons[doubts.worst]
     replicates = np.tile(value, (len(grouped.gram), 1))
     replicates[:, free] = solution.replicates
     none = np.zeros((len(own), len(own)))
-    found = Estimate(terms.names, value, replicates, tuple(reasons), none, tuple(remarks))
+    found = Estimate(terms.names, value, replicates, tuple(reasons), none, doubts.remarks)
     return with_reasons(found, range(len(terms.expressed)))
 
 
@@ -244,13 +272,3 @@ def _free_equations(grouped: GroupedEquations, own: Array, free: Mask) -> Groupe
     """Normal equations of the `free` unknowns (p,), with all others at the robot's `own` values."""
     held = grouped.gram[:, :, ~free] @ own[~free]
     return GroupedEquations(grouped.gram[:, free][:, :, free], (grouped.moment - held)[:, free])
-
-
-def relative_deviations(names: tuple[Name, ...], value: Array, sd: Array, free: Mask) -> Array:
-    """Standard deviations (p,) over values; 0 for held unknowns, and for offsets and couplings,
-    which the robot has no values of."""
-    counts = free & np.array(
-        [term != "offset" and not term.startswith(COUPLED) for term, _ in names]
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(counts, np.where(value != 0, sd / np.abs(value), np.inf), 0.0)

@@ -25,6 +25,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
     solve_bounded,
 )
 from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
+from joulepath.optimizer.identify.fits.own_ranges import own_deviations
 from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
@@ -70,6 +71,8 @@ class JointBlock:
     """Lower bounds (p,) of the terms."""
     own: Mapping[Name, float]
     """The robot's own values of the terms."""
+    own_sd: Mapping[Name, float]
+    """Standard deviations of these before the logs; 0 for other terms than friction and rotors."""
     spread: Mapping[int | None, float]
     """Standard deviation of the rigid torque of each joint [N·m]."""
     speed: Array
@@ -150,6 +153,7 @@ def joint_block(
     names = [(term, joint) for joint in joints for term in terms]
     names += [(COUPLED + term, k) for k, _ in couplings for term in coupled]
     speed = robot.friction.speed if speed is None else speed
+    own = np.array([own_value(robot, name) for name in names])
     parts = list[tuple[Array, Array, int, IntArray, Array]]()
     known, spread = _known_torque(robot, rows, options), dict[int | None, float]()
     for at, joint in enumerate(joints):
@@ -175,7 +179,8 @@ def joint_block(
         joint=np.concatenate([np.full(len(part[1]), part[2]) for part in parts]),
         cluster=np.concatenate([part[3] for part in parts]),
         lower=lower_bounds([term for term, _ in names]),
-        own={name: own_value(robot, name) for name in names},
+        own=dict(zip(names, own.tolist(), strict=True)),
+        own_sd=dict(zip(names, own_deviations(robot, names, own).tolist(), strict=True)),
         spread=spread,
         speed=speed,
         nuisances=options.nuisances,

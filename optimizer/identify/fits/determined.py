@@ -1,12 +1,12 @@
 """Decides whether a term takes its estimate or keeps the robot's own value.
 
-An undetermined term keeps the robot's own value unless the logs contradict this value: a poor
-estimate is better than a rejected value.
+An undetermined term keeps the robot's own value, unless the logs reject this value, or it is known
+even less well than the estimate: engineering defaults are right within a factor of three.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,10 @@ class DeterminedSettings:
 
     max_relative_sd: float = 0.3
     """Largest standard deviation of an identified figure over its value [1]."""
+    max_sd_ratio: float = 0.7
+    """Largest standard deviation of a figure over that before the logs, at which the logs are the
+    better source [1]: half of the variance, so that a figure does not change its source for
+    little."""
     rejecting_sds: float = 4.0
     """Distance of a rejected own value from the estimate, in standard deviations [1]."""
 
@@ -38,6 +42,11 @@ AT_BOUND = "The fit puts it at its bound, {:g}."
 REJECTED = (
     "{} The robot's own value, {:.3g}, is {:.0f} standard deviations away, so that it is not kept: "
     "check the links, the torque constants and the payload."
+)
+
+LESS_KNOWN = (
+    "{} The robot's own value, {:.3g}, has a standard deviation of {:.2g} and is known even less "
+    "well, so that it is not kept."
 )
 
 
@@ -107,9 +116,31 @@ def unbounded(
     return Unbounded(lifted, replicates)
 
 
-def rejections(solution: Unbounded, own: Array) -> Array:
-    """Distances (p,) of the robot's own values (p,) from a solution, in standard deviations; 0
-    where the solution does not reject them."""
-    sd = np.where(solution.sd > 0, solution.sd, np.inf)
-    distance = np.abs(own - solution.value) / sd
+def rejections(value: Array, sd: Array, own: Array) -> Array:
+    """Distances (p,) of the robot's own values (p,) from estimates, in standard deviations; 0 where
+    the logs do not reject them."""
+    distance = np.abs(own - value) / np.where(sd > 0, sd, np.inf)
     return np.where(distance > DETERMINED.rejecting_sds, distance, 0.0)
+
+
+def remarks_of(
+    reasons: Sequence[str], value: Array, sd: Array, own: Array, own_sd: Array
+) -> list[str]:
+    """Why the robot's own values of doubted terms are not kept; empty for all other terms.
+
+    Args:
+        reasons: reasons (p,) for a doubt, or empty.
+        value: estimates (p,) without bounds; those beyond a bound, 0, are no source.
+        sd: standard deviations (p,) of the estimates.
+        own: the robot's own values (p,).
+        own_sd: their standard deviations (p,); 0 for values that are kept unless they are rejected.
+    """
+    rejected = rejections(value, sd, own)
+    better = (value > 0) & (sd <= DETERMINED.max_sd_ratio * own_sd) & (own_sd > 0)
+    remarks = [""] * len(reasons)
+    for k, reason in enumerate(reasons):
+        if reason and rejected[k]:
+            remarks[k] = REJECTED.format(reason, own[k], rejected[k])
+        elif reason and better[k]:
+            remarks[k] = LESS_KNOWN.format(reason, own[k], own_sd[k])
+    return remarks

@@ -20,10 +20,9 @@ from joulepath.optimizer.identify.fits.base_fit import (
     BaseTerms,
     base_regression,
     base_terms,
-    relative_deviations,
 )
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
-from joulepath.optimizer.identify.fits.determined import DETERMINED, reason_of, with_reasons
+from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -140,18 +139,15 @@ def _most_likely(
         part = columns[:, inside]
         covariance = np.zeros((len(own), len(own)))
         covariance[np.ix_(inside, inside)] = np.linalg.pinv(part.T @ part, hermitian=True)
-        relative = relative_deviations(
-            terms.names, value, np.sqrt(np.diag(covariance)), free & terms.of_joints
-        )
-        worst = int(np.argmax(relative))
-        if relative[worst] <= DETERMINED.max_relative_sd:
+        sd = np.sqrt(np.diag(covariance))
+        doubts = terms.doubts(value, value, sd, free & terms.of_joints)
+        if doubts.worst is None:
             break
-        reasons[worst] = reason_of(float(value[worst]), float(np.sqrt(covariance[worst, worst])))
-        free[worst] = False
+        free[doubts.worst], reasons[doubts.worst] = False, doubts.reasons[doubts.worst]
     residuals = values - columns[:, free] @ value[free]
     excess = float(residuals @ residuals / (len(values) - int(inside.sum())))
     without = np.tile(value, (clusters.count, 1))
-    found = Estimate(terms.names, value, without, tuple(reasons), covariance)
+    found = Estimate(terms.names, value, without, tuple(reasons), covariance, doubts.remarks)
     return with_reasons(found, np.flatnonzero(~terms.of_joints).tolist()), excess
 
 

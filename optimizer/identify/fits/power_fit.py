@@ -18,7 +18,6 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from joulepath.models.robot import Array, Mask, Robot
-from joulepath.models.trust import trust_letters
 from joulepath.models.uncertainty.ranges import (
     P95,
     default_ranges,
@@ -40,6 +39,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
     residual_replicates,
 )
 from joulepath.optimizer.identify.estimates.robust import bisquare_weights
+from joulepath.optimizer.identify.fits.own_ranges import friction_width, own_range, rotor_width
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
 
 
@@ -95,11 +95,11 @@ def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerP
     drives, nq = robot.drives, robot.nq
     idle = robot.electronics.idle_power + float(drives.inverter_constant.sum())
     idle_mean, idle_sd = _lognormal_around(
-        idle, *_range(robot, "idle_power", "electronics", "idle_power")
+        idle, *own_range(robot, "idle_power", "electronics", "idle_power")
     )
     idle_sd = idle_sd or POWER_FIT.unknown_idle_sd
     large, small = (
-        _range(robot, each, "drives", "copper") for each in ("copper_large", "copper_small")
+        own_range(robot, each, "drives", "copper") for each in ("copper_large", "copper_small")
     )
     windings = drives.copper + drives.inverter_quadratic
     joints = zip(windings.tolist(), large_joints(robot).tolist(), strict=True)
@@ -123,9 +123,9 @@ def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerP
         links = LINK_ERRORS.mass
     if not friction_known:
         common, own = (
-            _friction_width(robot, each) for each in ("friction_common", "friction_joint")
+            friction_width(robot, each) for each in ("friction_common", "friction_joint")
         )
-        rotors = lognormal(*_range(robot, "rotor_inertia", "drives", "rotor_inertia"))[1]
+        rotors = rotor_width(robot)
         if robot.friction.load is None:
             loaded = np.arange(nq) < default_ranges()["load"]["joints"]
             load_mean, load_sd = (
@@ -145,22 +145,11 @@ def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerP
     return PowerPrior(mean, np.asarray(np.linalg.inv(variance)), known)
 
 
-def _range(robot: Robot, name: str, section: str, figure: str) -> tuple[float, float]:
-    """The range of a factor on a figure of the robot."""
-    return range_of(name, trust_letters(robot.figures.get(section, {}).get(figure)))
-
-
 def _lognormal_around(own: float, low: float, high: float) -> tuple[float, float]:
     """Mean and standard deviation of a figure between `low` and `high` times the robot's own."""
     middle, width = lognormal(low, high)
     mean = own * float(np.exp(middle))
     return mean, width * mean
-
-
-def _friction_width(robot: Robot, name: str) -> float:
-    """Relative standard deviation of the robot's own friction, common or joint by joint."""
-    letters = trust_letters(robot.figures.get("friction_laws", {}).get(robot.friction.name))
-    return lognormal(*range_of(name, letters))[1]
 
 
 def _half_common(sd: Array) -> Array:

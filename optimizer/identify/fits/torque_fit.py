@@ -7,7 +7,7 @@ figures, and the remaining terms are fitted again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -33,9 +33,9 @@ from joulepath.optimizer.identify.fits.determined import (
     DETERMINED,
     LAW_KEPT,
     NOT_MOVING,
-    REJECTED,
     UNCERTAIN,
     rejections,
+    remarks_of,
     unbounded,
 )
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -55,10 +55,6 @@ class TorqueFitSettings:
     min_load_spread: float = 0.05
     """Standard deviation of the rigid torque over the torque limit, below which a load term is not
     identified [1]."""
-    own_friction_sd: float = 0.17
-    """Relative standard deviation of the robot's own Coulomb and viscous friction [1]."""
-    own_rotor_sd: float = 0.1
-    """Relative standard deviation of the robot's own rotor inertia [1]."""
     own_load_sd: float = 0.06
     """Standard deviation of the robot's own load friction [1]."""
     min_rows: int = 20
@@ -159,12 +155,14 @@ def _fit_block(
         gradient = grouped.gram.sum(axis=0) @ value - grouped.moment.sum(axis=0)
         solution = unbounded(grouped, value, inside, ~inside, gradient)
         doubts = doubts_of(part, value, solution.sd)
-        rejected = rejections(solution, np.array([block.own[name] for name in part.names]))
-        worst = _least_determined(part, doubts, rejected)
+        remarks = remarks_on(part, doubts, solution.value, solution.sd)
+        worst = _least_determined(doubts, remarks)
         if not worst:
             break
         held |= worst
         for coulomb in [name for name in worst if name[0] == "coulomb"]:
+            own = np.array([block.own[name] for name in part.names])
+            rejected = rejections(solution.value, solution.sd, own)
             # a law is kept as a whole: its other terms have no meaning beside the Coulomb friction
             # of another law
             for name, distance in zip(part.names, rejected.tolist(), strict=True):
@@ -178,17 +176,13 @@ def _fit_block(
     full[free] = value
     all_replicates = np.tile(full, (clusters.count, 1))
     all_replicates[:, free] = solution.replicates
-    remarks = dict.fromkeys(block.names, "")
-    for name, doubt, distance in zip(part.names, doubts, rejected.tolist(), strict=True):
-        if doubt.reason:
-            remarks[name] = REJECTED.format(doubt.reason, block.own[name], distance)
     return Estimate(
         names=block.names,
         value=full,
         replicates=all_replicates,
         reasons=tuple(held.get(name, "") for name in block.names),
         prior_covariance=_prior_covariance(block, grouped, free, inside),
-        remarks=tuple(remarks.values()),
+        remarks=tuple(remarks.get(name, "") for name in block.names),
     )
 
 
@@ -209,13 +203,9 @@ def _prior_covariance(
 
 def own_deviations(block: JointBlock, names: Sequence[Name]) -> Array:
     """Standard deviations (k,) of the robot's own values of some terms."""
-    relative = {
-        "coulomb": TORQUE_FIT.own_friction_sd,
-        "viscous": TORQUE_FIT.own_friction_sd,
-        "rotor_inertia": TORQUE_FIT.own_rotor_sd,
-    }
-    sd = np.array([relative.get(name[0], 0.0) * block.own[name] for name in names])
-    return np.where([name[0] == "load" for name in names], TORQUE_FIT.own_load_sd, sd)
+    return np.array(
+        [TORQUE_FIT.own_load_sd if name[0] == "load" else block.own_sd[name] for name in names]
+    )
 
 
 def undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:
@@ -243,36 +233,54 @@ class Doubt(NamedTuple):
     """Standard deviation over value, over that of a determined term [1]."""
 
 
-def doubts_of(block: JointBlock, value: Array, sd: Array) -> list[Doubt]:
-    """Doubts about the fitted terms of a block; none about terms that are no figures."""
-    found = list[Doubt]()
-    for k, (term, _) in enumerate(block.names):
-        inside = value[k] > block.lower[k] and value[k] != 0
+def doubts_of(
+    block: JointBlock, value: Array, sd: Array, held: Container[Name] = ()
+) -> dict[Name, Doubt]:
+    """Doubts about the fitted terms of a block; none about held terms, and about terms that are no
+    figures.
+    """
+    found = dict[Name, Doubt]()
+    for k, name in enumerate(block.names):
+        term, inside = name[0], value[k] > block.lower[k] and value[k] != 0
         relative = float(sd[k] / abs(value[k])) if inside else np.inf
         size = relative / (TORQUE_FIT.max_scale_sd if term == SCALE else DETERMINED.max_relative_sd)
-        if term in block.nuisances:
-            found.append(Doubt("", 0.0))
+        if name in held or term in block.nuisances:
+            found[name] = Doubt("", 0.0)
         elif term == "load" and not value[k] >= TORQUE_FIT.min_load_sds * sd[k] > 0:
-            found.append(Doubt(LITTLE_LOAD.format(TORQUE_FIT.min_load_sds), np.inf))
+            found[name] = Doubt(LITTLE_LOAD.format(TORQUE_FIT.min_load_sds), np.inf)
         elif size <= 1:
-            found.append(Doubt("", 0.0))
+            found[name] = Doubt("", 0.0)
         else:
             reason = UNCERTAIN.format(relative) if np.isfinite(relative) else AT_BOUND.format(0.0)
-            found.append(Doubt(reason, size))
+            found[name] = Doubt(reason, size)
     return found
 
 
-def _least_determined(
-    block: JointBlock, doubts: Sequence[Doubt], rejected: Array
+def remarks_on(
+    block: JointBlock, doubts: Mapping[Name, Doubt], value: Array, sd: Array
 ) -> dict[Name, str]:
-    """The least determined terms whose own values are not rejected, with the reasons.
+    """Why doubted terms of a block are not held, or empty.
+
+    Args:
+        block: the block.
+        doubts: the doubt about each of its terms.
+        value: estimates (p,) of the terms, each without its bound.
+        sd: standard deviations (p,) of these.
+    """
+    own, own_sd = (
+        np.array([known[name] for name in block.names]) for known in (block.own, block.own_sd)
+    )
+    found = remarks_of([doubts[name].reason for name in block.names], value, sd, own, own_sd)
+    return dict(zip(block.names, found, strict=True))
+
+
+def _least_determined(doubts: Mapping[Name, Doubt], remarks: Mapping[Name, str]) -> dict[Name, str]:
+    """The least determined terms without a remark why they are not held, with the reasons.
 
     Load friction comes first; its doubts do not depend on other terms.
     """
     open_terms = {
-        name: doubt
-        for name, doubt, distance in zip(block.names, doubts, rejected.tolist(), strict=True)
-        if doubt.reason and not distance
+        name: doubt for name, doubt in doubts.items() if doubt.reason and not remarks[name]
     }
     load = {name: doubt.reason for name, doubt in open_terms.items() if name[0] == "load"}
     if load or not open_terms:

@@ -24,12 +24,15 @@ from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
 from joulepath.optimizer.identify.fits.determined import (
-    REJECTED,
-    rejections,
     unbounded,
     with_reasons,
 )
-from joulepath.optimizer.identify.fits.torque_fit import doubts_of, own_deviations, undetermined
+from joulepath.optimizer.identify.fits.torque_fit import (
+    doubts_of,
+    own_deviations,
+    remarks_on,
+    undetermined,
+)
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
@@ -147,8 +150,8 @@ def _determined(
 ) -> _Solution:
     """The solution whose undetermined terms are held at the robot's own values.
 
-    The least determined term of each joint is held until all others are determined. A term whose
-    own value the logs reject is not held.
+    The least determined term of each joint is held until all others are determined. A term is not
+    held if the logs reject its own value, or know it better.
 
     Args:
         robot: the robot with its own figures.
@@ -171,14 +174,9 @@ def _determined(
         value = np.where(inside | ~free, value, lower)
         gradient = np.where(inside, 0.0, gram @ value - moment)
         solution = unbounded(grouped, value, inside, free & ~inside, gradient, precision)
-        rejected = dict(zip(block.names, rejections(solution, mean)[bodies:], strict=True))
-        found = doubts_of(block, value[bodies:], solution.sd[bodies:])
-        doubts = {
-            name: doubt
-            for name, doubt in zip(block.names, found, strict=True)
-            if doubt.reason and name not in held
-        }
-        open_terms = [name for name in doubts if not rejected[name]]
+        doubts = doubts_of(block, value[bodies:], solution.sd[bodies:], held)
+        remarks = remarks_on(block, doubts, solution.value[bodies:], solution.sd[bodies:])
+        open_terms = [name for name in doubts if doubts[name].reason and not remarks[name]]
         if not open_terms:
             break
         for joint in {joint for _, joint in open_terms}:
@@ -191,10 +189,6 @@ def _determined(
     # as squares, which are positive whatever the rounding errors of a log without noise are
     root = np.hstack([inverse @ np.linalg.cholesky(precision), moved])
     by_prior = root @ root.T
-    remarks = {
-        name: REJECTED.format(doubt.reason, block.own[name], rejected[name])
-        for name, doubt in doubts.items()
-    }
     return _Solution(value, solution.replicates, by_prior, remarks)
 
 
