@@ -89,7 +89,7 @@ class Identification(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Remarks on figures whose own values the logs reject."""
+        """Remarks on poorly known figures whose own values the logs reject, or know better."""
         return tuple(each.named_remark for each in self.parameters if each.identified and each.why)
 
     @property

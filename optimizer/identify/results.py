@@ -44,7 +44,7 @@ class IdentifiedParameter:
     """Whether the logs determine the figure."""
     why: str
     """Reason for not identifying it, or a remark on a value that is identified poorly because the
-    logs reject the robot's own; otherwise empty."""
+    logs reject the robot's own, or know it better; otherwise empty."""
 
     @property
     def named_remark(self) -> str:

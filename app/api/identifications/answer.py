@@ -65,8 +65,8 @@ class IdentificationResult:
     """All figures that were sought."""
     warnings: list[str]
     """Figures at a bound or with a large standard deviation, which are used because the logs reject
-    the robot's own values. They mean that the robot's links, torque constants or payload do not fit
-    the logs."""
+    the robot's own values, or know them better. Rejected values mean that the robot's links, torque
+    constants or payload do not fit the logs."""
     structure: Structure
     """Base parameters of the links and rotors."""
     physical: Physical | None

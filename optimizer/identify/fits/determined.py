@@ -27,9 +27,8 @@ class DeterminedSettings:
     max_relative_sd: float = 0.3
     """Largest standard deviation of an identified figure over its value [1]."""
     max_sd_ratio: float = 0.7
-    """Largest standard deviation of a figure over that before the logs, at which the logs are the
-    better source [1]: half of the variance, so that a figure does not change its source for
-    little."""
+    """Largest standard deviation of a figure over that before the logs, at which the logs tell
+    something of it [1]: half of the variance."""
     rejecting_sds: float = 4.0
     """Distance of a rejected own value from the estimate, in standard deviations [1]."""
 

@@ -16,7 +16,7 @@ from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
 from joulepath.optimizer.identify.fits.base_wrench import fit_wrench
 from joulepath.optimizer.identify.fits.block import terms_of
-from joulepath.optimizer.identify.fits.determined import with_reasons
+from joulepath.optimizer.identify.fits.determined import DETERMINED, with_reasons
 from joulepath.optimizer.identify.fits.link_side import (
     kept_drives,
     seen_behind_gears,
@@ -49,9 +49,6 @@ class FitSettings:
     min_error_share: float = 1e-3
     """Variance of a common error of parameters of unit size over the largest one, up to which the
     error is a rounding error [1]."""
-    max_sd_ratio: float = 0.7
-    """Standard deviation of a power figure over that before the logs, above which the figure is
-    not identified [1]."""
     min_factor: float = 1e-3
     """Smallest factor on friction or rotors by which covariances are scaled [1]."""
 
@@ -266,7 +263,7 @@ def _with_power(
 def _with_hardly_known(estimate: Estimate, before: Array) -> Estimate:
     """The estimate with reasons for figures hardly better known than by the prior's covariance
     `before` (p, p)."""
-    unknown = np.diag(estimate.covariance) > FIT.max_sd_ratio**2 * np.diag(before)
+    unknown = np.diag(estimate.covariance) > DETERMINED.max_sd_ratio**2 * np.diag(before)
     reasons = tuple(HARDLY_KNOWN if each else "" for each in unknown.tolist())
     return with_reasons(replace(estimate, reasons=reasons), range(len(reasons)))
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.identification import tx40_torque
 from benchmarks.identification_logs import ur3e
 from joulepath.optimizer.identify.identify import identify
@@ -50,7 +48,5 @@ def test_currents_tell_friction_that_the_factory_does_not_know(place: Path) -> N
 
 def test_published_friction_of_another_maker(place: Path) -> None:
     """Friction and coupling of a TX40, of which the published values come from the same log."""
-    agreeing, *halves = tx40_torque(place, 0)
-    assert agreeing.value >= 12
-    # the wrist's torques are small, and so are the denominators
-    assert all(np.isfinite(each.value) and each.value < 25.0 for each in halves)
+    missed = [f"{each.what}: {each.value:.4g}" for each in tx40_torque(place, 0) if not each.kept]
+    assert missed == []
