@@ -9,6 +9,7 @@ errors in a motion. Only the figures in `REPLACEABLE` may differ from the robot'
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,7 +113,7 @@ class Covariance:
         return [found for name in self.names if (found := self.place_of(name, law)) is not None]
 
 
-def covariance_of(figures: dict[str, Any]) -> Covariance | None:
+def covariance_of(figures: Mapping[str, Any]) -> Covariance | None:
     """The covariance of a robot's figures; None without identified figures."""
     if "covariance" not in figures:
         return None

@@ -7,14 +7,15 @@ only together, it keeps the letter. A figure of some joints has the worst letter
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from joulepath.models.robot import Array
 from joulepath.models.trust import TRUST
-from joulepath.models.uncertainty.document import DOCUMENT, TOP
+from joulepath.models.uncertainty.document import DOCUMENT, TOP, covariance_of
 from joulepath.optimizer.identify.fits.whole_fit import LINK_NAMES
 from joulepath.optimizer.identify.logs.log_warnings import named_joints
 from joulepath.optimizer.identify.results import IdentifiedFigures
@@ -90,13 +91,55 @@ def document_of(
         document["inertials"] = inertials | {
             "inertia_frame_rpy": turned | {"source": source, "trust": inertials["mass"]["trust"]}
         }
-    listed = [k for k, (name, _) in enumerate(figures.parameters) if _path(name) is not None]
-    if listed:
+    paths = {k: path for k, each in enumerate(figures.parameters) if (path := _path(*each))}
+    kept, earlier_covariance = _kept(own, law, document, paths.values())
+    if paths or kept:
+        at = np.ix_([*paths], [*paths])
         document["covariance"] = {
-            "names": [_path(*figures.parameters[k]) for k in listed],
-            "matrix": _symmetric(figures.covariance[np.ix_(listed, listed)]).tolist(),
+            "names": [*paths.values(), *kept],
+            "matrix": block_diag(_symmetric(figures.covariance[at]), earlier_covariance).tolist(),
         }
     return document | {"session_sd": figures.session_sd.tolist(), "move_sd": figures.move_sd}
+
+
+def _kept(
+    own: Mapping[str, Any], law: str, document: Mapping[str, Any], found: Collection[str]
+) -> tuple[list[str], Array]:
+    """Paths and covariance of figures from earlier logs that a document keeps.
+
+    Args:
+        own: the robot's own figures by section.
+        law: name of the robot's own friction law.
+        document: the document without its covariance.
+        found: paths of the figures from the logs of the document.
+    """
+    known = covariance_of(own)
+    if known is None:
+        return [], np.zeros((0, 0))
+    before, now = f"friction_laws.{law}.", f"friction_laws.{FRICTION_LAW}."
+    paths = [
+        now + each.removeprefix(before) if each.startswith(before) else each for each in known.names
+    ]
+    kept = [
+        k
+        for k, path in enumerate(paths)
+        if path not in found
+        and known.place_of(known.names[k], law) is not None
+        and _entry(document, path) == _entry(own, known.names[k])
+    ]
+    return [paths[k] for k in kept], known.matrix[np.ix_(kept, kept)]
+
+
+def _entry(figures: Mapping[str, Any], path: str) -> Any:
+    """The value at a path; the section of the links as a whole, which its parameters depend on."""
+    section, *parts = path.split(".")
+    node: Any = figures.get(section, {})
+    if section == "inertials":
+        return node
+    for part in parts[: 2 if section == "friction_laws" else 1]:
+        node = node.get(part, {})
+    value = node.get("value")
+    return value if value is None or len(parts) == 1 else value[int(parts[-1])]
 
 
 def _figure(
@@ -128,20 +171,23 @@ def _figure(
     }
     if notes:
         content["note"] = " ".join(notes)[: DOCUMENT.text]
-    deviations = _deviations(figures, name, value)
+    deviations = _deviations(figures, name, value, own or {})
     return content if deviations is None else content | {"sd": deviations.tolist()}
 
 
-def _deviations(figures: IdentifiedFigures, name: str, value: Array) -> Array | None:
-    """Standard deviations in the shape of a figure, 0 for joints with the robot's own value; None
-    if no joint has a standard deviation.
+def _deviations(
+    figures: IdentifiedFigures, name: str, value: Array, own: Mapping[str, Any]
+) -> Array | None:
+    """Standard deviations in the shape of a figure: of joints with the robot's own value the own
+    ones, which only figures of earlier logs have, otherwise 0; None if all are 0.
     """
-    found, known = np.zeros(value.shape), False
+    found = np.zeros(value.shape)
+    if "sd" in own:
+        found = np.where(value == np.asarray(own["value"]), np.asarray(own["sd"]), found)
     for (figure, joint), sd in zip(figures.parameters, figures.sd.tolist(), strict=True):
         if figure == (LINK_MASS if name == "mass" else name):
-            known = True
             found[() if joint is None else joint] = sd
-    return found if known else None
+    return found if found.any() else None
 
 
 def _path(name: str, joint: int | None = None) -> str | None:

@@ -177,7 +177,9 @@ def jackknife(estimates: Array) -> Array:
     groups = len(estimates)
     if groups < 2:
         return np.full((estimates.shape[1],) * 2, np.inf)
-    centred = estimates - estimates.mean(axis=0)
+    # the mean of equal numbers may differ from them by a rounding error
+    changes = estimates - estimates[0]
+    centred = changes - changes.mean(axis=0)
     wider = float(stdtrit(groups - 1, 0.95)) / P95
     return np.asarray(wider**2 * (groups - 1) / groups * centred.T @ centred)
 

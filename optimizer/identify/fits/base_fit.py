@@ -94,8 +94,8 @@ class BaseTerms:
         names: list[Name] = [(base.expressions[k], None) for k in expressed]
         names += [(ROTOR, base.independent[k] - len(own)) for k in single]
         names += friction
-        of_friction = [own_value(robot, name) for name in friction]
-        own_values = np.concatenate([values[[*expressed, *single]], of_friction])
+        of_joints = [own_value(robot, name) for name in names[len(expressed) :]]
+        own_values = np.append(values[list(expressed)], of_joints)
         own_sd = own_deviations(robot, names, own_values)
         return BaseTerms(tuple(names), own_values, own_sd, base, expressed)
 

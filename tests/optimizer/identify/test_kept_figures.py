@@ -1,0 +1,96 @@
+"""Standard deviations and covariance of figures that a log does not change."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Robot
+from joulepath.models.uncertainty.document import covariance_of
+from joulepath.optimizer.identify.identify import Identification, identify
+from joulepath.optimizer.identify.logs.log import Log
+from joulepath.optimizer.identify.options import IdentificationOptions
+from tests.identification_logs import recorded, truth_of
+
+ROBOT = load_robot("ur10e")
+STILL = 5
+
+
+def log_of(still: int | None) -> Log:
+    """A log of currents and power, perhaps with a joint that does not move."""
+    log = recorded(ROBOT, truth_of(ROBOT, 4), moves=10, seed=4).log()
+    if still is None:
+        return log
+    q, v, a = (np.array(each) for each in (log.q, log.v, log.a))
+    q[:, still], v[:, still], a[:, still] = q[0, still], 0.0, 0.0
+    return replace(log, q=q, v=v, a=a)
+
+
+def written(found: Identification) -> Robot:
+    document = json.loads(json.dumps(found.document("2026-01-31")))
+    return load_robot(found.robot.name, figures=document)
+
+
+def variances(robot: Robot) -> dict[str, float]:
+    known = covariance_of(robot.figures)
+    assert known is not None
+    return dict(zip(known.names, np.diag(known.matrix).tolist(), strict=True))
+
+
+@pytest.mark.parametrize("options", [{}, {"refit": True}, {"method": "base_parameters"}])
+def test_a_kept_figure_is_exactly_the_robots_own_and_has_no_deviation(
+    options: dict[str, Any],
+) -> None:
+    found = identify(ROBOT, [log_of(STILL)], IdentificationOptions(held_out=0.0, **options))
+    own = {
+        "coulomb": ROBOT.friction.coulomb,
+        "viscous": ROBOT.friction.viscous,
+        "rotor_inertia": ROBOT.drives.rotor_inertia,
+        "torque_constant": ROBOT.drives.torque_constant,
+    }
+    kept = [each for each in found.parameters if each.figure in own and not each.identified]
+    assert {(each.figure, each.joint) for each in kept} >= {("coulomb", STILL), ("viscous", STILL)}
+    for each in kept:
+        assert (each.value, each.sd) == (own[each.figure][each.joint], 0.0)
+    deviations = found.document("2026-01-31")["friction_laws"]["identified"]["coulomb"]["sd"]
+    assert deviations[STILL] == 0.0 < min(deviations[:STILL])
+
+
+@pytest.mark.parametrize("fit", [("friction", "rotor"), ("rotor",)])
+def test_figures_of_earlier_logs_that_a_later_one_keeps_are_as_well_known_as_before(
+    fit: tuple[Any, ...],
+) -> None:
+    first = written(identify(ROBOT, [log_of(None)], IdentificationOptions(held_out=0.0)))
+    later = identify(first, [log_of(STILL)], IdentificationOptions(held_out=0.0, fit=fit))
+    robot, before = written(later), variances(first)
+    after = variances(robot)
+    assert after.keys() >= before.keys()
+    kept = {(name, STILL) for name in ("coulomb", "viscous")}
+    if fit == ("rotor",):
+        kept |= {(name, joint) for name in ("coulomb", "viscous") for joint in range(ROBOT.nq)}
+    for name, joint in kept:
+        path = f"friction_laws.identified.{name}.{joint}"
+        assert after[path] == before[path] > 0
+        figure = robot.figures["friction_laws"]["identified"][name]
+        assert figure["sd"][joint] == pytest.approx(np.sqrt(before[path]))
+
+
+def test_figures_that_a_later_log_replaces_have_its_covariance_alone() -> None:
+    """A law without viscous friction has no error of it."""
+    first = written(identify(ROBOT, [log_of(None)], IdentificationOptions(held_out=0.0)))
+    options = IdentificationOptions(held_out=0.0, terms=("coulomb",))
+    later = identify(first, [log_of(None)], options)
+    robot = written(later)
+    assert not any(".viscous." in path for path in variances(robot))
+    told = {path for path in variances(robot) if ".coulomb." in path}
+    assert told == {f"friction_laws.identified.coulomb.{joint}" for joint in range(ROBOT.nq)}
+    assert variances(robot)["drives.torque_constant.2"] > 0
+    sd = {(each.figure, each.joint): each.sd for each in later.parameters}
+    for joint in range(ROBOT.nq):
+        variance = variances(robot)[f"friction_laws.identified.coulomb.{joint}"]
+        assert np.sqrt(variance) == pytest.approx(sd["coulomb", joint])
