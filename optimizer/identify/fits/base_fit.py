@@ -29,6 +29,7 @@ from joulepath.optimizer.identify.fits.determined import (
     with_reasons,
 )
 from joulepath.optimizer.identify.fits.own_ranges import own_deviations
+from joulepath.optimizer.identify.fits.torque_fit import by_held_values, held_deviations
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
@@ -236,8 +237,12 @@ def _hold_undetermined(
         free[doubts.worst], reasons[doubts.worst] = False, doubts.reasons[doubts.worst]
     replicates = np.tile(value, (len(grouped.gram), 1))
     replicates[:, free] = solution.replicates
-    none = np.zeros((len(own), len(own)))
-    found = Estimate(terms.names, value, replicates, tuple(reasons), none, doubts.remarks)
+    by_prior = by_held_values(
+        grouped.gram.sum(axis=0),
+        free & (value > lower),
+        held_deviations(block, terms.names, terms.names_of(~free & terms.of_joints)),
+    )
+    found = Estimate(terms.names, value, replicates, tuple(reasons), by_prior, doubts.remarks)
     return with_reasons(found, range(len(terms.expressed)))
 
 

@@ -71,7 +71,7 @@ class JointBlock:
     """Lower bounds (p,) of the terms."""
     own: Mapping[Name, float]
     """The robot's own values of the terms."""
-    own_sd: Mapping[Name, float]
+    own_sd: dict[Name, float]
     """Standard deviations of these before the logs; 0 for other terms than friction and rotors."""
     spread: Mapping[int | None, float]
     """Standard deviation of the rigid torque of each joint [N·m]."""

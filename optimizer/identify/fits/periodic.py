@@ -23,6 +23,7 @@ from joulepath.optimizer.identify.fits.base_fit import (
 )
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
 from joulepath.optimizer.identify.fits.determined import with_reasons
+from joulepath.optimizer.identify.fits.torque_fit import by_held_values, held_deviations
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression
 from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
@@ -146,6 +147,8 @@ def _most_likely(
         free[doubts.worst], reasons[doubts.worst] = False, doubts.reasons[doubts.worst]
     residuals = values - columns[:, free] @ value[free]
     excess = float(residuals @ residuals / (len(values) - int(inside.sum())))
+    held = held_deviations(arm.block, terms.names, terms.names_of(~free))
+    covariance += by_held_values(columns.T @ columns, inside, held)
     without = np.tile(value, (clusters.count, 1))
     found = Estimate(terms.names, value, without, tuple(reasons), covariance, doubts.remarks)
     return with_reasons(found, np.flatnonzero(~terms.of_joints).tolist()), excess

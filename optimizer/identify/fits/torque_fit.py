@@ -16,7 +16,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
-from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
+from joulepath.optimizer.identify.estimates.grouped import RANK, GroupedEquations
 from joulepath.optimizer.identify.fits.block import (
     SCALE,
     JointBlock,
@@ -161,8 +161,8 @@ def _fit_block(
             break
         held |= worst
         for coulomb in [name for name in worst if name[0] == "coulomb"]:
-            own = np.array([block.own[name] for name in part.names])
-            rejected = rejections(solution.value, solution.sd, own)
+            own_of_free = np.array([block.own[name] for name in part.names])
+            rejected = rejections(solution.value, solution.sd, own_of_free)
             # a law is kept as a whole: its other terms have no meaning beside the Coulomb friction
             # of another law
             for name, distance in zip(part.names, rejected.tolist(), strict=True):
@@ -172,8 +172,8 @@ def _fit_block(
     grouped = GroupedEquations.of(
         block.columns, block.values, weight, block.cluster, clusters.count
     )
-    full = own.copy()
-    full[free] = value
+    full, fitted = own.copy(), np.zeros(len(own), dtype=bool)
+    full[free], fitted[free] = value, inside
     all_replicates = np.tile(full, (clusters.count, 1))
     all_replicates[:, free] = solution.replicates
     return Estimate(
@@ -181,31 +181,34 @@ def _fit_block(
         value=full,
         replicates=all_replicates,
         reasons=tuple(held.get(name, "") for name in block.names),
-        prior_covariance=_prior_covariance(block, grouped, free, inside),
+        prior_covariance=by_held_values(
+            grouped.gram.sum(axis=0), fitted, held_deviations(block, block.names, held)
+        ),
         remarks=tuple(remarks.get(name, "") for name in block.names),
     )
 
 
-def _prior_covariance(
-    block: JointBlock, grouped: GroupedEquations, free: list[int], inside: Mask
-) -> Array:
-    """Covariance (p, p) of the fitted terms due to the errors of the held terms."""
-    covariance = np.zeros((len(block.names), len(block.names)))
-    at = [k for k, fitted in zip(free, inside.tolist(), strict=True) if fitted]
-    held = [k for k in range(len(block.names)) if k not in free]
-    gram = grouped.gram.sum(axis=0)
-    if at and held:
-        sd = own_deviations(block, [block.names[k] for k in held])
-        moved = np.linalg.lstsq(gram[np.ix_(at, at)], gram[np.ix_(at, held)] * sd, rcond=None)[0]
-        covariance[np.ix_(at, at)] = moved @ moved.T
+def by_held_values(gram: Array, fitted: Mask, sd: Array) -> Array:
+    """Covariance (p, p) of the fitted unknowns due to independent errors of the held ones.
+
+    Args:
+        gram: normal matrix (p, p).
+        fitted: unknowns (p,) that are neither held nor at their bounds.
+        sd: standard deviations (p,) of the errors of held unknowns; 0 for all others.
+    """
+    covariance, scale = np.zeros_like(gram), np.sqrt(np.maximum(np.diag(gram), 1e-300))[fitted]
+    if fitted.any() and sd.any():
+        of_fitted = gram[np.ix_(fitted, fitted)] / np.outer(scale, scale)
+        of_held = gram[fitted][:, sd > 0] * sd[sd > 0] / scale[:, None]
+        moved = np.linalg.lstsq(of_fitted, of_held, RANK.eigenvalue_tolerance)[0] / scale[:, None]
+        covariance[np.ix_(fitted, fitted)] = moved @ moved.T
     return covariance
 
 
-def own_deviations(block: JointBlock, names: Sequence[Name]) -> Array:
-    """Standard deviations (k,) of the robot's own values of some terms."""
-    return np.array(
-        [TORQUE_FIT.own_load_sd if name[0] == "load" else block.own_sd[name] for name in names]
-    )
+def held_deviations(block: JointBlock, names: Sequence[Name], held: Container[Name]) -> Array:
+    """Standard deviations (p,) of the robot's own values of held terms; 0 for all other terms."""
+    known = block.own_sd | {name: TORQUE_FIT.own_load_sd for name in names if name[0] == "load"}
+    return np.array([known[name] if name in held else 0.0 for name in names])
 
 
 def undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:

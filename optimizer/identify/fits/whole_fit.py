@@ -29,7 +29,7 @@ from joulepath.optimizer.identify.fits.determined import (
 )
 from joulepath.optimizer.identify.fits.torque_fit import (
     doubts_of,
-    own_deviations,
+    held_deviations,
     remarks_on,
     undetermined,
 )
@@ -185,7 +185,7 @@ def _determined(
                 key=lambda name: doubts[name].size,
             )
             held[worst] = doubts[worst].reason
-    moved = inverse @ gram[:, ~free] * own_deviations(block, block.names)[~free[bodies:]]
+    moved = inverse @ gram[:, ~free] * held_deviations(block, block.names, held)[~free[bodies:]]
     # as squares, which are positive whatever the rounding errors of a log without noise are
     root = np.hstack([inverse @ np.linalg.cholesky(precision), moved])
     by_prior = root @ root.T
