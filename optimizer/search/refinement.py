@@ -132,17 +132,19 @@ def _value_surplus_otherwise(state: SearchState, candidate: Candidate) -> None:
     With a free duration, the candidate is also solved anew at durations around that of the best of
     them, at the highest value.
     """
-    arm, deadline = state.problem.arm, state.deadline
+    problem, deadline = state.problem, state.deadline
+    supply, most = problem.arm.regeneration, problem.arm.bus.efficiency
     for share in REFINEMENT.surplus_shares:
         if not deadline.passed:
-            value = arm.regeneration + share * max(arm.bus.efficiency - arm.regeneration, 0.0)
+            value = supply + share * max(most - supply, 0.0)
             solve_from(state, candidate, sampled(candidate.spline), fine=False, surplus_value=value)
-    if state.problem.has_fixed_duration:
+    if problem.has_fixed_duration:
         return
-    found = candidate.spline.duration
+    found, longest = candidate.spline.duration, problem.duration_max or np.inf
     for ratio in REFINEMENT.duration_ratios:
-        if not deadline.passed:
-            improve(state, candidate, lambda solver: solver.solve(), duration=ratio * found)
+        duration = ratio * found
+        if (problem.duration_min or 0.0) <= duration <= longest and not deadline.passed:
+            improve(state, candidate, lambda solver: solver.solve(), duration=duration)
 
 
 def start_from_fastest(

@@ -82,3 +82,8 @@ def test_no_motion_of_near_duration_stores_more_to_advantage() -> None:
     for ratio in (0.95, 1.05):
         other = optimize(replace(asked, **fixed(ratio * found.duration)), still)
         assert other.energy.electrical.total > least
+    bounded = replace(asked, duration_min=0.99 * found.duration, duration_max=found.duration)
+    within = optimize(bounded, still)
+    assert bounded.duration_min is not None
+    assert bounded.duration_min <= within.duration <= found.duration
+    assert within.energy.electrical.total > least
