@@ -42,9 +42,12 @@ class LeastChain:
                 return value, nodes
 
     def lower(self, by: float) -> None:
-        """Announce the fall of one cost `by` an amount [J]; costs may fall in no other way."""
+        """Announce the fall of one cost `by` an amount [J]; costs may fall in no other way.
+
+        A cost that falls from infinity may connect nodes that no chain passed before.
+        """
         if self._known is not None:
-            self._known -= by
+            self._known = self._known - by if np.isfinite(by) else None
 
     def _from(self, node: int) -> tuple[float, list[int]]:
         first = np.full(self.costs[0].shape[0], np.inf)

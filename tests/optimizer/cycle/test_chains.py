@@ -57,3 +57,14 @@ def test_no_chain_has_no_nodes() -> None:
     costs = [np.full((2, 2), np.inf), np.zeros((2, 2))]
     for closed in (True, False):
         assert LeastChain(costs, closed).find() == (np.inf, [])
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_cost_that_falls_from_infinity_opens_chains(closed: bool) -> None:
+    """A search that ran out of time counts a move as impossible, and may find its motion later."""
+    costs = [np.array([[1.0, np.inf], [np.inf, np.inf]]), np.array([[2.0, np.inf], [0.1, 9.0]])]
+    chain = LeastChain(costs, closed)
+    assert chain.find() == (3.0, [0, 0, 0])
+    costs[0][0, 1] = 0.5
+    chain.lower(np.inf)
+    assert chain.find() == (0.6, [0, 1, 0])
