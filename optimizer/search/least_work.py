@@ -45,7 +45,8 @@ def explore_least_work(state: SearchState, explore: Callable[[], object]) -> boo
     """Find motions of least work through coarse motions; `explore` then solves the open candidates.
 
     It does nothing for another objective, a free duration, constraints along the path, a tight
-    bound (for which every candidate is solved), or little time, since the first motion comes late.
+    bound (for which every candidate is solved), or little time, since the first motion comes late;
+    nor does it a second time.
 
     Args:
         state: state of the search.
@@ -59,8 +60,9 @@ def explore_least_work(state: SearchState, explore: Callable[[], object]) -> boo
         return False
     families = families_of(state)
     free = state.prepared.path is None and not asked.passes and asked.tool_path is None
-    if not (families and asked.has_fixed_duration and free):
+    if state.least_work_sought or not (families and asked.has_fixed_duration and free):
         return False
+    state.least_work_sought = True
     solver = CoarseSolver(state.prepared, float(asked.duration_max or 0.0))
     search = _LeastWorkSearch(state, families, solver)
     waiting = [each for family in families for each in family[1:]]

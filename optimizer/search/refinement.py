@@ -31,14 +31,14 @@ class RefinementSettings:
     """Assumed values of a joule of surplus if the storage cannot take all of it.
 
     They are shares of the way from the price that the supply pays to the share that the storage
-    gives back. The optimum often lies where the storage just takes all surplus. There the value is
-    nearly the highest one, and the energy is steep: of the energies of two moves, 1.3 % were saved
-    by shares above 0.75.
+    gives back. The optimum often lies where the storage just takes all surplus, and a joule of
+    surplus is worth nearly the highest value there. Shares above 0.75 saved 1.3 % and 0.7 % in 2 of
+    60 random requests.
     """
     duration_ratios: tuple[float, ...] = (0.93, 0.95, 0.97, 0.985, 1.0, 1.015, 1.03)
     """Fixed durations, in multiples of the one found, for which a motion that stores energy is
-    solved anew. With a free duration, no value of a joule leads to the optimum where the storage
-    just takes all surplus: it is 0.1 to 0.4 % better."""
+    solved anew. Solves with a free duration miss the optimum where the storage just takes all
+    surplus, by 0.1 to 0.4 % in 2 of 56 random requests."""
     least_charged: float = 1e-6
     """Energy that a motion stores, as a share of the energy it needs, above which other values of a
     joule of surplus are tried."""

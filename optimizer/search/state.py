@@ -84,6 +84,8 @@ class SearchState:
     """Whether `near_goals` has chosen the first goals of free orientation."""
     goal_was_lost: bool = False
     """Whether the search had no motion to one of the best goals of free orientation."""
+    least_work_sought: bool = False
+    """Whether coarse motions of least work have been sought."""
     may_rest: bool = False
     """Whether the motion of the longest duration is still to be compared."""
     seeks_baselines: bool = False
