@@ -1,15 +1,16 @@
-"""Places of least bound between those of the map.
+"""Checks of places for reach and bound, and the search for places of least bound.
 
 Where another configuration comes within reach of the stops, the least energy of a cycle jumps, by
-up to a tenth within some centimetres, and the bound jumps with it. A bound takes a tenth of the
-time of a cycle, so that a pattern search over bounds finds such places before any cycle is
-computed.
+up to a tenth within some centimetres. The lower bound jumps there as well and takes a tenth of the
+time of a cycle. A pattern search on the bound therefore finds places of little energy between the
+points of the map before any cycle is computed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,8 @@ class CheckedPlacesSettings:
     """Settings of the search for places of least bound."""
 
     finest_share: float = 0.2
-    """Step below which a search ends, as a share of the distance of neighbours on the map."""
+    """Step below which the search ends, as a share of the distance between neighbours on the
+    map."""
 
 
 CHECKED_PLACES = CheckedPlacesSettings()
@@ -33,12 +35,12 @@ CHECKED_PLACES = CheckedPlacesSettings()
 
 @dataclass(frozen=True, eq=False)
 class CheckedPlaces:
-    """Places that were checked for reach and bound.
+    """Memo of checks of places for reach and bound.
 
     Args:
         rounds: checks the places.
         box: ranges of the coordinates.
-        spacing: distances of neighbours on the map, shape (n,) [m, rad].
+        spacing: distances between neighbours on the map, shape (n,) [m, rad].
     """
 
     rounds: Rounds
@@ -47,7 +49,8 @@ class CheckedPlaces:
     _memo: dict[Key, Round] = field(default_factory=dict)
 
     def check(self, place: Place, end: Deadline) -> Round:
-        """The reason why a place has no cycles, or its bound; known ones or new ones."""
+        """The lower bound at a place, or the reason why the place has no cycles; neither of them if
+        the deadline passes first."""
         if place.key not in self._memo:
             found = self.rounds.checked(place, end)
             if end.passed:
@@ -56,36 +59,29 @@ class CheckedPlaces:
         return self._memo[place.key]
 
     def least_bounds(self, starts: Sequence[Round], end: Deadline) -> Iterator[Round]:
-        """The place of least bound near each of others, that of least bound first.
+        """Local minima of the bound, from the start of least bound to that of the greatest.
 
         Args:
-            starts: places to begin with; those without a bound are left out.
+            starts: checked places to begin with; places without a bound are left out.
             end: deadline.
         """
-        finest = CHECKED_PLACES.finest_share * float(
-            (self.spacing / self.box.scale).max(initial=0.0)
-        )
+        step = PATTERN.first_step * self.spacing
+        spacing = float((self.spacing / self.box.scale).max(initial=0.0))
+        # a map finer than the search for the least energy leaves nothing between its points
+        finest = max(CHECKED_PLACES.finest_share * spacing, PATTERN.finest)
         bounded = [each for each in starts if each.reason is None and each.bound is not None]
         for start in sorted(bounded, key=lambda each: each.bound or 0.0):
-            bound = _Bound(self, start.place.choice, end)
-            step = PATTERN.first_step * self.spacing
+            choice = start.place.choice
+            bound = partial(self._bound_at, choice, end)
             x, ended = refined(bound, start.place.x, self.box, step, finest)
-            yield self.check(self.rounds.space.place(start.place.choice, x), end)
+            yield self.check(self.rounds.space.place(choice, x), end)
             if not ended:
                 return
 
-
-@dataclass(frozen=True, eq=False)
-class _Bound:
-    """Bounds [J] at coordinates: inf without cycles, None if the time is up."""
-
-    places: CheckedPlaces
-    choice: tuple[int, ...]
-    end: Deadline
-
-    def __call__(self, x: Array) -> float | None:
+    def _bound_at(self, choice: tuple[int, ...], end: Deadline, x: Array) -> float | None:
+        """Bound [J] at coordinates (n,): inf without a bound, None if the time is up."""
         end_if_stopped()
-        if self.end.passed:
+        if end.passed:
             return None
-        bound = self.places.check(self.places.rounds.space.place(self.choice, x), self.end).bound
+        bound = self.check(self.rounds.space.place(choice, x), end).bound
         return np.inf if bound is None else bound

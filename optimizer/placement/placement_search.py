@@ -58,7 +58,7 @@ class PlacementSearchSettings:
     near_best: float = 0.05
     """Share of the least energy above it up to which a place of the map is refined."""
     same: float = 1e-6
-    """Relative difference of energies below which a bound excludes a better place."""
+    """Relative difference up to which the energies of two searches at one place are the same."""
 
 
 SEARCH = PlacementSearchSettings()
@@ -143,8 +143,9 @@ class PlacementSearch:
         return np.inf if self.best is None or self.best.energy is None else self.best.energy
 
     def _promises(self, found: Round) -> bool:
-        """Whether a place likely needs little more than the best one: its bound and its energy lie
-        as far apart as those of the place where they are closest.
+        """Whether a place may need little more energy than the best one.
+
+        The bound is scaled by the least ratio of energy to bound among the computed places.
         """
         most = self._least + SEARCH.near_best * abs(self._least)
         ratios = [
