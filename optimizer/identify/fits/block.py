@@ -161,12 +161,10 @@ def joint_block(
         v, a, rigid = rows.v[use], rows.a[use], rows.rigid[use]
         spread[joint] = float(rigid[:, joint].std()) if use.any() else 0.0
         columns = np.zeros((int(use.sum()), len(names)))
-        for k, term in enumerate(terms):
-            columns[:, at * len(terms) + k] = (
-                column(term, v[:, joint], a[:, joint], rigid[:, joint], knee, float(speed[joint]))
-                if term != SENSOR_COULOMB or rows.drags is None
-                else rows.drags[use, joint, options.reversal]
-            )
+        first = at * len(terms)
+        columns[:, first : first + len(terms)] = _own_columns(
+            rows, use, joint, terms, knee, float(speed[joint]), options.reversal
+        )
         columns[:, len(joints) * len(terms) :] = _coupled_columns(
             v, a, rigid, joint, coupled, [each for _, each in couplings], knee
         )
@@ -187,6 +185,27 @@ def joint_block(
         unrequested=np.concatenate([part[4] for part in parts]),
         deciding=deciding_term(terms),
     )
+
+
+def _own_columns(
+    rows: Rows,
+    use: Mask,
+    joint: int,
+    terms: Sequence[str],
+    knee: float,
+    speed: float,
+    reversal: int,
+) -> Array:
+    """Columns (n, k) of the terms of a joint in some rows."""
+    v, a, rigid = rows.v[use, joint], rows.a[use, joint], rows.rigid[use, joint]
+    columns = np.zeros((len(v), len(terms)))
+    for k, term in enumerate(terms):
+        columns[:, k] = (
+            column(term, v, a, rigid, knee, speed)
+            if term != SENSOR_COULOMB or rows.drags is None
+            else rows.drags[use, joint, reversal]
+        )
+    return columns
 
 
 def _coupled_columns(
