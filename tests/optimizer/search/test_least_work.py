@@ -106,6 +106,13 @@ def test_time_that_is_over_on_the_way() -> None:
     assert not any(each.deferred for each in own.state.candidates)
 
 
+def test_coarse_motions_are_sought_once_also_beside_a_known_motion() -> None:
+    own = run()
+    own.warm_start(answer(False).trajectory.spline)
+    assert explore_least_work(own.state, lambda: None)
+    assert not explore_least_work(own.state, lambda: pytest.fail("explored"))
+
+
 def test_guesses_rest_at_their_ends() -> None:
     own = run()
     candidate = own.state.candidates[0]
