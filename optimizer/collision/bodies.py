@@ -18,6 +18,9 @@ from joulepath.optimizer.problem.clouds import Cloud as CloudShape
 from joulepath.optimizer.problem.clouds import Points
 from joulepath.optimizer.problem.scene import Attachment, Obstacle
 
+COVER_SPHERES = 4
+"""Number of spheres that cover a body."""
+
 
 @dataclass(frozen=True, eq=False)
 class Body:
@@ -56,6 +59,26 @@ class Body:
             float(np.linalg.norm(self.points - self.ball_centre, axis=1).max())
             + self.core.disc_radius
         )
+
+    @cached_property
+    def cover(self) -> tuple[Array, float]:
+        """Centres (COVER_SPHERES, 3) [m] of the covering spheres in the link frame, and their
+        radius [m].
+
+        The spheres of a moving body without discs stand in a row along its longest principal axis.
+        For any other body, they coincide.
+        """
+        middle, points = self.ball_centre, self.points - self.ball_centre
+        if self.link > 0 and self.core.disc_radius == 0:
+            axis = np.linalg.svd(points, full_matrices=False)[2][0]
+            along = points @ axis
+            low, length = along.min(), np.ptp(along)
+            across = np.linalg.norm(points - along[:, None] * axis, axis=1).max()
+            radius = float(np.hypot(length / (2 * COVER_SPHERES), across))
+            if radius < self.ball_radius:
+                fractions = (np.arange(COVER_SPHERES) + 0.5) / COVER_SPHERES
+                return middle + (low + fractions * length)[:, None] * axis, radius
+        return np.tile(middle, (COVER_SPHERES, 1)), self.ball_radius
 
     @property
     def is_segment(self) -> bool:

@@ -9,11 +9,7 @@ from enum import IntEnum
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.collision.bodies import Body, Indices
-
-COVER_SPHERES = 4
-"""Number of spheres that cover a body."""
-
+from joulepath.optimizer.collision.bodies import COVER_SPHERES, Body, Indices
 
 class PairKind(IntEnum):
     """Method that computes the distance of a pair, by the cores of its first and second body."""
@@ -69,7 +65,7 @@ class PairArrays:
         cores = [body.core for body in bodies]
         max_points = max((len(body.points) for body in bodies), default=1)
         radii = np.array([core.radius for core in cores])
-        covers = [_cover(body) for body in bodies]
+        covers = [body.cover for body in bodies]
         growth = radii + np.array([body.margin for body in bodies])
         primitive_half_sizes = np.array([_primitive_half_size(body) for body in bodies]).reshape(
             -1, 3
@@ -125,26 +121,6 @@ def _kinds(bodies: Sequence[Body], pairs: Indices) -> Indices:
     return np.select(
         list(conditions.values()), [int(kind) for kind in conditions], int(PairKind.CONVEX)
     ).astype(np.intp)
-
-
-def _cover(body: Body) -> tuple[Array, float]:
-    """Centres (COVER_SPHERES, 3) [m] of the covering spheres in the link frame, and their radius
-    [m].
-
-    The spheres of a moving body without discs stand in a row along its longest principal axis. For
-    any other body, they coincide.
-    """
-    middle, points = body.ball_centre, body.points - body.ball_centre
-    if body.link > 0 and body.core.disc_radius == 0:
-        axis = np.linalg.svd(points, full_matrices=False)[2][0]
-        along = points @ axis
-        low, length = along.min(), np.ptp(along)
-        across = np.linalg.norm(points - along[:, None] * axis, axis=1).max()
-        radius = float(np.hypot(length / (2 * COVER_SPHERES), across))
-        if radius < body.ball_radius:
-            fractions = (np.arange(COVER_SPHERES) + 0.5) / COVER_SPHERES
-            return middle + (low + fractions * length)[:, None] * axis, radius
-    return np.tile(middle, (COVER_SPHERES, 1)), body.ball_radius
 
 
 def _primitive_half_size(body: Body) -> Array:
