@@ -5,8 +5,8 @@
 
 FILE is as for `python -m benchmarks.foreign`. Every motion carries `--mass`. It lasts `--duration`,
 or hardly longer than the fastest motion found if that takes more. Its work is the integral of the
-sum of |torque · speed| over the joints, with the torques of rigid bodies, without rotors and
-friction. The motions:
+sum of |torque · speed| over the joints. The robot has neither rotors nor friction, as in cuRobo's
+metric. The motions:
 
 - ours: from the start to the pose of the goal, in any posture
 - free: the same without obstacles
@@ -33,11 +33,12 @@ from benchmarks.statistics import Spread
 from joulepath import optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.robot import Array
+from joulepath.models.registry import load_robot
+from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.motion.spline import Spline, lasting, sample
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import warm_up
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.problem.scene import Scene
@@ -65,11 +66,19 @@ class Works:
     quintic: float | None = None
 
 
+def rigid(robot: Robot) -> Robot:
+    """A robot of the same rigid bodies, without rotors and friction."""
+    law, model = robot.friction, robot.model.copy()
+    none, model.armature = np.zeros(robot.nq), np.zeros(model.nv)
+    law = replace(law, coulomb=none, curved=none, viscous=none, load=None)
+    drives = replace(robot.drives, rotor_inertia=none)
+    return replace(robot, model=model, friction_laws={law.name: law}, drives=drives)
+
+
 def work(arm: Arm, spline: Spline) -> float:
-    """Work [J] of a motion: the integral of Σ |torque · speed| of rigid bodies alone."""
+    """Work [J] of a motion of a rigid arm: the integral of Σ |torque · speed|."""
     load = arm.payload
     model = arm.robot.loaded_model(load.mass, load.com, load.inertia, arm.gravity)
-    model.armature = np.zeros(model.nv)
     data, t = model.createData(), np.linspace(0.0, spline.duration, SAMPLES)
     q, v, a = sample(spline, t)
     tau = np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
@@ -98,13 +107,16 @@ def fastest(problem: Problem) -> Spline | None:
     raise AssertionError("a motion in no time")
 
 
-def run(problem: ForeignProblem, mass: float, duration: float, deadline: float) -> Works:
-    """The works of a problem's motions."""
+def run(
+    problem: ForeignProblem, robot: Robot, mass: float, duration: float, deadline: float
+) -> Works:
+    """The works of the motions of a problem for a rigid robot."""
 
     def asked(kind: Kind, duration: float) -> Problem:
         given = {"objective": "mechanical", "duration": duration}
         request = problem.requests[kind] | given | {"payload": {"mass": mass, "com": COM}}
-        return to_problem(OptimizeRequest.model_validate(request), deadline)
+        found = to_problem(OptimizeRequest.model_validate(request), deadline)
+        return replace(found, arm=replace(found.arm, robot=robot))
 
     try:
         ours: Spline | None = optimize(asked("pose", duration)).trajectory.spline
@@ -186,10 +198,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = command.parse_args(arguments)
     problems = selected(command, given)
     on_one_core()
-    warm_up(given.robot)
+    robot = rigid(load_robot(given.robot))
+    compile_kernel(robot)
     outcomes: list[Works] = []
     for problem in problems:
-        found = run(problem, given.mass, given.duration, given.deadline)
+        found = run(problem, robot, given.mass, given.duration, given.deadline)
         outcomes.append(found)
         if given.verbose:
             print(

@@ -6,11 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from benchmarks.least_work import Works, summary, work
+from benchmarks.least_work import Works, rigid, summary, work
+from joulepath import optimize
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.motion.quintic import PEAKS
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.problem import Problem
 
 COM = np.array([0.0, 0.0, 0.1])
 SAMPLED = 1e-4  # relative error of the trapezoidal rule
@@ -18,15 +20,26 @@ SAMPLED = 1e-4  # relative error of the trapezoidal rule
 
 def test_turning_the_base_costs_its_kinetic_energy_twice() -> None:
     """About the upright axis, gravity does no work: the arm is sped up, and stopped."""
-    arm = Arm(robot=load_robot("panda"), payload=Payload(2.9, COM))
+    arm = Arm(robot=rigid(load_robot("panda")), payload=Payload(2.9, COM))
     q = np.array([0, -0.785, 0, -2.356, 0, 1.571, 0.785])
     turn, duration = 0.8, 1.3
     model = arm.robot.loaded_model(2.9, COM, np.zeros((3, 3)), arm.gravity)
-    model.armature = np.zeros(7)
     inertia = pin.crba(model, model.createData(), q)[0, 0]
     fastest = turn * PEAKS[0] / duration
     found = work(arm, quintic_spline(q, q + turn * np.eye(7)[0], duration))
     assert found == pytest.approx(inertia * fastest**2, rel=SAMPLED)
+
+
+def test_the_work_is_the_objective_of_a_rigid_robot() -> None:
+    arm = Arm(robot=rigid(load_robot("panda")), payload=Payload(2.9, COM))
+    q = np.array([0, -0.785, 0, -2.356, 0, 1.571, 0.785])
+    problem = Problem(
+        arm=arm, start=q, goal=q + 0.3, objective="mechanical", duration_min=1.0, duration_max=1.0
+    )
+    found = optimize(problem)
+    assert work(arm, found.trajectory.spline) == pytest.approx(
+        found.energy.mechanical.total, rel=SAMPLED
+    )
 
 
 def test_means_are_over_the_problems_with_all_motions() -> None:
