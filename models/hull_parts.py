@@ -21,7 +21,7 @@ Inside = Callable[[Array], Mask]
 class PartSettings:
     """Settings of the division."""
 
-    most: int = 5
+    most: int = 8
     """Largest number of parts of a link. Every part adds a distance per obstacle."""
     p99: float = 1.5e-3
     """99th percentile of the excess of the parts' hulls, before they are grown, over the surface
@@ -141,9 +141,11 @@ class Division:
         return np.asarray(part.distances[:most][counts])
 
     def cost(self, part: _Part, others: Sequence[_Part]) -> float:
-        """Integral of the squared excess over the surface [m⁴]."""
+        """Integral of the fourth power of the excess over the surface [m⁶]: deep hollows cost most,
+        and are divided first.
+        """
         excess = self.distances(part, others, part.far) - PARTS.free
-        return float(part.area * (excess**2).sum())
+        return float(part.area * (excess**4).sum())
 
     def halves(self, part: _Part, others: Sequence[_Part]) -> tuple[_Part, _Part]:
         """Divide a part into two, by the best plane found."""
