@@ -3,20 +3,21 @@
     python -m benchmarks.covers
     python -m benchmarks.covers --meshes panda=FOLDER ur10e=FOLDER franka_hand=FOLDER
 
-FOLDER contains the meshes of a robot as `joulepath.models.meshes` describes, or of the tool as
-`joulepath.models.fit_tool_hulls` does. Without folders, the meshes of UR3e and UR5e are those of
-the package `airo-models`. For every moving link, the table has
+FOLDER contains the meshes of a robot as `joulepath.models.meshes` describes, or of a tool as
+`joulepath.models.tool_meshes` does. Without folders, the meshes are those of UR3e, UR5e and Robotiq
+2F-85 in the package `airo-models`. For every moving link, the table has
 the number of uncovered pieces of the meshes' triangles, and the excess: the distance of points of
 the cover's surface from the nearest point of any mesh of the link. Points within the covers of a
-neighbouring link at eight angles of the joint between them do not count. The exit code is 1 if a
-hull leaves a piece uncovered or exceeds the limits below.
+neighbouring link at eight angles of the joint between them do not count. The meshes of a tool are
+those at every opening, and the cover is proven in between, too. The exit code is 1 if a hull leaves
+a piece uncovered or exceeds the limits below.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,11 +27,11 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from benchmarks.command import on_one_core, parser, write_json
 from joulepath.models.capsule_cover import LinkCover, not_held, outside, turned_into
-from joulepath.models.fit_tool_hulls import HAND, surfaces
 from joulepath.models.hull_parts import Mask
 from joulepath.models.meshes import MESH_FILES, SHIFTS, installed, link_surfaces, sampled
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, LinkHull, Robot
+from joulepath.models.tool_meshes import TOOL_MESHES, between, installed_tool
 from joulepath.models.tools.registry import tool_figures
 
 # limits of the excess of hulls [m]: 99th percentile over the surface of an arm, and maximum; of
@@ -134,11 +135,21 @@ def of_tool(name: str, folder: Path, seed: int) -> list[Excess]:
     value = {key: figure["value"] for key, figure in tool_figures(name).items() if key != "title"}
     capsules = [LinkCapsule(0, np.reshape(row[:6], (2, 3)), row[6]) for row in value["capsules"]]
     hulls = [LinkHull(0, np.array(each), value["hull_radius"]) for each in value["hulls"]]
-    meshes, rng = list(surfaces(folder)), np.random.default_rng(seed)
-    return [
-        _found((name, "all", kind), covers, meshes, rng)[0]
-        for kind, covers in (("capsules", capsules), ("hulls", hulls))
-    ]
+    tool, rng, rows = TOOL_MESHES[name], np.random.default_rng(seed), list[Excess]()
+    pieces = [piece for part in tool.parts for piece in tool.swept(folder, part)]
+    for kind, covers in (("capsules", capsules), ("hulls", hulls)):
+        missed = sum(unproven(piece, covers, tool.sagitta(folder)) for piece in pieces)
+        excess = beyond(covers, [piece.reshape(-1, 3, 3) for piece in pieces], rng)
+        rows.append(_row(name, "all", kind, len(covers), missed, excess))
+    return rows
+
+
+def unproven(openings: Array, covers: Sequence[LinkCover], sagitta: float) -> int:
+    """The number of uncovered pieces of triangles (n, t, 3, 3) [m] on their ways between openings,
+    which leave the chords by a sagitta [m].
+    """
+    smaller = [replace(each, radius=each.radius - sagitta) for each in covers]
+    return len(not_held(between(openings), smaller))
 
 
 def _found(
@@ -176,22 +187,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     given = command.parse_args(arguments)
     folders = {name: Path(folder) for name, _, folder in (e.partition("=") for e in given.meshes)}
-    if unknown := sorted(set(folders) - {*SHIFTS, *MESH_FILES, HAND}):
-        known = ", ".join((*SHIFTS, *MESH_FILES, HAND))
+    if unknown := sorted(set(folders) - {*SHIFTS, *MESH_FILES, *TOOL_MESHES}):
+        known = ", ".join((*SHIFTS, *MESH_FILES, *TOOL_MESHES))
         command.error(f"no meshes of {', '.join(unknown)} are read: {known}")
     on_one_core()
     if not folders:
-        folders = {name: folder for name in SHIFTS if (folder := installed(name)) is not None}
+        known_by = {**dict.fromkeys(SHIFTS, installed), **dict.fromkeys(TOOL_MESHES, installed_tool)}
+        folders = {name: path for name, find in known_by.items() if (path := find(name))}
     rows = list[Excess]()
     print(
-        f"{'robot':12}{'link':12}{'cover':10}{'bodies':>6}{'uncovered':>10}"
+        f"{'robot':14}{'link':12}{'cover':10}{'bodies':>6}{'uncovered':>10}"
         f"{'p50':>6}{'p99':>6}{'max':>6} mm"
     )
     for name, folder in folders.items():
-        for row in (of_tool if name == HAND else of_robot)(name, folder, given.seed):
+        for row in (of_tool if name in TOOL_MESHES else of_robot)(name, folder, given.seed):
             rows.append(row)
             print(
-                f"{row.robot:12}{row.link:12}{row.kind:10}{row.bodies:6}{row.uncovered:10}"
+                f"{row.robot:14}{row.link:12}{row.kind:10}{row.bodies:6}{row.uncovered:10}"
                 f"{1e3 * row.p50:6.1f}{1e3 * row.p99:6.1f}{1e3 * row.maximum:6.1f}",
                 flush=True,
             )

@@ -54,14 +54,16 @@ def turned_into(robot: Robot, link: int, other: int, points: Array) -> list[Arra
 
 
 def not_held(triangles: Array, covers: Sequence[LinkCover]) -> Array:
-    """Uncovered pieces (k, 3, 3) [m] of triangles (t, 3, 3) [m] in the frame of capsules and hulls.
+    """Uncovered pieces (k, 3, 3 m) [m] of triangles (t, 3, 3 m) [m] in the frame of capsules and
+    hulls; m is the number of places of a moving triangle, which one cover must contain.
 
     The result is empty if the cover is proven. Otherwise every piece has a corner outside all of
     them, or a longest edge below SMALLEST.
     """
-    found, pieces = [np.empty((0, 3, 3))], triangles
+    found, pieces = [triangles[:0]], triangles
     while len(pieces):
-        distances = outside(pieces.reshape(-1, 3), covers).reshape(len(covers), -1, 3)
+        corners = outside(pieces.reshape(-1, 3), covers)
+        distances = corners.reshape(len(covers), len(pieces), -1)
         is_held = (distances.max(axis=2) <= 0).any(axis=0)
         has_corner_outside = (distances.min(axis=0) > 0).any(axis=1)
         edges = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2)
@@ -73,7 +75,7 @@ def not_held(triangles: Array, covers: Sequence[LinkCover]) -> Array:
 
 
 def cut(triangles: Array, edge: np.ndarray[tuple[int, ...], np.dtype[np.intp]]) -> Array:
-    """Both halves (2 k, 3, 3) of triangles (k, 3, 3), cut at the middle of edge (k,): 0 joins
+    """Both halves (2 k, 3, m) of triangles (k, 3, m), cut at the middle of edge (k,): 0 joins
     corners 0 and 1.
     """
     rows = np.arange(len(triangles))
