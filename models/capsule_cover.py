@@ -26,13 +26,13 @@ TURNS = 8
 
 
 def outside(points: Array, covers: Sequence[LinkCover]) -> Array:
-    """Signed distances (m, k) [m] of points (k, 3) [m] from m capsules or hulls; negative
-    inside.
+    """Signed distances (m, k) [m] of points (k, 3) [m] from m capsules or hulls; negative inside,
+    and lower bounds outside of hulls.
     """
     distances = []
     for cover in covers:
         if isinstance(cover, LinkHull):
-            distances.append(from_hull(points, cover.points) - cover.radius)
+            distances.append(from_hull(points, cover.points, cover.radius) - cover.radius)
             continue
         begin, along = cover.axis[0], cover.axis[1] - cover.axis[0]
         from_begin = points - begin

@@ -28,26 +28,35 @@ class HullFitSettings:
 HULL_FIT = HullFitSettings()
 
 
-def from_hull(points: Array, corners: Array) -> Array:
+def from_hull(points: Array, corners: Array, within: float = np.inf) -> Array:
     """Signed distances (k,) [m] of points (k, 3) [m] from the convex hull of corners (m, 3) [m].
 
-    Inside, the distance is minus that of the nearest face.
+    Inside, the distance is minus that of the nearest face. Distances above `within` [m] are lower
+    bounds that are also above it, and found much sooner.
     """
     hull = ConvexHull(corners)
-    distinct, which = np.unique(points, axis=0, return_inverse=True)
+    planes = hull.equations
     found = np.concatenate(
-        [_from_faces(distinct[k : k + BATCH], hull) for k in range(0, len(distinct), BATCH)]
+        [
+            (points[k : k + BATCH] @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+            for k in range(0, len(points), BATCH)
+        ]
         or [np.empty(0)]
     )
-    return np.asarray(found[which.ravel()])
+    # outside, the height above a face may be less than the distance
+    is_open = (found > 0) & (found <= within)
+    distinct, which = np.unique(points[is_open], axis=0, return_inverse=True)
+    if len(distinct):
+        batches = range(0, len(distinct), BATCH)
+        exact = [_from_faces(distinct[k : k + BATCH], hull) for k in batches]
+        found[is_open] = np.concatenate(exact)[which.ravel()]
+    return np.asarray(found)
 
 
 def _from_faces(points: Array, hull: ConvexHull) -> Array:
+    """Distances (k,) [m] of points (k, 3) [m] outside a hull."""
     normals, offsets = hull.equations[:, :3], hull.equations[:, 3]
     height = points @ normals.T + offsets
-    result = np.asarray(height.max(axis=1))
-    outside = result > 0
-    points, height = points[outside], height[outside]
     faces = hull.points[hull.simplices]
     is_above, nearest = height > 0, np.full(len(points), np.inf)
     for k in range(3):
@@ -61,8 +70,7 @@ def _from_faces(points: Array, hull: ConvexHull) -> Array:
         across = from_first - share[..., None] * edge
         nearest = np.minimum(nearest, np.linalg.norm(across, axis=2).min(axis=1))
     above_faces = np.where(is_above, height, np.inf).min(axis=1)
-    result[outside] = np.minimum(nearest, above_faces)
-    return result
+    return np.asarray(np.minimum(nearest, above_faces))
 
 
 def hull_around(

@@ -210,7 +210,7 @@ def _onrobot_rg2() -> ToolMeshes:
 
     return ToolMeshes(
         (
-            Part((Piece((mount,), ("visual/base_link",)),), most=3),
+            Part((Piece((mount,), ("visual/base_link",)),), most=4),
             Part((*finger(0.0), *finger(np.pi))),
         ),
         np.linspace(-0.558505, 0.785398, 41),
