@@ -154,32 +154,30 @@ def _robotiq_2f_85() -> ToolMeshes:
     def both(file: str) -> tuple[str, ...]:
         return tuple(f"{kind}/robotiq_arg2f_85_{file}" for kind in KINDS)
 
-    def finger(yaw: float) -> tuple[Piece, ...]:
+    outer, inner = list[Piece](), list[Piece]()
+    for yaw in (0.0, np.pi):
         side = Joint(_placed(0.0, 0.0, 0.0, yaw))
-        outer = base, side, Joint(_placed(0.0, 0.0306011, 0.054904), turn=1.0)
-        outer_finger = *outer, Joint(_placed(0.0, 0.0315, -0.0041))
-        inner = base, side, Joint(_placed(0.0, 0.0127, 0.06142), turn=1.0)
-        inner_finger = *outer_finger, Joint(_placed(0.0, 0.0061, 0.0471), turn=-1.0)
-        pad = *inner_finger, Joint(_placed(0.0, -0.0220203, 0.03242))
-        named = (
-            (outer, "outer_knuckle"),
-            (outer_finger, "outer_finger"),
-            (inner, "inner_knuckle"),
-            (inner_finger, "inner_finger"),
-        )
-        return (
-            *(Piece(joints, both(file), MILLIMETRES) for joints, file in named),
-            Piece(inner_finger, ("visual/robotiq_arg2f_85_pad",), MILLIMETRES),
-            Piece(pad, box=(0.022, 0.00635, 0.0375)),
-        )
-
+        knuckle = base, side, Joint(_placed(0.0, 0.0306011, 0.054904), turn=1.0)
+        finger = *knuckle, Joint(_placed(0.0, 0.0315, -0.0041))
+        tip = *finger, Joint(_placed(0.0, 0.0061, 0.0471), turn=-1.0)
+        link = base, side, Joint(_placed(0.0, 0.0127, 0.06142), turn=1.0)
+        outer += [
+            Piece(knuckle, both("outer_knuckle"), MILLIMETRES),
+            Piece(finger, both("outer_finger"), MILLIMETRES),
+        ]
+        inner += [
+            Piece(link, both("inner_knuckle"), MILLIMETRES),
+            Piece(tip, both("inner_finger"), MILLIMETRES),
+            Piece(tip, ("visual/robotiq_arg2f_85_pad",), MILLIMETRES),
+            Piece((*tip, Joint(_placed(0.0, -0.0220203, 0.03242))), box=(0.022, 0.00635, 0.0375)),
+        ]
     coupling = Joint(_placed(0.0, 0.0, 0.007, np.pi / 2))
     housing = (
         Piece((coupling,), ("visual/robotiq_gripper_coupling",), MILLIMETRES),
         Piece((base,), both("base_link")),
     )
     return ToolMeshes(
-        (Part(housing), Part((*finger(0.0), *finger(np.pi)), most=2)),
+        (Part(housing), Part(tuple(outer)), Part(tuple(inner))),
         np.linspace(0.0, 0.81, 28),
     )
 
@@ -197,22 +195,20 @@ def _onrobot_rg2() -> ToolMeshes:
     def piece(file: str, *joints: Joint) -> Piece:
         return Piece((mount, *joints), tuple(f"{kind}/{file}" for kind in KINDS))
 
-    def finger(yaw: float) -> tuple[Piece, ...]:
+    fingers = list[Piece]()
+    for yaw in (0.0, np.pi):
         side = Joint(_placed(0.0, 0.0, 0.0, yaw))
         outer = side, Joint(_placed(0.0, -0.017178, 0.125797), turn=-1.0)
         inner = side, Joint(_placed(0.0, -0.007678, 0.142297), turn=-1.0)
         tip = *outer, Joint(_placed(0.0, -0.039592, 0.038177), turn=1.0)
-        return (
+        fingers += [
             piece("outer_knuckle", *outer),
             piece("inner_knuckle", *inner),
             piece("inner_finger", *tip),
-        )
-
+        ]
+    housing = Piece((mount,), ("visual/base_link",))
     return ToolMeshes(
-        (
-            Part((Piece((mount,), ("visual/base_link",)),), most=4),
-            Part((*finger(0.0), *finger(np.pi))),
-        ),
+        (Part((housing,), most=4), Part(tuple(fingers))),
         np.linspace(-0.558505, 0.785398, 41),
     )
 
