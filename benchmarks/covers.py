@@ -38,6 +38,8 @@ from joulepath.models.tools.registry import tool_figures
 # bent links, which have several hulls, hollows remain that planes do not divide well
 P99, MOST = 3e-3, 8e-3
 BENT_P99, BENT_MOST = 4.5e-3, 16e-3
+# of tools with fingers on turning links; in the hollow of the 2F-85's coupling, 9 mm
+LINKED_P99, LINKED_MOST = 6.5e-3, 10e-3
 # points of a cover's surface per m², of every mesh, and directions that stand for a ball
 DENSITY, MESH_POINTS, DIRECTIONS = 100_000, 200_000, 2_000
 
@@ -175,7 +177,10 @@ def exceeds(row: Excess, rows: Sequence[Excess]) -> bool:
         (each.robot, each.kind) == (row.robot, row.kind) and each.link != "all" and each.bodies > 1
         for each in rows
     )
+    tool = TOOL_MESHES.get(row.robot)
     p99, most = (BENT_P99, BENT_MOST) if bent else (P99, MOST)
+    if tool is not None and tool.turns:
+        p99, most = LINKED_P99, LINKED_MOST
     return row.uncovered > 0 or row.p99 > p99 or row.maximum > most
 
 

@@ -92,6 +92,12 @@ class ToolMeshes:
     parts: tuple[Part, ...]
     openings: Array
 
+    @property
+    def turns(self) -> bool:
+        """Whether any piece turns."""
+        pieces = [piece for part in self.parts for piece in part.pieces]
+        return any(joint.turn for piece in pieces for joint in piece.joints)
+
     def sagitta(self, folder: Path) -> float:
         """The largest distance [m] of any piece between two openings from the chords."""
         step = float(np.diff(self.openings).max())
@@ -178,7 +184,7 @@ def _robotiq_2f_85() -> ToolMeshes:
     )
     return ToolMeshes(
         (Part(housing), Part(tuple(outer)), Part(tuple(inner))),
-        np.linspace(0.0, 0.81, 28),
+        np.linspace(0.0, 0.81, 15),
     )
 
 
@@ -209,7 +215,7 @@ def _onrobot_rg2() -> ToolMeshes:
     housing = Piece((mount,), ("visual/base_link",))
     return ToolMeshes(
         (Part((housing,), most=4), Part(tuple(fingers))),
-        np.linspace(-0.558505, 0.785398, 41),
+        np.linspace(-0.558505, 0.785398, 21),
     )
 
 

@@ -1,11 +1,11 @@
 """Where the meshes of the robots are: in a package that tests install, or in a folder that the
 environment names.
 
-The package `airo-models` ships those of UR3e and UR5e. No package ships those of UR10e and UR16e:
+The package `airo-models` ships those of UR3e, UR5e and the gripper Robotiq 2F-85. No package ships those of UR10e and UR16e:
 tests of theirs run where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in
 `joulepath.models.meshes`: the maker's files, as OBJ. Parts that a UR16e shares with the UR10e are
-in both. A test of the hulls of other arms runs for each that this folder has: `panda`, `iiwa14`,
-`kr10_r1100`, `xarm7`, `gen3`.
+in both. A test of the hulls of other arms and of tools runs for each that this folder has: `panda`,
+`iiwa14`, `kr10_r1100`, `xarm7`, `gen3`, `franka_hand`, `onrobot_rg2`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,18 @@ import os
 from pathlib import Path
 
 from joulepath.models.meshes import SHIFTS, installed
+from joulepath.models.tool_meshes import installed_tool
 
-# robots whose meshes the package ships
+# robots and tools whose meshes the package ships
 SHIPPED = ("ur3e", "ur5e")
+SHIPPED_TOOLS = ("robotiq_2f_85",)
 
 
 def meshes(robot: str) -> Path:
-    """The folder of a robot's meshes."""
-    if robot not in SHIPPED:
+    """The folder of a robot's or tool's meshes."""
+    if robot not in (*SHIPPED, *SHIPPED_TOOLS):
         return Path(os.environ["ROBOT_MESHES"]) / robot
-    folder = installed(robot)
+    folder = installed(robot) or installed_tool(robot)
     assert folder is not None, "a development dependency: `make test` installs it"
     return folder
 

@@ -14,7 +14,8 @@ from benchmarks.covers import beyond, main, within_neighbours
 from joulepath.models.meshes import MESH_FILES
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, LinkHull
-from tests.mesh_folders import meshes
+from joulepath.models.tool_meshes import TOOL_MESHES
+from tests.mesh_folders import SHIPPED_TOOLS, meshes
 
 # m; between samples of the mesh, and of the ball by flat triangles
 SAMPLED = 4e-4
@@ -53,12 +54,16 @@ def test_a_robot_without_readable_meshes_is_named(capsys: pytest.CaptureFixture[
     assert "ur15" in capsys.readouterr().err
 
 
-ARMS = [name for name in MESH_FILES if (Path(os.environ.get("ROBOT_MESHES", "")) / name).is_dir()]
+FOUND = [
+    name
+    for name in (*MESH_FILES, *TOOL_MESHES)
+    if name in SHIPPED_TOOLS or (Path(os.environ.get("ROBOT_MESHES", "")) / name).is_dir()
+]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ARMS)
-def test_the_hulls_of_an_arm_are_proven_and_within_the_limits(name: str) -> None:
+@pytest.mark.parametrize("name", FOUND)
+def test_the_hulls_of_an_arm_or_tool_are_proven_and_within_the_limits(name: str) -> None:
     assert main(["--meshes", f"{name}={meshes(name)}"]) == 0
 
 

@@ -17,7 +17,8 @@ from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.exceptions import UnknownTool
 from joulepath.optimizer.problem.arm import TOOL, Arm, Payload
 from joulepath.optimizer.problem.clouds import Points
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from joulepath.optimizer.problem.tool import load_tool
 
 # of sums of a few numbers in double precision
@@ -25,6 +26,10 @@ ROUNDING = 1e-12
 # m: the TCP lies between fingers, or on the rim of a cup
 BETWEEN_FINGERS = 0.06
 CONFIGURATIONS = 20
+# m: edge of a small obstacle
+CUBE = 2e-3
+# m: a distance that the capsules do not allow
+NEAR = 2e-3
 # m: the nearest point of the fingers is some millimetres beside the axis of the flange
 FLAT_TIP = 5e-4
 
@@ -111,26 +116,78 @@ def test_the_table_of_the_page_is_that_of_the_figures() -> None:
         assert row in page
 
 
-def test_obstacles_are_compared_with_the_hulls_of_a_tool() -> None:
+WITH_HULLS = [name for name in tool_names() if "hulls" in tool_figures(name)]
+
+
+@pytest.mark.parametrize("name", WITH_HULLS)
+def test_obstacles_are_compared_with_the_hulls_of_a_tool(name: str) -> None:
     """Links and clouds are compared with its capsules."""
     ball = Obstacle("ball", Sphere(0.05), np.eye(4))
     scan = Obstacle("scan", Points(np.zeros((1, 3)), 0.01))
-    arm = Arm(
-        robot=load_robot("panda"), tool=load_tool("franka_hand").shape, scene=Scene([ball, scan])
-    )
+    arm = Arm(robot=load_robot("panda"), tool=load_tool(name).shape, scene=Scene([ball, scan]))
     model = CollisionModel(arm)
     of_tool = [
         (model.bodies[i].name, model.bodies[k].is_hull)
         for i, k in model.pairs.tolist()
         if model.bodies[k].name == TOOL
     ]
-    assert of_tool.count(("ball", True)) == len(tool_figures("franka_hand")["hulls"]["value"])
+    assert of_tool.count(("ball", True)) == len(tool_figures(name)["hulls"]["value"])
     assert ("ball", False) not in of_tool
     assert ("scan", False) in of_tool and ("scan", True) not in of_tool
-    others = {name for name, is_hull in of_tool if is_hull}
+    others = {other for other, is_hull in of_tool if is_hull}
     assert others == {"ball"}
     # without obstacles there are no hulls
     assert not any(body.is_hull for body in CollisionModel(replace(arm, scene=Scene())).bodies)
+
+
+def clearance(name: str, centre: list[float]) -> float:
+    """Distance [m] of a tool on a UR5e from a cube of CUBE edge length at a place (3,) [m] of the
+    flange frame.
+    """
+    arm = Arm(robot=load_robot("ur5e"), tool=load_tool(name).shape)
+    q = np.array([[0.3, -1.2, 1.4, -1.8, -1.5, 0.4]])
+    T = CollisionModel(arm).frames(q)[0, -1] @ arm.robot.T_last_flange
+    at = T @ Pose.from_rpy(centre, [0.0, 0.0, 0.0]).T
+    cube = Obstacle("cube", Box(np.full(3, CUBE)), at, 0.0)
+    model = CollisionModel(replace(arm, scene=Scene([cube])))
+    distance = model.signed_distances(q)[0][0]
+    return float(min(distance[k] for k in range(len(distance)) if TOOL in model.names(k)))
+
+
+@pytest.mark.parametrize(
+    ("name", "beside"),
+    [
+        # beside the fingers, and beside the housing
+        ("robotiq_2f_85", [0.0131, 0.058, 0.15]),
+        ("robotiq_2f_85", [0.036, 0.0, 0.06]),
+        ("onrobot_rg2", [0.056, 0.0128, 0.185]),
+        ("onrobot_rg2", [0.0, 0.0211, 0.09]),
+    ],
+)
+def test_a_thing_beside_a_gripper_is_free(name: str, beside: list[float]) -> None:
+    """About 1 mm from its hulls, within its capsules."""
+    rows = np.array(tool_figures(name)["capsules"]["value"])
+    first, way = rows[:, :3], rows[:, 3:6] - rows[:, :3]
+    along = np.einsum("ij,ij->i", beside - first, way) / (way**2).sum(axis=1)
+    axis = first + np.clip(along, 0, 1)[:, None] * way
+    assert (np.linalg.norm(axis - beside, axis=1) + CUBE < rows[:, 6]).any()
+    assert 0 < clearance(name, beside) < NEAR
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        # the joints and the tips of the open fingers, and the tips of the closed ones
+        ("robotiq_2f_85", [0.0, 0.074, 0.1087]),
+        ("robotiq_2f_85", [0.0, 0.0445, 0.158]),
+        ("robotiq_2f_85", [0.0, -0.003, 0.173]),
+        ("onrobot_rg2", [0.075, 0.0, 0.133]),
+        ("onrobot_rg2", [-0.06, 0.0, 0.186]),
+        ("onrobot_rg2", [0.004, 0.0, 0.23]),
+    ],
+)
+def test_a_thing_at_a_finger_is_found_at_every_opening(name: str, place: list[float]) -> None:
+    assert clearance(name, place) < 0
 
 
 def test_distances_from_a_tool_are_those_from_its_grown_hulls() -> None:

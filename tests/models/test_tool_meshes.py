@@ -1,0 +1,105 @@
+"""Tools at every opening: how their fingers move, and the proof that their hulls hold them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from benchmarks.covers import unproven
+from joulepath.models.capsule_cover import not_held
+from joulepath.models.fit_tool_hulls import fitted_hulls
+from joulepath.models.hull_cover import HULL_FIT, from_hull
+from joulepath.models.robot import Array, LinkCapsule, LinkHull
+from joulepath.models.tool_meshes import TOOL_MESHES, Joint, Piece, between
+from joulepath.models.tools.registry import tool_figures, tool_names
+from tests.mesh_folders import meshes
+
+ROBOTIQ = "robotiq_2f_85"
+# m: by the maker's data sheet, the fingers open 85 mm wide
+OPEN, OPENING = 0.085, 2e-3
+# m: the pads touch when closed, but for the last thousandths of a radian
+CLOSED = 5e-4
+# the greatest sagitta is that of the farthest corner, by the first term of its series
+SERIES = 1e-3
+
+
+def hulls(name: str) -> list[LinkHull]:
+    figures = tool_figures(name)
+    radius = figures["hull_radius"]["value"]
+    return [LinkHull(0, np.array(points), radius) for points in figures["hulls"]["value"]]
+
+
+def test_the_pads_of_the_robotiq_touch_when_closed_and_open_by_its_stroke() -> None:
+    """They move along y, stay upright, and the TCP is at the height of their middle when open."""
+    tool = TOOL_MESHES[ROBOTIQ]
+    pads = [
+        swept
+        for part in tool.parts
+        for piece, swept in zip(part.pieces, tool.swept(meshes(ROBOTIQ), part), strict=True)
+        if piece.box is not None
+    ]
+    (left, right) = (pad.reshape(len(tool.openings), -1, 3) for pad in pads)
+    gap = left[..., 1].min(axis=1) - right[..., 1].max(axis=1)
+    assert gap[0] == pytest.approx(OPEN, abs=OPENING) and 0 <= gap[-1] < CLOSED
+    assert (np.diff(gap) < 0).all()
+    extents = np.ptp(left, axis=1)
+    np.testing.assert_allclose(extents, np.broadcast_to(extents[0], extents.shape))
+    tcp = tool_figures(ROBOTIQ)["tcp"]["value"]
+    assert tcp[2] == pytest.approx(left[0, :, 2].mean(), abs=1e-3)
+
+
+def test_arcs_stay_within_the_sagitta_of_their_chords() -> None:
+    """A corner on a turning link, and one of a finger that the link carries without a turn."""
+    corners = np.array([[[0.0, 0.03, 0.04], [0.1, 0.0, 0.02], [0.0, 0.01, 0.0]]])
+    hinge = Joint(pin.SE3.Identity(), turn=1.0)
+    carried = Joint(pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.06])), turn=-1.0)
+    step = 0.1
+    for joints, radius in (((hinge,), 0.05), ((hinge, carried), 0.06)):
+        piece = Piece(joints)
+        first, last, middle = (piece.at(corners, travel) for travel in (0.2, 0.2 + step, 0.25))
+        missed = np.linalg.norm(middle - (first + last) / 2, axis=-1).max()
+        assert missed == pytest.approx(radius * (1 - np.cos(step / 2)), rel=SERIES)
+        assert missed < piece.sagitta(corners, step) < (1 + SERIES) * missed
+
+
+def test_a_triangle_is_not_held_where_no_cover_holds_its_whole_way() -> None:
+    """Two balls side by side hold the first and the last place, and neither holds the way."""
+    triangle = 1e-3 * np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
+    places = np.array([triangle - [0.05, 0, 0], triangle + [0.05, 0, 0]])
+    ends = [np.tile([x, 0.0, 0.0], (2, 1)) for x in (-0.05, 0.05)]
+    balls = [LinkCapsule(0, end, 0.02) for end in ends]
+    assert not any(len(not_held(place, balls)) for place in places)
+    assert len(not_held(between(places), balls))
+    assert not len(not_held(between(places), [LinkCapsule(0, np.concatenate(ends)[::2], 0.02)]))
+
+
+def _surfaces() -> list[Array]:
+    tool, folder = TOOL_MESHES[ROBOTIQ], meshes(ROBOTIQ)
+    return [swept for part in tool.parts for swept in tool.swept(folder, part)]
+
+
+def test_the_hulls_of_the_robotiq_hold_it_at_every_opening_and_in_between() -> None:
+    """1 mm less, and every body leaves something out."""
+    covers, surfaces = hulls(ROBOTIQ), _surfaces()
+    sagitta = TOOL_MESHES[ROBOTIQ].sagitta(meshes(ROBOTIQ))
+    assert sum(unproven(surface, covers, sagitta) for surface in surfaces) == 0
+    ends = [surface[[0, -1]].reshape(1, -1, 3, 3) for surface in surfaces]
+    for each in covers:
+        smaller = [replace(c, radius=c.radius - 1e-3 * (c is each)) for c in covers]
+        assert any(unproven(end, smaller, 0.0) for end in ends)
+
+
+def test_a_fit_repeats_the_figures() -> None:
+    fitted = list(fitted_hulls(ROBOTIQ, meshes(ROBOTIQ)))
+    for each, points in zip(hulls(ROBOTIQ), fitted, strict=True):
+        np.testing.assert_allclose(each.points, points, atol=HULL_FIT.digit / 2)
+
+
+@pytest.mark.parametrize("name", [name for name in tool_names() if "hulls" in tool_figures(name)])
+def test_the_tcp_lies_within_the_hulls_of_a_tool_that_grips(name: str) -> None:
+    assert name in TOOL_MESHES
+    tcp = np.array([tool_figures(name)["tcp"]["value"][:3]])
+    assert min(from_hull(tcp, each.points)[0] - each.radius for each in hulls(name)) < 0
