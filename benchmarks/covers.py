@@ -197,8 +197,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command.error(f"no meshes of {', '.join(unknown)} are read: {known}")
     on_one_core()
     if not folders:
-        known_by = {**dict.fromkeys(SHIFTS, installed), **dict.fromkeys(TOOL_MESHES, installed_tool)}
-        folders = {name: path for name, find in known_by.items() if (path := find(name))}
+        found = {name: installed(name) or installed_tool(name) for name in (*SHIFTS, *TOOL_MESHES)}
+        folders = {name: folder for name, folder in found.items() if folder is not None}
     rows = list[Excess]()
     print(
         f"{'robot':14}{'link':12}{'cover':10}{'bodies':>6}{'uncovered':>10}"

@@ -68,7 +68,8 @@ def test_arcs_stay_within_the_sagitta_of_their_chords() -> None:
 def test_a_triangle_is_not_held_where_no_cover_holds_its_whole_way() -> None:
     """Two balls side by side hold the first and the last place, and neither holds the way."""
     triangle = 1e-3 * np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
-    places = np.array([triangle - [0.05, 0, 0], triangle + [0.05, 0, 0]])
+    aside = np.array([0.05, 0.0, 0.0])
+    places = np.array([triangle - aside, triangle + aside])
     ends = [np.tile([x, 0.0, 0.0], (2, 1)) for x in (-0.05, 0.05)]
     balls = [LinkCapsule(0, end, 0.02) for end in ends]
     assert not any(len(not_held(place, balls)) for place in places)
