@@ -44,8 +44,10 @@ def mesh_collisions(
         for k, triangles in enumerate(of_link):
             mesh = pin.GeometryObject(f"{link} {k}", link, pin.SE3.Identity(), _surface(triangles))
             moving.append((geometry.addGeometryObject(mesh), 0.0))
+    # the hulls of a tool, if it has any, and its capsules otherwise
+    has_hulls = any(part.is_hull for part in arm.tool)
     for number, body in enumerate(model.bodies[len(arm.robot.capsules) :]):
-        if body.link == 0 or body.name == TOOL:
+        if body.link == 0 or (body.name == TOOL and body.is_hull == has_hulls):
             growth = body.core.radius
             if _add(geometry, f"body {number}", body):
                 # Coal grows no meshes by a negative margin.

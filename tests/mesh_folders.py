@@ -1,11 +1,11 @@
 """Where the meshes of the robots are: in a package that tests install, or in a folder that the
 environment names.
 
-The package `airo-models` ships those of UR3e, UR5e and the gripper Robotiq 2F-85. No package ships those of UR10e and UR16e:
-tests of theirs run where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in
-`joulepath.models.meshes`: the maker's files, as OBJ. Parts that a UR16e shares with the UR10e are
-in both. A test of the hulls of other arms and of tools runs for each that this folder has: `panda`,
-`iiwa14`, `kr10_r1100`, `xarm7`, `gen3`, `franka_hand`, `onrobot_rg2`.
+The package `airo-models` ships those of UR3e, UR5e and the gripper Robotiq 2F-85. No package ships
+those of UR10e and UR16e: tests of theirs run where ROBOT_MESHES names a folder with `ur10e` and
+`ur16e`, each as in `joulepath.models.meshes`: the maker's files, as OBJ. Parts that a UR16e shares
+with the UR10e are in both. A test of the hulls of other arms and of tools runs for each that this
+folder has: `panda`, `iiwa14`, `kr10_r1100`, `xarm7`, `gen3`, `franka_hand`, `onrobot_rg2`.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from joulepath.models.registry import load_robot
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere, capsule_between
+from joulepath.optimizer.problem.tool import load_tool
 from tests.mesh_folders import meshes
 from tests.optimizer.cells import wander
 
@@ -47,3 +48,16 @@ def test_a_tool_is_replayed_with_the_meshes() -> None:
         scene = Scene([Obstacle("pea", Sphere(RADIUS), at, margin=0.0)])
         found = mesh_collisions(Arm(robot=ROBOT, tool=[rod], scene=scene), {}, spline, 1.0)
         assert (found > 0) == hit
+
+
+def test_a_tool_is_replayed_with_its_hulls() -> None:
+    """A pea beside the fingers of a Robotiq 2F-85 is free, within the reach of its capsules."""
+    spline, tool = wander(2, duration=1.0), load_tool("robotiq_2f_85").shape
+    capsules = tuple(part for part in tool if not part.is_hull)
+    at = CollisionModel(Arm(robot=ROBOT)).frames(spline.curve(np.zeros(1)))[0, -1]
+    at = at @ ROBOT.T_last_flange
+    at[:3, 3] = (at @ [0.015, 0.058, 0.15, 1.0])[:3]
+    scene = Scene([Obstacle("pea", Sphere(RADIUS), at, margin=0.0)])
+    for shape, hit in ((tool, False), (capsules, True)):
+        arm = Arm(robot=ROBOT, tool=shape, scene=scene)
+        assert (mesh_collisions(arm, {}, spline, 2.0) > 0) == hit
