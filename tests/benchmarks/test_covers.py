@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from benchmarks.command import THREADS
 from benchmarks.covers import beyond, main, within_neighbours
 from joulepath.models.meshes import MESH_FILES
 from joulepath.models.registry import load_robot
@@ -63,7 +64,12 @@ FOUND = [
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", FOUND)
-def test_the_hulls_of_an_arm_or_tool_are_proven_and_within_the_limits(name: str) -> None:
+def test_the_hulls_of_an_arm_or_tool_are_proven_and_within_the_limits(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # otherwise the command would start this process again
+    for each in THREADS:
+        monkeypatch.setenv(each, "1")
     assert main(["--meshes", f"{name}={meshes(name)}"]) == 0
 
 
