@@ -26,11 +26,11 @@ import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
 from benchmarks.command import on_one_core, parser, write_json
-from joulepath.models.capsule_cover import LinkCover, not_held, outside, turned_into
+from joulepath.models.capsule_cover import LinkCover, not_held, outside, within_neighbours
 from joulepath.models.hull_parts import Mask
 from joulepath.models.meshes import MESH_FILES, SHIFTS, installed, link_surfaces, sampled
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, LinkCapsule, LinkHull, Robot
+from joulepath.models.robot import Array, LinkCapsule, LinkHull
 from joulepath.models.tool_meshes import TOOL_MESHES, between, installed_tool
 from joulepath.models.tools.registry import tool_figures
 
@@ -89,20 +89,6 @@ def beyond(
         found.append(points[~within(points)])
     near = np.concatenate([sampled(each, MESH_POINTS, rng) for each in meshes])
     return np.asarray(cKDTree(near).query(np.concatenate(found))[0])
-
-
-def within_neighbours(robot: Robot, link: int, covers: Sequence[LinkCover], points: Array) -> Mask:
-    """Whether points (k, 3) [m] of the frame of a link are within the covers of the next or the
-    previous moving link at TURNS angles of the joint between them, where no obstacle can be.
-    """
-    found = np.zeros(len(points), dtype=bool)
-    for other in (link - 1, link + 1):
-        if own := [each for each in covers if each.link == other > 0]:
-            is_within = ~found
-            for turned in turned_into(robot, link, other, points):
-                is_within[is_within] = (outside(turned[is_within], own) < 0).any(axis=0)
-            found |= is_within
-    return found
 
 
 def of_robot(name: str, folder: Path, seed: int) -> list[Excess]:

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.hull_cover import from_hull
-from joulepath.models.robot import Array, LinkCapsule, LinkHull, Robot
+from joulepath.models.robot import Array, LinkCapsule, LinkHull, Mask, Robot
 
 LinkCover = LinkCapsule | LinkHull
 SMALLEST = 2e-5
@@ -50,6 +50,20 @@ def turned_into(robot: Robot, link: int, other: int, points: Array) -> list[Arra
         T = joint * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3))
         T = T.inverse() if other > link else T
         found.append(points @ T.rotation.T + T.translation)
+    return found
+
+
+def within_neighbours(robot: Robot, link: int, covers: Sequence[LinkCover], points: Array) -> Mask:
+    """Whether points (k, 3) [m] of the frame of a link are within the covers of the next or the
+    previous moving link at TURNS angles of the joint between them, where no obstacle can be.
+    """
+    found = np.zeros(len(points), dtype=bool)
+    for other in (link - 1, link + 1):
+        if own := [each for each in covers if each.link == other > 0]:
+            is_within = ~found
+            for turned in turned_into(robot, link, other, points):
+                is_within[is_within] = (outside(turned[is_within], own) < 0).any(axis=0)
+            found |= is_within
     return found
 
 

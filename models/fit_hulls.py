@@ -2,58 +2,34 @@
 for the section `hulls` of figures.yaml, which has the radius already.
 
 MESHES is a folder as in `joulepath.models.meshes`. A bent link is divided into parts, with one hull
-each. The points of a hull are vertices of the convex hull of its part, so that the hull reaches at
-most its radius beyond that convex hull.
+each. The hollows that the hulls of a neighbouring link fill at every angle are not divided, so the
+links of a new robot are fitted twice. The points of a hull are vertices of the convex hull of its
+part, so that the hull reaches at most its radius beyond that convex hull.
 """
 
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 
-import numpy as np
-from scipy.spatial import ConvexHull
-
-from joulepath.models.capsule_cover import turned_into
+from joulepath.models.capsule_cover import within_neighbours
 from joulepath.models.hull_cover import hull_around
-from joulepath.models.hull_parts import Inside, Mask, divided
+from joulepath.models.hull_parts import divided
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, LinkHull, Robot
+from joulepath.models.robot import LinkHull, Robot
 
 
 def fitted_hulls(folder: Path, robot: Robot, link: int) -> list[LinkHull]:
     """The hulls around the parts of a link."""
     radius = robot.figures["hulls"]["radius"]["value"]
     surfaces = list(link_surfaces(folder, robot.name, link).values())
-    parts = divided(surfaces, radius, _within_neighbours(folder, robot, link, radius))
+    inside = partial(within_neighbours, robot, link, robot.hulls)
+    parts = divided(surfaces, radius, inside)
     return [
         LinkHull(link, hull_around(part.reshape(-1, 3), radius=radius), radius) for part in parts
     ]
-
-
-def _within_neighbours(folder: Path, robot: Robot, link: int, radius: float) -> Inside:
-    """Whether points are within the hull of a neighbouring link at TURNS angles of the joint: in
-    the hollow ends of links, where no obstacle can be.
-    """
-    planes = dict[int, Array]()
-    for other in (link - 1, link + 1):
-        if 1 <= other <= robot.nq:
-            surfaces = link_surfaces(folder, robot.name, other).values()
-            corners = np.concatenate([each.reshape(-1, 3) for each in surfaces])
-            planes[other] = ConvexHull(hull_around(corners)).equations
-
-    def inside(points: Array) -> Mask:
-        found = np.zeros(len(points), dtype=bool)
-        for other, hull in planes.items():
-            is_inside = ~found
-            for turned in turned_into(robot, link, other, points):
-                height = turned[is_inside] @ hull[:, :3].T + hull[:, 3]
-                is_inside[is_inside] = (height <= radius).all(axis=1)
-            found |= is_inside
-        return found
-
-    return inside
 
 
 def main() -> None:

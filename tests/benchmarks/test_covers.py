@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from benchmarks.command import THREADS
-from benchmarks.covers import beyond, main, within_neighbours
+from benchmarks.covers import beyond, main
+from joulepath.models.capsule_cover import within_neighbours
 from joulepath.models.meshes import MESH_FILES
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, LinkHull
