@@ -73,6 +73,14 @@ class GroupedEquations:
         return GroupedEquations(gram, moment)
 
 
+def column_lengths(gram: Array, rank: RankSettings = RANK) -> Array:
+    """Lengths (p,) of the columns of a normal matrix (p, p); infinite for those that count as zero,
+    so that divided by its length a zero column stays zero."""
+    lengths = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    shortest = rank.column_tolerance * max(lengths.max(initial=0.0), 1e-300)
+    return np.where(lengths > shortest, lengths, np.inf)
+
+
 def solve_bounded(gram: Array, moment: Array, lower: Array, rank: RankSettings = RANK) -> Array:
     """Minimise xᵀ gram x / 2 - momentᵀ x subject to x ≥ lower.
 
@@ -88,9 +96,7 @@ def solve_bounded(gram: Array, moment: Array, lower: Array, rank: RankSettings =
     Returns:
         The minimiser x (p,).
     """
-    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    shortest = rank.column_tolerance * max(scale.max(initial=0.0), 1e-300)
-    scale = np.where(scale > shortest, scale, np.inf)
+    scale = column_lengths(gram, rank)
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     roots = np.sqrt(np.where(values > rank.eigenvalue_tolerance, values, np.inf))
     target = (vectors / roots).T @ (moment / scale)
@@ -122,7 +128,9 @@ def leave_one_out(
     total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
     estimates = np.tile(found, (len(grouped.gram), 1))
     at = np.flatnonzero(free)
-    scale = np.sqrt(np.maximum(np.diag(total)[at], 1e-300))
+    # a prior leaves no column zero
+    of_free = total[np.ix_(at, at)]
+    scale = column_lengths(of_free) if prior is None else np.sqrt(np.diag(of_free))
     for k, (gram, moment) in enumerate(zip(grouped.gram, grouped.moment, strict=True)):
         rest = (total - gram)[np.ix_(at, at)] / np.outer(scale, scale)
         pull = (gram @ found - moment)[at] / scale

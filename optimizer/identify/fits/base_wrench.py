@@ -61,7 +61,7 @@ def fit_wrench(
     precision = options.prior_weight * distance_metric(own)
     value = own
     for _ in range(WRENCH_FIT.weight_passes):
-        weight = _weights(values - columns @ value, clusters)
+        weight = _weights(values, values - columns @ value, clusters)
         grouped = GroupedEquations.of(columns, values, weight, cluster, clusters.count)
         gram = grouped.gram.sum(axis=0) + precision
         moment = grouped.moment.sum(axis=0) + precision @ own
@@ -79,8 +79,9 @@ def fit_wrench(
     return with_reasons(found, range(len(own)))
 
 
-def _weights(residuals: Array, clusters: Clusters) -> Array:
+def _weights(measured: Array, residuals: Array, clusters: Clusters) -> Array:
     """Weights (6 n,) of rows and axes by the inverse of the effective variance of their axis."""
-    rest = residuals.reshape(-1, WRENCH_AXES)
-    equal = np.ones(len(rest))
-    return np.tile([1 / effective_variance(axis, equal, clusters) for axis in rest.T], len(rest))
+    axes = [each.reshape(-1, WRENCH_AXES).T for each in (measured, residuals)]
+    equal = np.ones(len(clusters.of_row))
+    weight = [1 / effective_variance(*axis, equal, clusters) for axis in zip(*axes, strict=True)]
+    return np.tile(weight, len(equal))

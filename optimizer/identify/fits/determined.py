@@ -15,6 +15,7 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.identify.estimates.estimate import Estimate
 from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
+    column_lengths,
     jackknife,
     leave_one_out,
 )
@@ -105,7 +106,7 @@ def unbounded(
         free[k] = True
         at = np.flatnonzero(free)
         place = int(np.searchsorted(at, k))
-        scale = np.sqrt(np.maximum(np.diag(total)[at], 1e-300))
+        scale = column_lengths(total[np.ix_(at, at)])
         inverse = np.linalg.pinv(total[np.ix_(at, at)] / np.outer(scale, scale), hermitian=True)
         step = -inverse[:, place] / scale * (gradient[k] / scale[place])
         moved = value.copy()

@@ -164,7 +164,7 @@ def fit_payload(
             if len(right):
                 error = right - left @ value[at]
                 variance[joint] = effective_variance(
-                    error, np.ones_like(error), Clusters(of_row, clusters.count)
+                    right, error, np.ones_like(error), Clusters(of_row, clusters.count)
                 )
         body = value[links : links + PARAMETERS_PER_BODY]
     replicates = leave_one_out(grouped, value, np.ones(len(value), dtype=bool), prior)

@@ -64,8 +64,6 @@ class PowerFitSettings:
     """Largest number of Gauss-Newton steps."""
     step_tolerance: float = 1e-9
     """Step over the largest figure, at which the iteration ends [1]."""
-    variance_floor: float = 1e-9
-    """Variance added to that of the measured power at the start [W²]."""
     min_clusters: int = 3
     """Clusters below which the loss of information without one of them is not measured."""
 
@@ -197,7 +195,7 @@ def fit_power(
     """
     settings = POWER_FIT
     value, weight = prior.mean, np.ones_like(measured)
-    noise = float(np.var(measured)) + settings.variance_floor
+    noise = effective_variance(measured, measured - measured.mean(), weight, clusters)
     least = np.zeros_like(prior.mean)
     least[-1 - parts.v.shape[1] : -1] = -np.inf  # offsets may be negative
     least[-1] = settings.least_link_scale
@@ -207,7 +205,7 @@ def fit_power(
         residuals = measured - predicted
         if iteration:
             weight = bisquare_weights(residuals) if robust else weight
-            noise = effective_variance(residuals, weight, clusters)
+            noise = effective_variance(measured, residuals, weight, clusters)
         grouped = GroupedEquations.of(
             slope, residuals + slope @ value, weight / noise, clusters.of_row, clusters.count
         )

@@ -16,7 +16,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
-from joulepath.optimizer.identify.estimates.grouped import RANK, GroupedEquations
+from joulepath.optimizer.identify.estimates.grouped import RANK, GroupedEquations, column_lengths
 from joulepath.optimizer.identify.fits.block import (
     SCALE,
     JointBlock,
@@ -196,7 +196,7 @@ def by_held_values(gram: Array, fitted: Mask, sd: Array) -> Array:
         fitted: unknowns (p,) that are neither held nor at their bounds.
         sd: standard deviations (p,) of the errors of held unknowns; 0 for all others.
     """
-    covariance, scale = np.zeros_like(gram), np.sqrt(np.maximum(np.diag(gram), 1e-300))[fitted]
+    covariance, scale = np.zeros_like(gram), column_lengths(gram)[fitted]
     if fitted.any() and sd.any():
         of_fitted = gram[np.ix_(fitted, fitted)] / np.outer(scale, scale)
         of_held = gram[fitted][:, sd > 0] * sd[sd > 0] / scale[:, None]

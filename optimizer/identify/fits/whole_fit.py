@@ -278,7 +278,8 @@ def _weights(arm: WholeArmRegression, residuals: Array, clusters: Clusters, robu
     weight = np.ones_like(residuals)
     for joint in np.unique(arm.block.joint):
         rows = arm.block.joint == joint
-        rest, cluster = residuals[rows], arm.block.cluster[rows]
+        values, rest, of_row = arm.values[rows], residuals[rows], arm.block.cluster[rows]
         share = bisquare_weights(rest) if robust else np.ones_like(rest)
-        weight[rows] = share / effective_variance(rest, share, Clusters(cluster, clusters.count))
+        part = Clusters(of_row, clusters.count)
+        weight[rows] = share / effective_variance(values, rest, share, part)
     return weight

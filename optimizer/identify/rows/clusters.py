@@ -22,8 +22,11 @@ class ClusterSettings:
     """Largest number of clusters; more cost time and do not improve the spread."""
     slice_duration: float = 1.0
     """Duration of the smallest unit, a slice of a move [s]."""
+    min_relative_sd: float = 1e-3
+    """Smallest error of a row over the root mean square of the measured values [1]. No sensor and
+    no model is better; a log without noise would outweigh any prior up to rounding errors."""
     variance_floor: float = 1e-9
-    """Variance added to that of residuals, which may be rounding errors alone [unit²]."""
+    """Smallest variance of a row, for measured values that are all zero [unit²]."""
 
 
 CLUSTERS = ClusterSettings()
@@ -51,7 +54,9 @@ def clusters_of(rows: Rows, settings: ClusterSettings = CLUSTERS) -> Clusters:
     return Clusters(np.asarray(number, dtype=np.int64), count)
 
 
-def effective_variance(residuals: Array, weight: Array, clusters: Clusters) -> float:
+def effective_variance(
+    measured: Array, residuals: Array, weight: Array, clusters: Clusters
+) -> float:
     """Variance of a row as if all rows were independent.
 
     The rows of a move share an error that the model does not express, so the mean residual of a
@@ -59,16 +64,18 @@ def effective_variance(residuals: Array, weight: Array, clusters: Clusters) -> f
     variance makes both agree.
 
     Args:
+        measured: measured values (n,).
         residuals: residuals (n,).
         weight: weights (n,) of the rows.
         clusters: partition of the rows.
 
     Returns:
-        The variance, in the squared unit of the residuals.
+        The variance, in the squared unit of the measured values.
     """
     weighted = np.sqrt(weight) * residuals
     size = np.bincount(clusters.of_row, minlength=clusters.count)
     total = np.bincount(clusters.of_row, weighted, minlength=clusters.count)
     shared = float(np.mean(total[size > 0] ** 2 / size[size > 0]))
     independent = float(weighted @ weighted / max(weight.sum(), 1e-300))
-    return max(shared, independent) + CLUSTERS.variance_floor
+    least = CLUSTERS.min_relative_sd**2 * float(np.mean(measured**2))
+    return max(shared, independent) + least + CLUSTERS.variance_floor
