@@ -368,3 +368,12 @@ def test_friction_without_a_rise_has_no_threshold() -> None:
     random = np.random.default_rng(4)
     v = np.concatenate([random.uniform(-2, 2, 20_000), random.uniform(-0.3, 0.3, 20_000)])
     assert velocity_threshold(v, stribeck(v, 0.0, random)) == 0.0
+
+
+@pytest.mark.parametrize("method", ["base_parameters", "essential_parameters"])
+def test_the_spread_of_two_moves_is_a_number(method: Method) -> None:
+    """Terms of joints that rest are zero columns, which have no scale."""
+    robot = load_robot("ur10e")
+    log = replace(recorded(robot, truth_of(robot), moves=2).log(), power=None)
+    found = identify(robot, [log], IdentificationOptions(method=method, held_out=0.0))
+    assert np.isfinite(found.spread.move_sd)

@@ -34,6 +34,9 @@ PANDA = load_robot("panda")
 WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 # N·m of the bearings and the reading at rest of torque sensors behind the gears
 BEARING, OFFSET = 0.3, 0.4
+# % of the energy of a move, from six moves without noise: the power of four moves tells the
+# friction of the drives, which torques behind the gears do not show
+NOISE_FREE = 5.0
 # kg, of links that weigh more than the robot's own
 HEAVIER = 1.1
 
@@ -218,3 +221,15 @@ def test_measured_energy_is_the_same_from_either_side() -> None:
     assert one > 1.1 * sum(
         each.by_efforts or 0.0 for each in measured(replace(link, torque_side="motor"), arm)
     )
+
+
+def test_torques_behind_the_gears_without_noise_predict_energies() -> None:
+    """The priors alone tell the gains of the sensors from the masses of the links."""
+    robot = load_robot("ur10e")
+    truth = truth_of(robot, 3)
+    silent = recorded(robot, truth, moves=6, seed=3, noise=SILENT)
+    torque = rigid_torques(robot, truth, silent.exact_q, silent.exact_v, silent.a)
+    log = replace(silent.log("torque"), effort=torque, torque_side="link")
+    found = identify(robot, [log]).validation
+    assert found is not None and found.fitted.power is not None
+    assert found.fitted.power.energy_mean < NOISE_FREE
