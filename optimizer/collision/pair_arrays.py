@@ -11,6 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.collision.bodies import COVER_SPHERES, Body, Indices
 
+
 class PairKind(IntEnum):
     """Method that computes the distance of a pair, by the cores of its first and second body."""
 
