@@ -81,7 +81,10 @@ def fit_wrench(
 
 def _weights(measured: Array, residuals: Array, clusters: Clusters) -> Array:
     """Weights (6 n,) of rows and axes by the inverse of the effective variance of their axis."""
-    axes = [each.reshape(-1, WRENCH_AXES).T for each in (measured, residuals)]
+    values, rest = (each.reshape(-1, WRENCH_AXES).T for each in (measured, residuals))
     equal = np.ones(len(clusters.of_row))
-    weight = [1 / effective_variance(*axis, equal, clusters) for axis in zip(*axes, strict=True)]
+    weight = [
+        1 / effective_variance(value, left, equal, clusters)
+        for value, left in zip(values, rest, strict=True)
+    ]
     return np.tile(weight, len(equal))
