@@ -16,7 +16,7 @@ a piece uncovered or exceeds the limits below.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from benchmarks.command import on_one_core, parser, write_json
 from joulepath.models.capsule_cover import LinkCover, not_held, outside, within_neighbours
-from joulepath.models.hull_parts import Mask
+from joulepath.models.hull_parts import Inside, nowhere
 from joulepath.models.meshes import MESH_FILES, SHIFTS, installed, link_surfaces, sampled
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule, LinkHull
@@ -76,7 +76,7 @@ def beyond(
     covers: Sequence[LinkCover],
     meshes: Sequence[Array],
     rng: np.random.Generator,
-    within: Callable[[Array], Mask] = lambda points: np.zeros(len(points), dtype=bool),
+    within: Inside = nowhere,
 ) -> Array:
     """Distances (n,) [m] of the outer surface of covers from meshes of triangles (t, 3, 3) [m],
     except `within` other bodies.

@@ -11,10 +11,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
 from joulepath.models.hull_cover import hull_around
-from joulepath.models.hull_parts import Mask, divided
+from joulepath.models.hull_parts import divided, nowhere
 from joulepath.models.robot import Array
 from joulepath.models.tool_meshes import TOOL_MESHES
 from joulepath.models.tools.registry import tool_figures
@@ -30,13 +28,8 @@ def fitted_hulls(name: str, folder: Path) -> Iterator[Array]:
     reach = radius - meshes.sagitta(folder)
     for part in meshes.parts:
         swept = [each.reshape(-1, 3, 3) for each in meshes.swept(folder, part)]
-        for triangles in divided(swept, radius, _nowhere, part.most):
+        for triangles in divided(swept, radius, nowhere, part.most):
             yield hull_around(triangles.reshape(-1, 3), radius=reach)
-
-
-def _nowhere(points: Array) -> Mask:
-    """No place is out of the reach of obstacles."""
-    return np.zeros(len(points), dtype=bool)
 
 
 def main() -> None:

@@ -10,11 +10,15 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from joulepath.models.meshes import sampled
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
 
-Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 Inside = Callable[[Array], Mask]
 """Whether points (k, 3) [m] lie where no obstacle can be."""
+
+
+def nowhere(points: Array) -> Mask:
+    """No point lies where no obstacle can be."""
+    return np.zeros(len(points), dtype=bool)
 
 
 @dataclass(frozen=True)

@@ -80,10 +80,15 @@ _TURNS = ((0.0, 0.0, np.pi), (0.0, 0.0, np.pi), _ALONG, _ALONG, _UPRIGHT, (0.0, 
 
 def installed(robot: str) -> Path | None:
     """The folder of a robot's meshes in the package `airo-models`; None without the package."""
+    return in_package("arms", robot) if robot in SHIFTS else None
+
+
+def in_package(*names: str) -> Path | None:
+    """A folder in the package `airo-models`, by the names that lead to it; None if missing."""
     package = find_spec("airo_models")
-    if robot not in SHIFTS or package is None or package.origin is None:
+    if package is None or package.origin is None:
         return None
-    folder = Path(package.origin).parent / "arms" / robot
+    folder = Path(package.origin).parent.joinpath(*names)
     return folder if folder.is_dir() else None
 
 

@@ -8,7 +8,6 @@ leaves its chord.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-from joulepath.models.meshes import KINDS, surface
+from joulepath.models.meshes import KINDS, in_package, surface
 from joulepath.models.robot import Array
 
 MILLIMETRES = 1e-3
@@ -229,8 +228,4 @@ TOOL_MESHES = {
 
 def installed_tool(name: str) -> Path | None:
     """The folder of a tool's meshes in the package `airo-models`; None without the package."""
-    package = find_spec("airo_models")
-    if package is None or package.origin is None:
-        return None
-    folder = Path(package.origin).parent / "grippers" / name / "meshes"
-    return folder if folder.is_dir() else None
+    return in_package("grippers", name, "meshes")

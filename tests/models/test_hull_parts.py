@@ -9,10 +9,10 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from joulepath.models.capsule_cover import TURNS, not_held, outside, turned_into
 from joulepath.models.hull_cover import hull_around
-from joulepath.models.hull_parts import PARTS, Mask, below, divided
+from joulepath.models.hull_parts import PARTS, below, divided, nowhere
 from joulepath.models.meshes import sampled
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, LinkHull
+from joulepath.models.robot import Array, LinkHull, Mask
 
 RADIUS = 1.5e-3  # m; of the hulls
 SAMPLED = 1e-3  # m; between points of the surfaces
@@ -26,10 +26,6 @@ def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Ar
 
 BENT = np.concatenate([box((0, 0, 0), (0.05, 0.015, 0.015)), box((0, 0, 0), (0.015, 0.05, 0.015))])
 """Two arms of 5 cm at a right angle."""
-
-
-def nowhere(points: Array) -> Mask:
-    return np.zeros(len(points), dtype=bool)
 
 
 def everywhere(points: Array) -> Mask:
