@@ -24,6 +24,7 @@ from joulepath.optimizer.kinematics.tool_path.least_time import least_time
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.motion.limit_ratios import excess_text
 from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
@@ -58,6 +59,28 @@ class ArmModels(Plant):
     def path(self) -> PathConstraints | None:
         """Path constraints except clearance; None if there are none."""
         return path_constraints_of(self.arm)
+
+
+class ModelsOfArms:
+    """Models of several arms, such as those of a cycle with and without its payload.
+
+    Arms are told apart by identity.
+    """
+
+    def __init__(self) -> None:
+        self._known = list[ArmModels]()
+
+    def of(self, arm: Arm) -> ArmModels:
+        """Models of an arm, shared by all problems of this arm."""
+        for models in self._known:
+            if models.arm is arm:
+                return models
+        self._known.append(ArmModels(arm))
+        return self._known[-1]
+
+    def prepared(self, problem: Problem) -> PreparedProblem:
+        """The problem with the models of its arm."""
+        return PreparedProblem.of(problem, self.of(problem.arm))
 
 
 @dataclass(frozen=True)

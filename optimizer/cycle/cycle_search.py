@@ -21,8 +21,7 @@ from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.prepared_problem import ArmModels, PreparedProblem
-from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.prepared_problem import ModelsOfArms
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.progress import (
@@ -90,11 +89,10 @@ class CycleSearch(LazySearch):
         self._runs: dict[Pair, Run] = {}
         # times of first motions [s]
         self._times = list[float]()
-        # models of every arm
-        self._models: list[ArmModels] = []
+        self._models = ModelsOfArms()
         try:
             with watch(self.end):
-                layers = layers_of(cycle)
+                layers = layers_of(cycle, self._models)
                 check_size(self.moves, layers)
                 legs = [self._leg(move, layers) for move in self.moves]
         except DeadlinePassed:
@@ -126,19 +124,11 @@ class CycleSearch(LazySearch):
     def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
         start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
         problem = problem_of(self.cycle, move, start.q[0], goal.q[0], self.cycle.deadline)
-        prepared = PreparedProblem.of(problem, self._models_of(move.arm))
+        prepared = self._models.prepared(problem)
         dwells = dwell_costs(self.cycle, move, goal)
         if between:
             return PassingLeg.through(prepared, [start, *between, goal], dwells)
         return (Leg.of if move.tool_path is None else Leg.along_path)(prepared, start, goal, dwells)
-
-    def _models_of(self, arm: Arm) -> ArmModels:
-        """Models of an arm, shared by all moves with this arm."""
-        for models in self._models:
-            if models.arm is arm:
-                return models
-        self._models.append(ArmModels(arm))
-        return self._models[-1]
 
     def run(self) -> list[int]:
         """Nodes of the chain of least energy, with all motions in `solutions`.

@@ -21,7 +21,7 @@ from joulepath.optimizer.cycle.layers import arms_at
 from joulepath.optimizer.cycle.path_segments import PathSegment, path_segments
 from joulepath.optimizer.cycle.stop_layers import layers_of_stop
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ModelsOfArms, PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.pose import Pose
@@ -58,9 +58,9 @@ def with_divided_paths(cycle: Cycle) -> Cycle:
     Raises:
         JoulepathError: the errors of `layers_of_stop` for stops with a divisible path.
     """
-    stops, parts_of = list[Stop](), dict[str, list[str]]()
+    stops, parts_of, models = list[Stop](), dict[str, list[str]](), ModelsOfArms()
     for k, stop in enumerate(cycle.stops):
-        parts = _parts(cycle, k) if stop.path is not None and stop.path.split else [stop]
+        parts = _parts(cycle, models, k) if stop.path is not None and stop.path.split else [stop]
         parts_of[stop.name] = [part.name for part in parts]
         stops += parts
     if len(stops) == len(cycle.stops):
@@ -79,17 +79,17 @@ def _order(order: FreeOrder, parts_of: dict[str, list[str]]) -> FreeOrder:
     return FreeOrder(before=before, together=together)
 
 
-def _parts(cycle: Cycle, k: int) -> list[Stop]:
+def _parts(cycle: Cycle, models: ModelsOfArms, k: int) -> list[Stop]:
     """Parts of the path of stop `k`; the stop itself if some configuration follows the whole
     path.
     """
     stop = cycle.stops[k]
     try:
-        layers_of_stop(cycle, k)
+        layers_of_stop(cycle, models, k)
     except PathInfeasible as error:
         if error.path != f"stops/{stop.name}":
             raise
-        places = _places(cycle, stop)
+        places = _places(cycle, models, stop)
         if places is None:
             raise PathInfeasible(error.length, error.attempts, error.path, in_parts=True) from None
         return _divided(stop, places)
@@ -117,7 +117,7 @@ def _divided(stop: Stop, places: Sequence[float]) -> list[Stop]:
     return parts
 
 
-def _places(cycle: Cycle, stop: Stop) -> list[float] | None:
+def _places(cycle: Cycle, models: ModelsOfArms, stop: Stop) -> list[float] | None:
     """Fractions at which the path of a stop is divided; None if it cannot be followed in parts
     either.
     """
@@ -132,10 +132,10 @@ def _places(cycle: Cycle, stop: Stop) -> list[float] | None:
     rests = [
         Problem(arm=each, start=stop.target, goal=stop.target) for each in arms_at(cycle, stop.name)
     ]
-    free = PreparedProblem.of(Problem(arm=cycle.arm, start=stop.target, goal=stop.target))
+    free = models.prepared(Problem(arm=cycle.arm, start=stop.target, goal=stop.target))
     return _cheapest_division(
         segments,
-        *_reconfiguration_bounds(free, [PreparedProblem.of(each) for each in rests], segments),
+        *_reconfiguration_bounds(free, [models.prepared(each) for each in rests], segments),
     )
 
 

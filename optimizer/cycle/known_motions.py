@@ -12,11 +12,13 @@ from collections.abc import Set as AnySet
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields, is_dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
 
+from joulepath.models.robot import MOST_ROBOTS, Robot
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
@@ -119,6 +121,20 @@ def _digest(value: Any) -> bytes:
     return digest.digest()
 
 
+@lru_cache(MOST_ROBOTS)
+def _digest_of_robot(robot: Robot) -> bytes:
+    return hashlib.sha256(b"".join(_content_of_fields(robot))).digest()
+
+
+def _content_of_fields(value: Any) -> Iterator[bytes]:
+    """Bytes of a dataclass."""
+    yield type(value).__qualname__.encode() + b"{"
+    for each in fields(value):
+        yield each.name.encode() + b"="
+        yield from _content(getattr(value, each.name))
+    yield b"}"
+
+
 def _content(value: Any) -> Iterator[bytes]:
     """Bytes of everything a value consists of; equal for equal questions only."""
     match value:
@@ -134,12 +150,11 @@ def _content(value: Any) -> Iterator[bytes]:
             )
         case pin.Model():
             yield value.saveToString().encode()
+        case Robot():
+            # the figures of a robot are by far the most of an arm, and many arms share them
+            yield _digest_of_robot(value)
         case _ if is_dataclass(value):
-            yield type(value).__qualname__.encode() + b"{"
-            for each in fields(value):
-                yield each.name.encode() + b"="
-                yield from _content(getattr(value, each.name))
-            yield b"}"
+            yield from _content_of_fields(value)
         case Mapping():
             yield b"{"
             for name in sorted(value, key=repr):

@@ -15,7 +15,7 @@ from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.reach import POSE_FREEDOMS
 from joulepath.optimizer.kinematics.tcp import T_last_tcp
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ModelsOfArms
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -77,6 +77,7 @@ class Layer:
 
 def layer_of(
     cycle: Cycle,
+    models: ModelsOfArms,
     place: str,
     field: str,
     target: Target,
@@ -87,6 +88,7 @@ def layer_of(
 
     Args:
         cycle: the cycle.
+        models: models of its arms.
         place: name of the place.
         field: field of the request, for errors.
         target: target at the place.
@@ -102,9 +104,9 @@ def layer_of(
         Problem(arm=arm, start=target, goal=target, branch=branch) for arm in arms_at(cycle, place)
     ]
     problem = problems[0]
-    found, _ = ends_of(PreparedProblem.of(problem), name, problem.goal)
+    found, _ = ends_of(models.prepared(problem), name, problem.goal)
     q = np.array([end.q for end in found])
-    causes_of_arms = [check_configurations(PreparedProblem.of(each), q) for each in problems]
+    causes_of_arms = [check_configurations(models.prepared(each), q) for each in problems]
     either = [
         next((cause for cause in causes if cause is not None), None)
         for causes in zip(*causes_of_arms, strict=True)

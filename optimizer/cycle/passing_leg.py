@@ -187,7 +187,7 @@ class PassingLeg(Leg):
             goal=self.goal.q[g],
             passes=self.passes(s, g),
         )
-        return PreparedProblem.of(problem)
+        return PreparedProblem.of(problem, self.prepared.models)
 
 
 def _travel_bounds(

@@ -88,14 +88,13 @@ def _bound_of_free_poses(leg: Leg, enough: float, deadline: Deadline) -> float:
     axis.
     """
     problem, start, goal = leg.prepared.freed(), leg.start, leg.goal
+    prepared = PreparedProblem.of(problem, leg.prepared.models)
     if start.free_pose is not None and goal.free_pose is not None:
-        return bound_between_free_ends(
-            PreparedProblem.of(problem), start.free_pose, goal.free_pose, deadline, enough
-        )
+        return bound_between_free_ends(prepared, start.free_pose, goal.free_pose, deadline, enough)
     if goal.free_pose is not None:
         q = np.array([end.q for end in start.ends])
         limits = SearchLimits(deadline=deadline, enough=enough)
-        return family_bound(PreparedProblem.of(problem), goal.free_pose, q, limits)
+        return family_bound(prepared, goal.free_pose, q, limits)
     assert start.free_pose is not None
     back = PreparedProblem.of(reversed_problem(problem, problem.goal, problem.start))
     q = np.array([end.q for end in goal.ends])

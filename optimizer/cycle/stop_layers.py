@@ -21,7 +21,7 @@ from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientat
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.kinematics.tool_path.course_tracing import Trace, traces_of_each
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.prepared_problem import ModelsOfArms
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.line import Line
@@ -86,21 +86,32 @@ class _PrescribedPath:
         return ToolCourse.of(ToolPath(), T, T_end)
 
 
-def layers_of(cycle: Cycle) -> dict[str, Layer]:
+def layers_of(cycle: Cycle, models: ModelsOfArms | None = None) -> dict[str, Layer]:
     """Layers of all places of a cycle, by their names in order.
+
+    Args:
+        cycle: the cycle.
+        models: models of its arms, to be shared; None for new ones.
 
     Raises:
         PathInfeasible: no configuration follows a path.
         JoulepathError: the errors of `layer_of`.
     """
-    layers = {START: layer_of(cycle, START, "start", cycle.start, cycle.branch, cycle.windings)}
+    models = ModelsOfArms() if models is None else models
+    at_start = cycle.start, cycle.branch, cycle.windings
+    layers = {START: layer_of(cycle, models, START, "start", *at_start)}
     for k, stop in enumerate(cycle.stops):
-        layers |= zip(stop.places, layers_of_stop(cycle, k), strict=True)
+        layers |= zip(stop.places, layers_of_stop(cycle, models, k), strict=True)
     return layers
 
 
-def layers_of_stop(cycle: Cycle, k: int) -> list[Layer]:
-    """Layers of the places of stop `k` in order.
+def layers_of_stop(cycle: Cycle, models: ModelsOfArms, k: int) -> list[Layer]:
+    """Layers of the places of a stop in order.
+
+    Args:
+        cycle: the cycle.
+        models: models of its arms.
+        k: number of the stop.
 
     Raises:
         PathInfeasible: no configuration follows a path.
@@ -110,7 +121,8 @@ def layers_of_stop(cycle: Cycle, k: int) -> list[Layer]:
     stop = cycle.stops[k]
     # joints may move far along a path, so all full turns count until the path has been followed
     windings = cycle.windings or stop.path is not None
-    at = layer_of(cycle, stop.entry, f"stops.{k}.target", stop.target, stop.branch, windings)
+    asked = stop.entry, f"stops.{k}.target", stop.target, stop.branch, windings
+    at = layer_of(cycle, models, *asked)
     layers, kept = {stop.entry: at}, np.ones(len(at.q), dtype=bool)
     for path in _prescribed_paths(stop):
         origin = layers[path.origin]
@@ -119,7 +131,8 @@ def layers_of_stop(cycle: Cycle, k: int) -> list[Layer]:
         except InvalidProblem as error:
             raise at_stop(k, error) from None
         layers[path.end] = _layer_at_end(cycle, origin, path.end, found)
-        follows, blocked = _nodes_that_follow(cycle, stop, origin, layers[path.end], found)
+        blocked = _blocked_ends(cycle, models, stop, layers[path.end])
+        follows = _nodes_that_follow(cycle, origin, found, blocked)
         if not (kept & follows).any():
             attempts = _attempts(cycle, origin, found, blocked, follows)
             raise PathInfeasible(length, attempts, layers[path.end].name)
@@ -250,12 +263,21 @@ def _layer_at_end(cycle: Cycle, origin: Layer, place: str, found: list[Trace]) -
     )
 
 
-def _nodes_that_follow(
-    cycle: Cycle, stop: Stop, origin: Layer, end: Layer, found: list[Trace]
-) -> tuple[Mask, Mask]:
-    """Nodes (n,) from which the whole path is followed, and ends (e,) that are infeasible at its
-    end.
-    """
+def _blocked_ends(cycle: Cycle, models: ModelsOfArms, stop: Stop, end: Layer) -> Mask:
+    """Configurations (e,) at the end of a path that are infeasible with some arm there."""
+    problems = [
+        Problem(arm=arm, start=stop.target, goal=stop.target)
+        for arm in arms_at(cycle, end.name.removeprefix("stops/"))
+    ]
+    q = np.array([each.q for each in end.ends])
+    causes_of_arms = [check_configurations(models.prepared(problem), q) for problem in problems]
+    return np.array(
+        [any(cause is not None for cause in causes) for causes in zip(*causes_of_arms, strict=True)]
+    )
+
+
+def _nodes_that_follow(cycle: Cycle, origin: Layer, found: list[Trace], blocked: Mask) -> Mask:
+    """Nodes (n,) from which the whole path is followed to an end that is not blocked."""
     limits = cycle.arm.active_limits
     reach = np.array(
         [
@@ -265,17 +287,8 @@ def _nodes_that_follow(
     )
     low, high = origin.q + reach[origin.end, 0], origin.q + reach[origin.end, 1]
     inside = ((low >= limits.q_min) & (high <= limits.q_max)).all(axis=1)
-    problems = [
-        Problem(arm=arm, start=stop.target, goal=stop.target)
-        for arm in arms_at(cycle, end.name.removeprefix("stops/"))
-    ]
-    q = np.array([each.q for each in end.ends])
-    causes_of_arms = [check_configurations(PreparedProblem.of(problem), q) for problem in problems]
-    blocked = np.array(
-        [any(cause is not None for cause in causes) for causes in zip(*causes_of_arms, strict=True)]
-    )
     whole = np.array([trace.obstacle is None for trace in found])
-    return inside & (whole & ~blocked)[origin.end], blocked
+    return np.asarray(inside & (whole & ~blocked)[origin.end])
 
 
 def _attempts(

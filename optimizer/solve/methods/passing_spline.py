@@ -167,7 +167,7 @@ class PassingSpline(SqpMethod):
         interval = replace(self.interval, t_min=DURATIONS.least, t_max=DURATIONS.longest)
         results = list[SolveResult]()
         for a, b in pairwise(self._configurations):
-            part = PreparedProblem.of(replace(problem, start=a, goal=b))
+            part = PreparedProblem.of(replace(problem, start=a, goal=b), self.prepared.models)
             results.append(FreeSpline(SolveContext(part, a, b, self.deadline, interval)).solve())
             if results[-1].spline is None:
                 break
