@@ -14,6 +14,7 @@ from scipy import sparse
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY
+from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.pseudo_inertia import BASIS
 
 # entries of a symmetric matrix in Clarabel's order, and their factors
@@ -30,6 +31,9 @@ class ConsistentSettings:
     min_eigenvalue: float = 1e-9
     """Smallest eigenvalue of a pseudo-inertia, so that no body is without mass or extent
     [kg, kg·m²]."""
+    max_step_fraction: float = 0.95
+    """Largest step over that to the boundary of the cone [1]. Longer steps, such as the solver's
+    own 0.99, may end beside the boundary, far from the solution."""
 
 
 CONSISTENT = ConsistentSettings()
@@ -48,7 +52,7 @@ def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> A
         The minimiser x (p,).
 
     Raises:
-        ArithmeticError: the solver fails, as it does if `gram` is not positive definite.
+        InvalidProblem: the solver fails, as it does if `gram` is not positive definite.
     """
     p = len(moment)
     scale = 1 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
@@ -62,6 +66,7 @@ def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> A
     )
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.max_step_fraction = CONSISTENT.max_step_fraction
     smallest = CONSISTENT.min_eigenvalue * np.eye(4)[_ENTRIES]
     solution = clarabel.DefaultSolver(
         sparse.csc_matrix(np.triu(scaled)),
@@ -73,5 +78,9 @@ def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> A
     ).solve()
     solved = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
     if solution.status not in solved:
-        raise ArithmeticError(f"The semidefinite program ended with {solution.status}.")
+        raise InvalidProblem(
+            "inertials",
+            f"These logs tell no consistent links, as the solver ended with {solution.status}: "
+            "keep the inertials, or log more motions.",
+        )
     return np.asarray(solution.x) * scale
