@@ -33,6 +33,9 @@ class RankSettings:
     eigenvalue_tolerance: float = 1e-9
     """Eigenvalue of the normal matrix of columns of unit length, up to which a combination of
     columns counts as zero [1]."""
+    least_part: float = 1e-3
+    """Smallest part of a column in such a combination, at which the rows do not determine the
+    column's unknown [1]."""
 
 
 RANK = RankSettings()
@@ -114,7 +117,14 @@ def solve_bounded(gram: Array, moment: Array, lower: Array, rank: RankSettings =
 def leave_one_out(
     grouped: GroupedEquations, found: Array, free: Mask, prior: Array | None = None
 ) -> Array:
-    """Estimates without one group at a time.
+    """Estimates (G, p) without one group at a time; arguments as of `left_out`."""
+    return left_out(grouped, found, free, prior)[0]
+
+
+def left_out(
+    grouped: GroupedEquations, found: Array, free: Mask, prior: Array | None = None
+) -> tuple[Array, Mask]:
+    """Estimates without one group at a time, and whose spread they do not tell.
 
     Args:
         grouped: normal equations of the G groups.
@@ -123,10 +133,10 @@ def leave_one_out(
         prior: precision (p, p) of a Gaussian prior around the estimate's prior mean.
 
     Returns:
-        Estimates (G, p).
+        Estimates (G, p), and the parameters (p,) that the rows without some group do not determine.
     """
     total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
-    estimates = np.tile(found, (len(grouped.gram), 1))
+    estimates, unknown = np.tile(found, (len(grouped.gram), 1)), np.zeros(len(found), dtype=bool)
     at = np.flatnonzero(free)
     # a prior leaves no column zero
     of_free = total[np.ix_(at, at)]
@@ -135,11 +145,14 @@ def leave_one_out(
         rest = (total - gram)[np.ix_(at, at)] / np.outer(scale, scale)
         pull = (gram @ found - moment)[at] / scale
         if prior is None:
-            step = np.linalg.pinv(rest, rcond=RANK.eigenvalue_tolerance, hermitian=True) @ pull
+            values, vectors = np.linalg.eigh(rest)
+            zero = values <= RANK.eigenvalue_tolerance * values.max(initial=0.0)
+            step = vectors @ (vectors.T @ pull / np.where(zero, np.inf, values))
+            unknown[at] |= np.linalg.norm(vectors[:, zero], axis=1) > RANK.least_part
         else:
             step = np.linalg.solve(rest, pull)
         estimates[k, at] += step / scale
-    return estimates
+    return estimates, unknown
 
 
 def residual_replicates(grouped: GroupedEquations, found: Array, free: Mask, prior: Array) -> Array:

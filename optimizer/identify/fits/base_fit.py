@@ -6,6 +6,7 @@ and rotors that determine the torques (Gautier 1991), beside the terms of fricti
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,13 +24,19 @@ from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations, ow
 from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
 from joulepath.optimizer.identify.fits.determined import (
     DETERMINED,
+    IMPOSSIBLE,
+    impossible,
     reason_of,
     remarks_of,
     unbounded,
     with_reasons,
 )
 from joulepath.optimizer.identify.fits.own_ranges import own_deviations
-from joulepath.optimizer.identify.fits.torque_fit import by_held_values, held_deviations
+from joulepath.optimizer.identify.fits.torque_fit import (
+    by_held_values,
+    held_deviations,
+    not_moving,
+)
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression, whole_arm_regression
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
@@ -138,11 +145,13 @@ class BaseTerms:
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = np.where(value != 0, sd / np.abs(value), np.inf)
         doubted = judged & (relative > DETERMINED.max_relative_sd)
-        reasons = [
-            reason_of(float(value[k]), float(sd[k])) if doubted[k] else ""
-            for k in range(len(value))
-        ]
-        remarks = remarks_of(reasons, lifted, sd, self.own, self.own_sd)
+        reasons = [""] * len(value)
+        for k in np.flatnonzero(judged).tolist():
+            if impossible(self.names[k], float(value[k])):
+                doubted[k], relative[k], reasons[k] = True, np.inf, IMPOSSIBLE.format(value[k])
+            elif doubted[k]:
+                reasons[k] = reason_of(float(value[k]), float(sd[k]))
+        remarks = remarks_of(self.names, reasons, lifted, sd, self.own, self.own_sd)
         left = np.flatnonzero(doubted & (np.array(remarks) == ""))
         worst = int(left[np.argmax(relative[left])]) if len(left) else None
         return Doubts(tuple(reasons), tuple(remarks), worst)
@@ -204,11 +213,15 @@ def _fit(
         value = solve_bounded(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), lower)
         residuals = arm.values - block.kept_torque(()) - columns @ value
         weight = inverse_variance_weights(block.joint, residuals, options.estimator == "irls")
-    return _hold_undetermined(terms, block, equations, options)
+    return _hold_undetermined(terms, block, equations, options, not_moving(block))
 
 
 def _hold_undetermined(
-    terms: BaseTerms, block: JointBlock, equations: LawEquations, options: IdentificationOptions
+    terms: BaseTerms,
+    block: JointBlock,
+    equations: LawEquations,
+    options: IdentificationOptions,
+    held: Mapping[Name, str],
 ) -> Estimate:
     """Solve for the unknowns, and hold those that the rows do not determine.
 
@@ -217,9 +230,11 @@ def _hold_undetermined(
         block: the terms of the joints.
         equations: normal equations.
         options: the method.
+        held: terms that no torques determine, with the reason.
     """
     own, lower = terms.own, terms.lower
-    free, reasons = np.ones(len(own), dtype=bool), [""] * len(own)
+    reasons = [held.get(name, "") for name in terms.names]
+    free = np.array([not reason for reason in reasons])
     judged = terms.of_joints | (options.method == "essential_parameters")
     while True:
         grouped = equations.keeping(block.keeps(terms.names_of(~free)))
@@ -229,9 +244,10 @@ def _hold_undetermined(
         inside = (value > lower)[free]
         gradient = gram @ value[free] - moment
         solution = unbounded(part, value[free], inside, ~inside, gradient)
-        lifted, sd = own.copy(), np.zeros(len(own))
+        lifted, sd, unknown = own.copy(), np.zeros(len(own)), np.zeros(len(own), dtype=bool)
         lifted[free], sd[free] = solution.value, solution.sd
-        doubts = terms.doubts(value, lifted, sd, free & judged)
+        unknown[free] = solution.unknown
+        doubts = terms.doubts(value, lifted, sd, free & (judged | unknown))
         if doubts.worst is None:
             break
         free[doubts.worst], reasons[doubts.worst] = False, doubts.reasons[doubts.worst]

@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.models.robot import Array, Mask
-from joulepath.optimizer.identify.estimates.estimate import Estimate
+from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
 from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
     column_lengths,
     jackknife,
-    leave_one_out,
+    left_out,
 )
+from joulepath.optimizer.identify.fits.block import SCALE
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,11 @@ class DeterminedSettings:
     max_sd_ratio: float = 0.7
     """Largest standard deviation of a figure over that before the logs, at which the logs tell
     something of it [1]: half of the variance."""
+    least_scale: float = 0.2
+    """Smallest factor on the rigid torque that is a torque constant's [1]; the own constants are
+    right within some ten per cent."""
+    most_load: float = 0.999
+    """Largest load friction [1], with which an arm still moves."""
     rejecting_sds: float = 4.0
     """Distance of a rejected own value from the estimate, in standard deviations [1]."""
 
@@ -37,6 +43,8 @@ class DeterminedSettings:
 DETERMINED = DeterminedSettings()
 NOT_MOVING = "The joint hardly moves in these logs."
 UNCERTAIN = "Its standard deviation is {:.0%} of its value."
+NOT_TOLD = "The logs do not tell it from other figures."
+IMPOSSIBLE = "The fit puts it at {:.3g}, which no drive has."
 LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
 AT_BOUND = "The fit puts it at its bound, {:g}."
 REJECTED = (
@@ -54,6 +62,8 @@ def reason_of(value: float, sd: float) -> str:
     """Reason for not counting a figure as identified; empty if it is."""
     if value == 0 or sd == 0:
         return AT_BOUND.format(value)
+    if not np.isfinite(sd):
+        return NOT_TOLD
     relative = sd / abs(value)
     return "" if relative <= DETERMINED.max_relative_sd else UNCERTAIN.format(relative)
 
@@ -74,11 +84,13 @@ class Unbounded:
     """Values (p,): the own bound of an unknown is lifted, and all other bounds hold."""
     replicates: Array
     """Values (G, p) without one group each, around the bounded values."""
+    unknown: Mask
+    """Unknowns (p,) that the logs without some group do not determine."""
 
     @property
     def sd(self) -> Array:
-        """Standard deviations (p,)."""
-        return np.asarray(np.sqrt(np.diag(jackknife(self.replicates))))
+        """Standard deviations (p,), infinite if the spread of the replicates does not tell them."""
+        return np.where(self.unknown, np.inf, np.sqrt(np.diag(jackknife(self.replicates))))
 
 
 def unbounded(
@@ -99,7 +111,7 @@ def unbounded(
         gradient: gradient (p,) of the sum of squares at the solution.
         prior: precision (p, p) of a prior.
     """
-    lifted, replicates = value.copy(), leave_one_out(grouped, value, inside, prior)
+    lifted, (replicates, unknown) = value.copy(), left_out(grouped, value, inside, prior)
     total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
     for k in np.flatnonzero(bounded):
         free = inside.copy()
@@ -112,8 +124,16 @@ def unbounded(
         moved = value.copy()
         moved[at] += step
         lifted[k] = moved[k]
-        replicates[:, k] = value[k] + leave_one_out(grouped, moved, free, prior)[:, k] - moved[k]
-    return Unbounded(lifted, replicates)
+        without, not_told = left_out(grouped, moved, free, prior)
+        replicates[:, k], unknown[k] = value[k] + without[:, k] - moved[k], not_told[k]
+    return Unbounded(lifted, replicates, unknown)
+
+
+def impossible(name: Name, value: float) -> bool:
+    """Whether no drive has such a factor on its torque, or such load friction."""
+    if name[0] == SCALE:
+        return value < DETERMINED.least_scale
+    return name[0] == "load" and value > DETERMINED.most_load
 
 
 def rejections(value: Array, sd: Array, own: Array) -> Array:
@@ -124,11 +144,17 @@ def rejections(value: Array, sd: Array, own: Array) -> Array:
 
 
 def remarks_of(
-    reasons: Sequence[str], value: Array, sd: Array, own: Array, own_sd: Array
+    names: Sequence[Name],
+    reasons: Sequence[str],
+    value: Array,
+    sd: Array,
+    own: Array,
+    own_sd: Array,
 ) -> list[str]:
     """Why the robot's own values of doubted terms are not kept; empty for all other terms.
 
     Args:
+        names: names (p,) of the terms; an impossible estimate replaces nothing.
         reasons: reasons (p,) for a doubt, or empty.
         value: estimates (p,) without bounds; those beyond a bound, 0, are no source.
         sd: standard deviations (p,) of the estimates.
@@ -139,6 +165,8 @@ def remarks_of(
     better = (value > 0) & (sd <= DETERMINED.max_sd_ratio * own_sd) & (own_sd > 0)
     remarks = [""] * len(reasons)
     for k, reason in enumerate(reasons):
+        if impossible(names[k], float(value[k])):
+            continue
         if reason and rejected[k]:
             remarks[k] = REJECTED.format(reason, own[k], rejected[k])
         elif reason and better[k]:

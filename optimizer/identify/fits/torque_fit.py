@@ -31,9 +31,12 @@ from joulepath.optimizer.identify.fits.curve_speed import (
 from joulepath.optimizer.identify.fits.determined import (
     AT_BOUND,
     DETERMINED,
+    IMPOSSIBLE,
     LAW_KEPT,
     NOT_MOVING,
     UNCERTAIN,
+    impossible,
+    reason_of,
     rejections,
     remarks_of,
     unbounded,
@@ -211,14 +214,21 @@ def held_deviations(block: JointBlock, names: Sequence[Name], held: Container[Na
     return np.array([known[name] if name in held else 0.0 for name in names])
 
 
+def not_moving(block: JointBlock) -> dict[Name, str]:
+    """Terms with hardly any rows, as their joints hardly move, with the reason."""
+    moved = np.count_nonzero(block.columns, axis=0).tolist()
+    return {
+        name: NOT_MOVING
+        for name, rows in zip(block.names, moved, strict=True)
+        if rows < TORQUE_FIT.min_rows
+    }
+
+
 def undetermined(robot: Robot, block: JointBlock) -> dict[Name, str]:
     """Terms that the rows cannot determine, for any torques, with the reason."""
-    held = dict[Name, str]()
-    for k, name in enumerate(block.names):
-        moved = np.count_nonzero(block.columns[:, k])
-        if moved < TORQUE_FIT.min_rows:
-            held[name] = NOT_MOVING
-        elif name[0] == "load" and name[1] is not None:
+    held = not_moving(block)
+    for name in block.names:
+        if name[0] == "load" and name[1] is not None and name not in held:
             spread, limit = block.spread[name[1]], float(robot.limits.tau_max[name[1]])
             if spread < TORQUE_FIT.min_load_spread * limit:
                 held[name] = (
@@ -249,13 +259,15 @@ def doubts_of(
         size = relative / (TORQUE_FIT.max_scale_sd if term == SCALE else DETERMINED.max_relative_sd)
         if name in held or term in block.nuisances:
             found[name] = Doubt("", 0.0)
+        elif impossible(name, float(value[k])):
+            found[name] = Doubt(IMPOSSIBLE.format(value[k]), np.inf)
         elif term == "load" and not value[k] >= TORQUE_FIT.min_load_sds * sd[k] > 0:
             found[name] = Doubt(LITTLE_LOAD.format(TORQUE_FIT.min_load_sds), np.inf)
         elif size <= 1:
             found[name] = Doubt("", 0.0)
         else:
-            reason = UNCERTAIN.format(relative) if np.isfinite(relative) else AT_BOUND.format(0.0)
-            found[name] = Doubt(reason, size)
+            reason = reason_of(float(value[k]), float(sd[k])) if inside else AT_BOUND.format(0.0)
+            found[name] = Doubt(reason or UNCERTAIN.format(relative), size)
     return found
 
 
@@ -273,7 +285,8 @@ def remarks_on(
     own, own_sd = (
         np.array([known[name] for name in block.names]) for known in (block.own, block.own_sd)
     )
-    found = remarks_of([doubts[name].reason for name in block.names], value, sd, own, own_sd)
+    reasons = [doubts[name].reason for name in block.names]
+    found = remarks_of(block.names, reasons, value, sd, own, own_sd)
     return dict(zip(block.names, found, strict=True))
 
 

@@ -41,12 +41,15 @@ class Clusters:
 
 
 def clusters_of(rows: Rows, settings: ClusterSettings = CLUSTERS) -> Clusters:
-    """Partition rows into motions; with few motions into moves, with few moves into slices."""
+    """Partition rows into motions; with few motions into moves, with few moves into slices, of
+    which there are at least two."""
     unit = rows.group
     if len(rows.groups) < settings.min_count:
         unit = rows.move
         if len(np.unique(rows.move[~rows.rest])) < settings.min_count:
-            unit = np.floor(np.cumsum(rows.weight) / settings.slice_duration).astype(np.int64)
+            middle = np.cumsum(rows.weight) - rows.weight / 2
+            duration = min(settings.slice_duration, float(rows.weight.sum()) / 2)
+            unit = np.floor(middle / duration).astype(np.int64)
     number = np.unique(unit, return_inverse=True)[1]
     count = int(number.max()) + 1
     if count > settings.max_count:
