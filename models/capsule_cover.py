@@ -1,10 +1,9 @@
-"""Proof that capsules and hulls cover surfaces: every point of every triangle, not only the
-corners.
+"""Proof of the cover of surfaces by capsules and hulls, for every point of every triangle.
 
-Capsules and grown hulls are convex, so one of them contains a triangle if and only if it contains
-the three corners. A triangle that none contains is bisected at its longest edge until every piece
-lies in one of them. This proves the cover for every point of the surface, without sampling. A
-corner of a piece outside all of them is an uncovered point.
+Capsules and grown hulls are convex: such a body contains a triangle if and only if it contains the
+three corners. An uncontained triangle is bisected at its longest edge until every piece lies in a
+single body. The proof holds for every point of the surface, without sampling. A corner outside all
+bodies is an uncovered point.
 """
 
 from __future__ import annotations
@@ -42,8 +41,16 @@ def outside(points: Array, covers: Sequence[LinkCover]) -> Array:
 
 
 def turned_into(robot: Robot, link: int, other: int, points: Array) -> list[Array]:
-    """Points (k, 3) [m] of the frame of a link in that of the next or the previous link, at each of
-    TURNS angles of the joint between them.
+    """Transform points from the frame of a link to the frame of the next or previous link.
+
+    Args:
+        robot: the robot.
+        link: number of the link of the points.
+        other: `link + 1` or `link - 1`.
+        points: points in the frame of `link`, shape (k, 3) [m].
+
+    Returns:
+        Points in the frame of `other`, shape (k, 3) [m], for TURNS angles of the joint in between.
     """
     found, joint = list[Array](), robot.model.jointPlacements[max(link, other)]
     for angle in 2 * np.pi * np.arange(TURNS) / TURNS:
@@ -54,8 +61,18 @@ def turned_into(robot: Robot, link: int, other: int, points: Array) -> list[Arra
 
 
 def within_neighbours(robot: Robot, link: int, covers: Sequence[LinkCover], points: Array) -> Mask:
-    """Whether points (k, 3) [m] of the frame of a link are within the covers of the next or the
-    previous moving link at TURNS angles of the joint between them, where no obstacle can be.
+    """Whether points are within the covers of an adjacent link at all TURNS angles of the joint.
+
+    No obstacle can be at such a point.
+
+    Args:
+        robot: the robot.
+        link: number of the link of the points.
+        covers: capsules and hulls of all links.
+        points: points in the frame of `link`, shape (k, 3) [m].
+
+    Returns:
+        Mask of the points, shape (k,).
     """
     found = np.zeros(len(points), dtype=bool)
     for other in (link - 1, link + 1):
@@ -68,11 +85,16 @@ def within_neighbours(robot: Robot, link: int, covers: Sequence[LinkCover], poin
 
 
 def not_held(triangles: Array, covers: Sequence[LinkCover]) -> Array:
-    """Uncovered pieces (k, 3, 3 m) [m] of triangles (t, 3, 3 m) [m] in the frame of capsules and
-    hulls; m is the number of places of a moving triangle, which one cover must contain.
+    """Find uncovered pieces of triangles by bisection.
 
-    The result is empty if the cover is proven. Otherwise every piece has a corner outside all of
-    them, or a longest edge below SMALLEST.
+    Args:
+        triangles: triangles in the frame of the covers, shape (t, 3, 3 m) [m]. A moving triangle
+            has m places, and a single cover must contain all of them.
+        covers: capsules and hulls.
+
+    Returns:
+        Uncovered pieces, shape (k, 3, 3 m) [m]; empty if the cover is proven. Every piece has a
+        corner outside all covers, or its longest edge is below SMALLEST.
     """
     found, pieces = [triangles[:0]], triangles
     while len(pieces):

@@ -1,8 +1,8 @@
-"""Fit hulls to a tool: `python -m joulepath.models.fit_tool_hulls TOOL MESHES` prints rows for the
-figure `hulls` of the tool, which has a `hull_radius` already.
+"""Fit hulls to a tool: `python -m joulepath.models.fit_tool_hulls TOOL MESHES`.
 
-MESHES is a folder as in `joulepath.models.tool_meshes`. The hulls hold the parts of the tool at
-every opening.
+The command prints rows for the figure `hulls` of the tool. The tool already needs the figure
+`hull_radius`. MESHES is a folder as in `joulepath.models.tool_meshes`. The hulls contain the parts
+of the tool at every opening.
 """
 
 from __future__ import annotations
@@ -19,10 +19,18 @@ from joulepath.models.tools.registry import tool_figures
 
 
 def fitted_hulls(name: str, folder: Path) -> Iterator[Array]:
-    """Points (n, 3) [m] of each hull in the flange frame, to be grown by the `hull_radius`.
+    """Fit hulls to the parts of a tool at all sampled openings.
 
-    A convex body that holds a corner at two openings, grown by the sagitta, holds its way from one
-    to the other: the hulls are fitted with a radius that is less by that.
+    A corner of a part moves on an arc between two sampled openings. The arc deviates from its chord
+    by at most the sagitta, so a convex body around both ends, grown by the sagitta, contains the
+    arc. The hulls are therefore fitted with the `hull_radius` less the sagitta.
+
+    Args:
+        name: name of the tool.
+        folder: folder of the meshes.
+
+    Yields:
+        Points of a hull in the flange frame, shape (n, 3) [m], to be grown by the `hull_radius`.
     """
     meshes, radius = TOOL_MESHES[name], float(tool_figures(name)["hull_radius"]["value"])
     reach = radius - meshes.sagitta(folder)

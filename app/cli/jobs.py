@@ -35,9 +35,9 @@ Examples:
 @SERVICE
 @click.pass_context
 def jobs(context: click.Context, url: str, key: str | None) -> None:
-    """Lists the jobs of a service; sends, shows and ends them.
+    """Lists the jobs of a service; sends, shows, cancels, retries and deletes jobs.
 
-    These commands need a service that runs, and the extra `client` of the package.
+    These commands need a running service, and the extra `client` of the package.
     """
     connect(context, url, key)
     if context.invoked_subcommand is None:
@@ -112,7 +112,7 @@ Example:
 )
 @click.pass_obj
 def results(client: Client, id: str, output: Path | None, wanted: Literal["jsonl", "csv"]) -> None:
-    """Writes what the requests of the job ID have come to."""
+    """Writes the outcomes of the requests of the job ID."""
     with answered():
         content = (
             client.job_table(id).encode()
@@ -123,7 +123,7 @@ def results(client: Client, id: str, output: Path | None, wanted: Literal["jsonl
 
 
 def _changing(name: str, words: str) -> Callable[[Client, str], None]:
-    """A command that changes a job and writes what it is then."""
+    """Define a command to change a job and write its new state."""
 
     @_ID
     @click.pass_obj
@@ -157,7 +157,7 @@ def delete(client: Client, id: str) -> None:
 
 
 def _waited(client: Client, id: str) -> int:
-    """The exit code of a job that has ended; its progress on a terminal."""
+    """Wait for the end of a job, with its progress on a terminal; returns the exit code."""
     from joulepath.app.cli.terminal import fraction
 
     with answered(), fraction("Waiting for the job") as tell:

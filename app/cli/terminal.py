@@ -10,7 +10,7 @@ from typing import Any
 
 @contextmanager
 def progress(description: str) -> Iterator[None]:
-    """Shows a spinner with the elapsed time while the body runs, if standard error is a
+    """Show a spinner with the elapsed time while the body runs, if standard error is a
     terminal."""
     if not sys.stderr.isatty():
         yield
@@ -28,9 +28,14 @@ def progress(description: str) -> Iterator[None]:
 
 @contextmanager
 def steps(title: str) -> Iterator[None]:
-    """Shows a bar with the events or steps of the task in the body, if standard error is a
-    terminal."""
-    # imported late: `joulepath --help` needs none of them
+    """Show a progress bar while the body runs a task, if standard error is a terminal.
+
+    The events of the task move the bar.
+
+    Args:
+        title: text before the bar.
+    """
+    # imported late to keep `joulepath --help` fast
     from joulepath.app.engine.listening import listening
     from joulepath.optimizer.presentation.progress_bar import progress_bar
 
@@ -40,9 +45,10 @@ def steps(title: str) -> Iterator[None]:
 
 @contextmanager
 def fraction(description: str) -> Iterator[Callable[[float], object]]:
-    """Shows a bar while the body runs, if standard error is a terminal.
+    """Show a bar while the body runs, if standard error is a terminal.
 
-    Yields a function that takes the share that is done.
+    Yields:
+        A function to call with the completed share, from 0 to 1.
     """
     if not sys.stderr.isatty():
         yield lambda share: None
@@ -57,7 +63,15 @@ def fraction(description: str) -> Iterator[Callable[[float], object]]:
 
 
 def problem(document: dict[str, Any], remedy: str) -> str:
-    """A problem document in words, with each field that is wrong and what to do."""
+    """Format a problem document as text.
+
+    Args:
+        document: the problem document (RFC 9457).
+        remedy: advice for the last line; may be empty.
+
+    Returns:
+        Title and detail, one line per wrong field, and the remedy.
+    """
     from joulepath.app.client.errors import wrong_fields
 
     lines = [f"{document['title']}: {document['detail']}"]
@@ -66,7 +80,11 @@ def problem(document: dict[str, Any], remedy: str) -> str:
 
 
 def summary(lines: Callable[[], dict[str, str]]) -> None:
-    """Prints titles and values, if standard error is a terminal."""
+    """Print titles and values to standard error if it is a terminal.
+
+    Args:
+        lines: called only in a terminal; returns the values by their titles.
+    """
     if not sys.stderr.isatty():
         return
     found = lines()

@@ -32,7 +32,15 @@ class ServiceUnreachable(ServiceError, JoulepathError):
 
 
 def error_in(answer: Any, url: str) -> DeclaredError:
-    """The error that a response of httpx tells, or that no service answers at `url`."""
+    """Convert a response of httpx to an error.
+
+    Args:
+        answer: the response.
+        url: address of the service.
+
+    Returns:
+        The error of the problem document, or `ServiceUnreachable` if the body is none.
+    """
     try:
         document = orjson.loads(answer.content)
         return error_of(document)
@@ -42,11 +50,14 @@ def error_in(answer: Any, url: str) -> DeclaredError:
 
 
 def error_of(document: Json) -> DeclaredError:
-    """The error of a problem document (RFC 9457).
+    """Convert a problem document (RFC 9457) to an error.
 
     Args:
-        document: the document. Its fields beyond those of every problem become data of the error,
-            and `instance` the id of the request.
+        document: the document. Its fields except `type`, `title` and `status` become attributes
+            of the error; `instance` is the id of the request.
+
+    Returns:
+        An error of the class with the slug of `type`, or of `InternalError` if there is none.
     """
     slug = document["type"].rpartition("/")[2]
     kind = next((each for each in types_of_error() if each.slug() == slug), InternalError)
@@ -60,7 +71,7 @@ def error_of(document: Json) -> DeclaredError:
 
 
 def wrong_fields(document: Json) -> list[str]:
-    """The fields that a problem document finds wrong, one a line: `start.q.1: must be …`."""
+    """Wrong fields of a problem document, one line per field: `start.q.1: must be …`."""
     return [f"{_place(each['loc'])}: {each['msg']}" for each in document.get("errors", ())]
 
 
@@ -72,7 +83,7 @@ def _place(loc: list[str | int]) -> str:
 
 @cache
 def _told(kind: type[DeclaredError]) -> type[DeclaredError]:
-    """A kind of error whose message is the one that the service wrote."""
+    """A subclass of an error with the message of the service."""
 
     def message(self: Any) -> str:
         return "\n".join([str(vars(self)["detail"]), *wrong_fields(vars(self)["document"])])

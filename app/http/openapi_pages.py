@@ -1,5 +1,5 @@
-"""The OpenAPI document for people: tags in the order of the work, the page of each operation, and
-the groups of fields of long requests.
+"""Presentation of the OpenAPI document: tags in the order of the work, pages of the operations, and
+groups of the fields of long requests.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ _LONG = 19
 
 
 def add_pages(document: dict[str, Any]) -> None:
-    """Give a document its tags, and each operation the address of its page."""
+    """Add the tags to a document, and the address of its page to every operation."""
     document["tags"] = [
         {"name": name, "description": text, "externalDocs": _page(page)}
         for name, (text, page) in _TAGS.items()
@@ -78,7 +78,7 @@ def add_pages(document: dict[str, Any]) -> None:
 
 
 def add_groups(schemas: dict[str, Any]) -> None:
-    """Order the fields of long requests by their groups, whose names are in `x-group`."""
+    """Order the fields of long requests by groups; `x-group` names the group of a field."""
     for schema in schemas.values():
         fields = schema.get("properties", {})
         for groups in (_MOTION, _ARM, _FIGURES):

@@ -43,7 +43,7 @@ class Parameters:
 
     @classmethod
     def declared(cls, node: Node) -> Self:
-        """Declare the parameters of a node, and read them.
+        """Declare the parameters of a node, and read their values.
 
         Raises:
             InvalidRequest: the values contradict each other.
@@ -61,12 +61,12 @@ class Parameters:
                 ("url",), "A service computes for a robot that it has: set the parameter `robot`."
             )
         own = cls(**found)
-        # what is wrong in the file is said when the node starts
+        # reports an unusable file at the start of the node
         own.request()
         return own
 
     def request(self) -> Json:
-        """The fields of `POST /optimize` that are the same for all plans.
+        """Fields of `POST /optimize` common to all plans.
 
         Raises:
             InvalidRequest: the file cannot be used.

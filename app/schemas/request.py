@@ -1,4 +1,4 @@
-"""The request of `POST /optimize`, and the fields that other requests for a motion share."""
+"""Request of `POST /optimize`, and the fields shared by all requests for a motion."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class JointTarget(Request):
 
 
 class PoseTarget(Request):
-    """A target as a pose of the TCP. Every arm configuration that reaches it is a candidate."""
+    """A target as a pose of the TCP. All configurations of the arm at this pose are candidates."""
 
     pose: TargetPose = described(
         "Pose of the TCP in the robot's base frame, or in its `frame`. The orientation of a goal "
@@ -69,7 +69,7 @@ SingleTarget = Annotated[
 
 
 class AnyOfTarget(Request):
-    """Several targets. The answer moves to the one that needs the least energy."""
+    """Several targets. The answer moves to the target of least energy."""
 
     any_of: list[SingleTarget] = described(
         "Joint positions and poses, mixed. Targets that the arm cannot reach are in `unreachable` "
@@ -93,7 +93,7 @@ Target = Annotated[
 
 
 class DurationRange(Request):
-    """Bounds on the duration; each is optional."""
+    """Bounds on the duration. Both are optional."""
 
     min: Seconds | None = described("Smallest duration. Null: no bound.", "s", 1.0, default=None)
     max: Seconds | None = described("Largest duration. Null: no bound.", "s", 3.0, default=None)
@@ -115,7 +115,7 @@ Duration = Annotated[
 
 
 class Branch(Request):
-    """Allowed branches. A part that is null may have any value."""
+    """Allowed branches. A part with the value null is unrestricted."""
 
     shoulder: Literal["left", "right"] | None = described(
         "Side of the first axis on which the plane of the arm lies, seen along the reach.",
@@ -138,7 +138,7 @@ class Branch(Request):
 
 
 class Holding(Request):
-    """What holds the arm while it waits."""
+    """Holding of the arm during a wait: by the motors or by the brakes."""
 
     hold: Literal["motors", "brakes"] = described(
         "`motors`: the motors hold the arm during the wait. `brakes`: the motors hold it for "
@@ -165,7 +165,7 @@ class Holding(Request):
 
 
 class Dwell(Holding):
-    """The wait at the goal: when the arm is needed again, and what holds it until then."""
+    """The wait at the goal: its end, and the holding of the arm until then."""
 
     time: Seconds = described(
         "Time from the start of the motion until the arm is needed again. The motion takes no "

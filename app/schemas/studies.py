@@ -1,4 +1,4 @@
-"""What the routes under `/studies` take and answer."""
+"""Requests and responses of the routes under `/studies`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ IdempotencyKey = Annotated[str, Field(min_length=1, max_length=LENGTHS.key, patt
 
 
 class StudyRequest(Request):
-    """A study: a motion that is improved step by step until its energy is at most a threshold."""
+    """A study: the stepwise improvement of a motion to an energy at or below a threshold."""
 
     name: Name = described("Name of the study.", None, "Pick and place, cell 4")
     robot: RobotName = described(
@@ -43,10 +43,10 @@ class StudyRequest(Request):
         default=None,
     )
     threshold: float = described(
-        "Energy that is low enough, of the objective.", "J", 60.0, gt=0, le=1e9
+        "Energy of the objective at or below which the study has reached its aim.", "J", 60.0, gt=0, le=1e9
     )
     objective: Objective = described(
-        "Energy that is compared with the threshold, and that the iterations minimise.",
+        "Energy minimised by the iterations and compared with the threshold.",
         None,
         "electrical",
         default="electrical",
@@ -60,7 +60,7 @@ class StudyName(Request):
 
 
 class StudyPage(Query):
-    """The part of the list of studies that is returned."""
+    """The requested part of the list of studies."""
 
     search: Name | None = search_in("the name or the robot")
     limit: int = limit_of("studies")
@@ -68,22 +68,22 @@ class StudyPage(Query):
 
 
 class OptimizeStep(Request):
-    """An iteration that optimises a motion."""
+    """An iteration by optimisation of a motion."""
 
     optimize: OptimizeRequest = described(
-        "A body of `POST /optimize`. If `robot`, `figures` and `objective` are left out, those of "
-        "the study apply.",
+        "A body of `POST /optimize`. The defaults of `robot`, `figures` and `objective` are the "
+        "values of the study.",
         None,
         OPTIMIZE,
     )
 
 
 class EvaluateStep(Request):
-    """An iteration that evaluates a given motion."""
+    """An iteration by evaluation of a given motion."""
 
     evaluate: EvaluateRequest = described(
-        "A body of `POST /evaluate`. If `robot` and `figures` are left out, those of the study "
-        "apply.",
+        "A body of `POST /evaluate`. The defaults of `robot` and `figures` are the values of the "
+        "study.",
         None,
         EVALUATE,
     )
@@ -152,11 +152,11 @@ class StudySummary(Response):
         "Id of the figures of all iterations; null: the robot's own.", None, FIGURES_ID
     )
     objective: Objective = described(
-        "Energy that is compared with the threshold, and that the iterations minimise.",
+        "Energy minimised by the iterations and compared with the threshold.",
         None,
         "electrical",
     )
-    threshold: float = described("Energy that is low enough, of the objective.", "J", 60.0)
+    threshold: float = described("Energy of the objective at or below which the study has reached its aim.", "J", 60.0)
     created: datetime = described("Time at which the study was created, in UTC.", None, CREATED)
     owner: str | None = described(
         "Name of the API key that created it; null without one.", None, "press_shop"

@@ -1,7 +1,7 @@
 """URDFs from files with xacro macros, and the folders of ROS packages.
 
-xacro evaluates the file's expressions, so files are expanded that the user of this machine names:
-never those of a request to the service.
+xacro evaluates expressions in the file. Therefore only files named by the user of this machine are
+expanded, never files in a request to the service.
 """
 
 from __future__ import annotations
@@ -18,12 +18,15 @@ MANIFEST = "package.xml"
 
 
 def expanded(path: Path, arguments: Mapping[str, str], folders: Sequence[Path]) -> str:
-    """The URDF that a file with macros stands for.
+    """Expand a file with xacro macros.
 
     Args:
         path: the file.
         arguments: values of its <xacro:arg> by name.
-        folders: folders in which `$(find …)` looks for packages, beside the package of the file.
+        folders: folders searched for packages by `$(find …)`, besides the package of the file.
+
+    Returns:
+        The URDF.
 
     Raises:
         InvalidArm: the file cannot be expanded, or the package `xacrodoc` is not installed.
@@ -51,7 +54,7 @@ def expanded(path: Path, arguments: Mapping[str, str], folders: Sequence[Path]) 
 
 
 def package_folders(path: Path) -> list[Path]:
-    """The ROS package that a file belongs to, and the folder of it; none outside of packages."""
+    """Folder of the ROS package of a file, and its parent; empty outside of packages."""
     for folder in path.resolve().parents:
         if (folder / MANIFEST).is_file():
             return [folder, folder.parent]

@@ -15,12 +15,13 @@ from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Metho
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """A motor that turns with several joints, such as the last motor of a wrist that is driven
-    through the joint before it. Its inertia and friction act on all of these joints.
+    """Coupling of a motor to several joints, as in a wrist driven through the joint before it.
+
+    The inertia and the friction of the motor act on all coupled joints.
     """
 
     ratios: Array
-    """Speed of the motor over that of each joint (nq,) [1]."""
+    """Ratio of the speed of the motor to the speed of each joint, shape (nq,) [1]."""
 
     def __post_init__(self) -> None:
         ratios = np.array(self.ratios, dtype=float)
@@ -39,39 +40,39 @@ class Coupling:
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationOptions:
-    """Requested figures and the method to find them.
+    """Requested figures and the method of identification.
 
     Raises:
-        InvalidProblem: an option is out of its range, or options exclude each other.
+        InvalidProblem: an option is out of its range, or two options exclude each other.
     """
 
     fit: Sequence[Target] = ("friction", "rotor")
     """Requested figures. Power is added if the logs have it; friction and rotors are added if the
     payload of the last log is requested."""
     refit: bool | None = None
-    """Whether to fit the inertials of the links, too; None: only to torques that were measured
-    behind the gears, which identify nothing else."""
+    """Whether to fit the inertials of the links, too. None: only if a log has torques measured
+    behind the gears, because such torques identify nothing else."""
     constants: bool | None = None
-    """Whether to fit torque constants, too, where they are not requested; None: to the currents of
-    logs with a known payload, if the masses of the robot's links have a source."""
+    """Whether to fit torque constants without a request. None: only if all logs have currents and
+    a known payload, and the masses of the robot's links have a source."""
     method: Method = "automatic"
     period: float | None = None
     """Period of the motion for the method `periodic` [s]."""
     held_out: float = 0.3
-    """Share of the moving time that validates; 0: none, 1: each motion in its turn."""
+    """Share of the moving time held out for validation; 0: none, 1: every motion once."""
     terms: Sequence[Term] = DEFAULT_TERMS
     """Terms of the friction law."""
     knee: float | None = None
-    """Speed over which Coulomb friction reverses [rad/s]; None for the robot's own."""
+    """Range of speed in which Coulomb friction reverses [rad/s]. None: the value of the robot."""
     estimator: Estimator = "wls"
     velocity_threshold: float = 0.02
-    """Speed up to which samples of a joint are left out [rad/s]."""
+    """Samples of a joint at or below this speed are left out [rad/s]."""
     prior_weight: float = 1.0
     """Weight of the robot's own inertials in a refit [1]."""
     couplings: Sequence[Coupling] = field(default_factory=tuple)
     mains: Sequence[float | None] = ()
-    """Mean power [W] that a wattmeter in the mains cable of the control box showed during each log;
-    None for a log without a reading. Empty: no readings."""
+    """Mean power during each log by a wattmeter in the mains cable of the control box [W]; None for
+    a log without a reading. Empty: no readings."""
 
     def __post_init__(self) -> None:
         for name, allowed in (("fit", get_args(Target)), ("terms", get_args(Term))):
@@ -125,18 +126,18 @@ class IdentificationOptions:
 
     @property
     def joint_terms(self) -> tuple[str, ...]:
-        """Terms of friction and of the measurement that are fitted to each joint."""
+        """Terms of friction and of the measurement, fitted per joint."""
         return tuple(self.terms)
 
     @property
     def nuisances(self) -> frozenset[str]:
-        """Terms that are no figures of the robot: they are fitted however poorly known they are."""
+        """Terms of the measurement, fitted even if the log determines them poorly."""
         return frozenset({"offset"})
 
     @property
     def reversal(self) -> int:
-        """Number of the distance over which friction behind the gears reverses, among those of the
-        rows."""
+        """Index, among the candidates of the rows, of the distance in which friction behind the
+        gears reverses."""
         return 0
 
     @property

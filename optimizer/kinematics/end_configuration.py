@@ -1,4 +1,4 @@
-"""Configurations that reach a target, with the full turns that the position limits leave open."""
+"""Configurations at a target, with all full turns within the position limits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EQUAL_DISPLACEMENT = 1e-9
 class EndConfiguration:
     """One branch of the arm at the start or the goal of a motion.
 
-    Two end configurations are equal only if they are the same object, so that they can be keys.
+    Equality is identity, so end configurations can be keys of a dictionary.
     """
 
     label: str
@@ -29,36 +29,35 @@ class EndConfiguration:
     q: Array
     """Joint positions, shape (nq,) [rad]."""
     choices: list[list[float]]
-    """For each joint, its position with every full turn within the limits [rad]."""
+    """Positions of each joint with all full turns within the limits [rad]."""
     fixed: bool
-    """Whether the target gives the joint positions: then no other full turns are allowed."""
+    """Whether the target gives joint positions, so that the number of full turns is fixed."""
     target: int = 0
-    """Index of the target that the configuration reaches."""
+    """Index of the target."""
     tolerance: ConeOrientedPose | None = None
-    """The target if its orientation is partly free; the configuration is a sample of it then."""
+    """The target if its orientation is partly free; the configuration is then one sample."""
     self_motion: SelfMotion | None = None
-    """The curve that holds the target's pose, of which the configuration is a sample."""
+    """Self-motion at the target's pose; the configuration is then one sample of the curve."""
 
     @cached_property
     def sampled(self) -> bool:
-        """Whether infinitely many configurations reach the target, and this is a sample."""
+        """Whether the target has infinitely many configurations, and this is a sample."""
         return self.tolerance is not None or self.self_motion is not None
 
 
 def joint_options(
     starts: list[float], goals: list[float], fixed: bool, windings: bool
 ) -> list[tuple[float, float]]:
-    """Pairs of start and goal position of one joint, one pair for each displacement of interest.
+    """Pairs of start and goal position of one joint, one pair per displacement of interest.
 
-    Displacements differ by full turns, whose number tells them apart. One beyond a full turn is
-    left out unless it is the least one or an end is `fixed`: without the full turn the same
-    branches are nearer.
+    Displacements differ by full turns. A displacement beyond a full turn is left out unless it is
+    the least one or an end is `fixed`, because one full turn less connects the same branches.
 
     Args:
-        starts: positions at the start that differ by full turns [rad].
-        goals: positions at the goal that differ by full turns [rad].
-        fixed: whether one of the ends gives joint positions, so that every pair is distinct.
-        windings: whether other displacements than the least one are of interest.
+        starts: positions at the start, equal up to full turns [rad].
+        goals: positions at the goal, equal up to full turns [rad].
+        fixed: whether an end gives joint positions; every pair is then kept.
+        windings: whether displacements beyond the least one are of interest.
 
     Returns:
         Pairs (start, goal) [rad], the least displacement first.

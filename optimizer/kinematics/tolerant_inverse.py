@@ -1,10 +1,9 @@
-"""Inverse kinematics of a pose whose orientation is free in part, by Newton's method from many
-starts.
+"""Inverse kinematics of a pose with a partly free orientation, by Newton's method from many starts.
 
-It needs no closed form and no given number of joints. With five joints, the configurations that
-reach a position with the direction of an axis are isolated, and the starts find all but those of
-small basins of attraction; where the pose fixes less than the joints can do, the configurations are
-samples of a manifold.
+The method needs no closed form and admits any number of joints. An arm of five joints has isolated
+configurations at a given position and direction of an axis; the starts find all except those with
+small basins of attraction. With more joints than constraints, the configurations are samples of a
+manifold.
 """
 
 from __future__ import annotations
@@ -45,12 +44,12 @@ TOLERANT_INVERSE = TolerantInverseSettings()
 def tolerant_configurations(
     arm: Arm, pose: ConeOrientedPose, count: int, target: str = "goal"
 ) -> Array:
-    """Distinct configurations within the position limits that reach a pose.
+    """Find distinct configurations at a pose, within the position limits.
 
     Args:
         arm: arm with its TCP and limits.
-        pose: pose whose orientation is free in part.
-        count: number of configurations at which the search ends.
+        pose: pose with a partly free orientation.
+        count: greatest number of configurations.
         target: name of the pose in errors.
 
     Returns:
@@ -61,7 +60,7 @@ def tolerant_configurations(
         NoConfigurationFound: the search found none.
     """
     manifold, settings = GoalManifold.of(arm, pose), TOLERANT_INVERSE
-    # one turn of each joint holds all configurations up to full turns
+    # one turn per joint contains all configurations up to full turns
     last = np.minimum(manifold.q_max, manifold.q_min + 2 * np.pi)
     rng, idle, found = np.random.default_rng(0), 0, np.zeros((0, arm.robot.nq))
     for _ in range(settings.rounds):

@@ -1,4 +1,4 @@
-"""Times at which a motion passes given configurations in order, and its deviations from them."""
+"""Passing of given configurations by a motion, in order: times and deviations."""
 
 from __future__ import annotations
 
@@ -12,22 +12,28 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class PassSettings:
-    """Search for the times at which a motion passes configurations."""
+    """Settings of the search for the times of passing."""
 
     least_instants: int = 401
     """Smallest number of evenly spaced instants of the first search."""
     instants_per_pass: int = 200
     """Evenly spaced instants of the first search per configuration."""
     refinements: int = 8
-    """Newton steps that refine the instants."""
+    """Number of Newton steps on each time."""
 
 
 PASSING = PassSettings()
 
 
 def pass_times(curve: BSpline, passes: Array) -> Array:
-    """Ascending times (k,) at which a curve over [0, T] is nearest to the configurations `passes`
-    (k, r), in order.
+    """Find the ascending times of least distance between a curve and given configurations.
+
+    Args:
+        curve: motion of r joints over [0, T].
+        passes: configurations in the order of passing, shape (k, r) [rad].
+
+    Returns:
+        Ascending times, shape (k,) [s].
     """
     if not len(passes):
         return np.zeros(0)
@@ -41,8 +47,16 @@ def pass_times(curve: BSpline, passes: Array) -> Array:
 
 
 def refined_pass_times(curve: BSpline, passes: Array, times: Array, step: float) -> Array:
-    """Times (k,) at which a curve is nearest to `passes` (k, r), within `step` of the given
-    times.
+    """Refine times of passing by Newton's method.
+
+    Args:
+        curve: motion of r joints over [0, T].
+        passes: configurations, shape (k, r) [rad].
+        times: times to begin with, shape (k,) [s].
+        step: greatest change of a time [s].
+
+    Returns:
+        Times of least distance to the configurations, shape (k,) [s].
     """
     refined = times
     for _ in range(PASSING.refinements):
@@ -56,8 +70,10 @@ def refined_pass_times(curve: BSpline, passes: Array, times: Array, step: float)
 
 
 def deviations(curve: BSpline, passes: Array) -> Array:
-    """Largest deviation (k,) of a coordinate of a curve from every configuration in `passes` (k,
-    r), at the times of passing.
+    """Deviation of a curve from every configuration in `passes` (k, r) at its time of passing.
+
+    Returns:
+        Largest absolute deviation over the joints, shape (k,) [rad].
     """
     return np.asarray(np.abs(curve(pass_times(curve, passes)) - passes).max(axis=1, initial=0.0))
 
@@ -68,7 +84,7 @@ def _nearest_in_order(samples: Array, passes: Array) -> list[int]:
     for q in passes:
         total = best + ((samples - q) ** 2).sum(axis=1)
         best = np.minimum.accumulate(total)
-        # Sample at which every running minimum was reached.
+        # index of the sample with the minimum so far
         chosen.append(np.maximum.accumulate(np.where(total == best, np.arange(len(total)), 0)))
     indices, last = list[int](), len(samples) - 1
     for index_of in reversed(chosen):

@@ -42,33 +42,30 @@ def place(
     tell: Tell = no_listener,
     progress: bool = True,
 ) -> PlacementSolution:
-    """Find the place of the robot, or of stops and obstacles around it, at which cycles need the
-    least energy.
+    """Find the place of least energy for the robot, or for stops and obstacles around it.
 
-    The nominal place is computed first, so that the answer never needs more than it. Places that
-    the arm cannot reach, and those with a bound above the best energy, take no time of those that
-    may be better.
+    The nominal place is computed first, so the energy of the answer never exceeds the nominal one.
+    Places out of reach, and places with a lower bound above the incumbent, are not optimised.
 
     Args:
-        cycle: the cycle, or several of one robot with how often each runs. Poses, obstacles,
-            directions and gravity are in the world.
-        region: where the base may be, or by how much the group may be moved; None with a list of
-            `moves`.
-        moves: "base", a group of stops and obstacles, or several bodies with a region each.
-        base: nominal pose of the robot base in the world, shape (4, 4); None for the identity, so
-            that poses in the base frame are poses in the world.
+        cycle: the cycle, or several weighted cycles of one robot. Poses, obstacles, directions and
+            gravity are given in the world frame.
+        region: admissible places of the base, or offsets of the group; None with a list of `moves`.
+        moves: "base", a group of stops and obstacles, or several bodies, each with a region.
+        base: nominal pose of the robot base in the world, shape (4, 4); None for the identity: the
+            world frame is then the base frame.
         resolution: distance between the places of the map [m]; None for about 100 places.
         deadline: limit of the wall time [s].
-        clock: function that returns the time [s].
-        tell: gets the progress: places of the map as candidates, and the best place so far.
-        progress: whether a bar may show the progress, as of `optimize`.
+        clock: returns the current time [s].
+        tell: receives the progress: places of the map as candidates, and the best place so far.
+        progress: whether a bar may show the progress, as in `optimize`.
 
     Returns:
         Best and nominal place with their certified cycles, the map, tolerance and lower bound.
 
     Raises:
         InvalidProblem: a field is malformed, or the nominal place is not in the region.
-        NoPlacement: the cycles can be run at no place that was tried.
+        NoPlacement: the cycles are infeasible at all tried places.
         DeadlineExceeded: the deadline passed before any place was decided.
     """
     cycles = [WeightedCycle(cycle)] if isinstance(cycle, Cycle) else cycle
@@ -88,7 +85,7 @@ def place_robot(
     tell: Tell = no_listener,
     progress: bool = True,
 ) -> PlacementSolution:
-    """The solution of a placement; the arguments and errors are those of `place`."""
+    """Solve a placement. Arguments and errors are the same as of `place`."""
     with one_thread(), progress_bar("Placing the robot", tell, progress) as tell:
         began = clock()
         search = PlacementSearch(placement, clock, only_news(tell))
@@ -180,6 +177,6 @@ def _tolerance(search: PlacementSearch) -> list[Tolerance]:
 
 
 def _edges(space: Space, at: Place) -> list[Coordinate]:
-    """Coordinates of a place that are at an end of their range."""
+    """Coordinates of a place at an end of their range."""
     ends = zip(space.axes, at.x.tolist(), strict=True)
     return [axis.name for axis, value in ends if value in (axis.low, axis.high)]

@@ -1,4 +1,4 @@
-"""Packages that are not needed to compute, and are imported where one is used."""
+"""Optional packages: the computation runs without them, and their users import them late."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ from typing import Any
 
 
 def required(module: str, purpose: str, requirement: str) -> Any:
-    """An imported module.
+    """Import an optional module.
 
     Args:
-        module: name of the module.
-        purpose: the function that needs it, for the error.
-        requirement: what to install.
+        module: dotted name of the module.
+        purpose: name of the function that needs the module, for the message of the error.
+        requirement: argument of `pip install` that provides the module.
+
+    Returns:
+        The module.
 
     Raises:
-        ModuleNotFoundError: the module is not installed; says what to install.
+        ModuleNotFoundError: the module is not installed; the message gives the `pip` command.
     """
     try:
         return import_module(module)
@@ -28,10 +31,16 @@ def required(module: str, purpose: str, requirement: str) -> Any:
 
 
 def data_frame(columns: dict[str, Any]) -> Any:
-    """A table of pandas, or of polars where pandas is not installed.
+    """Build a data frame of pandas, or of polars if pandas is not installed.
+
+    Args:
+        columns: values of each column by its name.
+
+    Returns:
+        A `pandas.DataFrame` or a `polars.DataFrame`.
 
     Raises:
-        ModuleNotFoundError: neither is installed.
+        ModuleNotFoundError: neither package is installed.
     """
     for name in ("pandas", "polars"):
         try:

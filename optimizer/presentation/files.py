@@ -1,8 +1,8 @@
 """Results in files: JSON with every field, internal ones included.
 
 A dataclass is an object with its name as `class`, a NamedTuple a list, a robot its name and its
-figures, a number that is not finite the text `inf`, `-inf` or `nan`. A file is read by the types of
-the fields: it names no code.
+figures, a non-finite number the text `inf`, `-inf` or `nan`. The declared types of the fields
+determine how a file is read; nothing in a file selects the code to run.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CLASS = "class"
 
 
 class Saved:
-    """Base of results that can be written to a file and read again."""
+    """Base of results with a representation as a file."""
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the result to a JSON file, complete and exact to the last digit.
@@ -41,16 +41,16 @@ class Saved:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
-        """Read a result that `save` wrote.
+        """Read a result from a file written by `save`.
 
         Args:
             path: the file.
 
         Returns:
-            A result equal to the one that was saved.
+            A result equal to the saved one.
 
         Raises:
-            ValueError: the file has no result of this class, or that of another version.
+            ValueError: the file has no result of this class and this version of joulepath.
         """
         try:
             found = read(cls, json.loads(Path(path).read_text(encoding="utf-8")))
@@ -63,7 +63,7 @@ class Saved:
 
 
 def written(value: Any) -> Any:
-    """A value as JSON has it, with all fields that its constructor takes."""
+    """Convert a value to JSON types, with all arguments of its constructor."""
     if isinstance(value, np.ndarray):
         return written(value.tolist())
     if isinstance(value, Robot):
@@ -78,17 +78,20 @@ def written(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, float):
-        # JSON has no numbers that are not finite, such as an infinite limit
+        # JSON has no infinity, the value of an absent limit
         return float(value) if math.isfinite(value) else str(float(value))
     return value.item() if isinstance(value, np.generic) else value
 
 
 def read(hint: Any, data: Any) -> Any:
-    """A value of a type from its JSON.
+    """Convert JSON types back to a value.
 
     Args:
-        hint: type of the value: a class, or a type of a field with its markers.
-        data: what `written` returned.
+        hint: type of the value: a class, or the annotated type of a field.
+        data: result of `written`.
+
+    Returns:
+        A value of the type.
 
     Raises:
         ValueError: the data do not fit the type.
@@ -140,7 +143,7 @@ def _with_subclasses(kind: type[Any]) -> Iterator[type[Any]]:
 
 
 def _option(options: tuple[Any, ...], data: Any) -> Any:
-    """The alternative of a union that the data are of."""
+    """Alternative of a union with the form of the data."""
     bare: list[Any] = [
         get_args(each)[0] if get_origin(each) is Annotated else each for each in options
     ]
@@ -166,7 +169,7 @@ def _array(hint: Any, data: Any) -> Any:
 
 
 def _robot(name: str, figures: dict[str, Any]) -> Robot:
-    """The robot that this process has already, or another one of the same figures."""
+    """The loaded robot of this name if its figures are the same, else a new one."""
     if name in robot_names() and load_robot(name).figures == figures:
         return load_robot(name)
     return robot_of(name, figures)

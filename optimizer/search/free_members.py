@@ -1,4 +1,4 @@
-"""Members of self-motions that keep clear of obstacles, where no coarse sample does."""
+"""Dense samples of self-motions, for ends with collisions at all coarse samples."""
 
 from __future__ import annotations
 
@@ -29,9 +29,16 @@ FREE_MEMBERS = FreeMemberSettings()
 
 
 def bounded(prepared: PreparedProblem, candidates: list[Candidate]) -> list[Candidate]:
-    """The candidates with their bounds, as of `bound`.
+    """Compute the lower bounds of candidates, with denser samples of self-motions if necessary.
 
-    If every sample of the self-motions at an end collides, denser samples replace them.
+    Denser samples replace the samples of an end if all of them collide.
+
+    Args:
+        prepared: the problem.
+        candidates: the candidates of the coarse samples.
+
+    Returns:
+        The candidates with bounds.
 
     Raises:
         InvalidProblem, InCollision, TorqueInfeasible: as `bound`.

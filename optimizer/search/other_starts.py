@@ -1,9 +1,9 @@
-"""Other starts for sliding ends: postures one step to each side of the best posture.
+"""Further starts for motions with an end on a self-motion: postures beside the best posture.
 
-A motion has several local optima, which differ in the limits that it touches and in their times, by
-some tenths of a percent of energy. An end that slides takes the motion along, so both stay in the
-optimum from which they began. A motion solved by itself to a posture beside may be in a better
-optimum; from there both ends slide again.
+A motion has several local optima. They differ in the set of active limits and in the times of
+contact, and their energies by some tenths of a percent. Optimisation along the self-motion deforms
+the motion continuously and therefore stays in the initial basin. A fresh solve to an adjacent
+posture may reach a better optimum; both ends are then optimised along their self-motions again.
 """
 
 from __future__ import annotations
@@ -33,11 +33,17 @@ than it finds."""
 
 
 def start_beside(state: SearchState, best: Candidate) -> Candidate:
-    """The best solved candidate, or a better candidate found from a posture beside, which is
-    appended.
+    """Search for a better candidate from postures one step along the self-motions of the ends.
 
-    Motions with more control points than the first solve are left out, and motions with corners in
-    joints' powers, which `sharpening` starts again.
+    Motions with more control points than in the first solve are left out. So are motions with
+    corners in the powers of joints, because `sharpening` restarts them itself.
+
+    Args:
+        state: state of the search; better candidates are appended to its list.
+        best: the solved candidate of least energy.
+
+    Returns:
+        The candidate of least energy, `best` if no other start improves on it.
     """
     prepared = state.prepared
     cornered = has_corners(state.problem.objective, prepared.arm)
@@ -62,10 +68,15 @@ def start_beside(state: SearchState, best: Candidate) -> Candidate:
 
 
 def _solved(state: SearchState, candidate: Candidate, below: float) -> bool:
-    """Solve a candidate with fixed ends, then with sliding ends if it needs less than `below` [J].
+    """Solve a candidate with fixed ends and, if its energy is below `below`, with sliding ends.
+
+    Args:
+        state: state of the search.
+        candidate: the candidate; receives the solution.
+        below: energy of the incumbent [J].
 
     Returns:
-        Whether it needs less.
+        Whether the energy of the candidate is below `below`.
     """
     for interval in duration_intervals(state.prepared, candidate.q_goal):
         solver = solver_of(state, candidate, interval, above(below, PROMISE_MARGIN))
@@ -79,7 +90,7 @@ def _solved(state: SearchState, candidate: Candidate, below: float) -> bool:
 
 
 def _again(found: SolveResult, solver: Method) -> SolveResult:
-    """Solve from a motion that was found with fixed ends."""
+    """Solve from a motion with fixed ends."""
     assert found.spline is not None
     q, t = sampled(found.spline)
     return solver.solve_evenly(q, t, SPLINE_SPACES.coarse_points, SQP.progress)

@@ -1,4 +1,4 @@
-"""POST and GET /jobs, GET, PATCH and DELETE /jobs/{id}, and what is done with a job."""
+"""Routes of jobs: create, list, read, rename, delete, cancel, retry, events and results."""
 
 from __future__ import annotations
 
@@ -103,9 +103,9 @@ async def create(
     client: ServiceClient,
     key: Key = None,
 ) -> Job:
-    """Takes up to 10,000 requests, and computes them while the client does not wait. Every request
-    is validated now: a malformed one refuses the whole job. The job survives a restart of the
-    service. Requests that somebody waits for come first."""
+    """Accepts up to 10,000 requests and computes them in the background. All requests are
+    validated before the response: a single malformed request refuses the whole job. The job
+    survives a restart of the service. Requests with a waiting client run before those of jobs."""
     if media_type(request.headers) not in (JSON, *UNDECLARED):
         raise UnsupportedMediaType
     with upload() as (file, path):
@@ -126,7 +126,8 @@ async def create(
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> JobList:
-    """Jobs with their progress, newest first, page by page: all, or those that are asked for."""
+    """Jobs with their progress, newest first, page by page. The query parameters select a
+    state, search the names and leave out identifications."""
     without = None if page.identifications else IDENTIFY
     wanted = stored_jobs.Wanted(page.state, page.search, without)
     read = partial(stored_jobs.page, limit=page.limit, after=page.after, wanted=wanted)
@@ -143,8 +144,8 @@ async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> J
 async def show(
     id: JobId, page: Annotated[RequestPage, Query()], jobs: ServiceJobs, store: ServiceStore
 ) -> JobDetail:
-    """The job with its progress and a page of its requests. Each request that is done refers to its
-    answer, which is kept as long as the job; each that failed has its problem."""
+    """The job with its progress and a page of its requests. A completed request refers to its
+    answer, which is kept as long as the job; a failed request has its problem document."""
     view = await jobs.view(id)
     read = partial(stored_jobs.requests, job_id=id, limit=page.limit + 1, after=page.after)
     return JobDetail(**detail(view, await store.read(read), page.limit))
@@ -169,7 +170,7 @@ async def rename(id: JobId, body: NewName, store: ServiceStore, client: ServiceC
     responses=problem_responses(*_OF_ONE, NotOwner),
 )
 async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
-    """Deletes the job with its answers. What runs is stopped."""
+    """Deletes the job with its answers. Running requests are stopped."""
     await jobs.delete(id, client)
 
 
@@ -181,8 +182,8 @@ async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
     responses=problem_responses(*_OF_ONE, NotOwner, JobNotCancellable),
 )
 async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
-    """Cancels what waits, and stops what runs within a second. Answers that are there stay. A job
-    that is cancelled already stays as it is."""
+    """Cancels the waiting requests and stops the running requests within a second. Existing
+    answers are kept. Cancelling a cancelled job has no effect."""
     await jobs.cancel(id, client)
     return Job(**summary(await jobs.view(id)))
 
@@ -195,9 +196,7 @@ async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
     responses=problem_responses(*_OF_ONE, NotOwner, Busy),
 )
 async def retry(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
-    """Lets the requests wait again that failed or were cancelled. Those that are done stay as they
-    are.
-    """
+    """Queues the failed and cancelled requests again. Completed requests keep their answers."""
     await jobs.retry(id, client)
     return Job(**summary(await jobs.view(id)))
 
@@ -223,9 +222,10 @@ KnownJob = Annotated[str, Depends(_known)]
 async def events(
     job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last: LastEventId = None
 ) -> Response:
-    """Server-sent events: `state` (of the job), `request` (one has ended), `progress` (at most two
-    in a second) and `end`. They are numbered in the job from 1. `Last-Event-ID` continues after a
-    number, also after a restart of the service. The stream closes when the job has ended."""
+    """Server-sent events: `state` (of the job), `request` (a request has ended), `progress` (at
+    most two per second) and `end`. The events of a job are numbered from 1. `Last-Event-ID` resumes
+    after a given number, also after a restart of the service. The stream closes when the job has
+    ended."""
     number = int(last) if last is not None and last.isdecimal() and len(last) < 10 else 0
     # in batches, and not event by event as FastAPI has it: hundreds may follow one job
     found = events_after(store, jobs.dispatcher, job_id, number)
@@ -247,9 +247,9 @@ async def events(
     },
 )
 async def results(job_id: KnownJob, store: ServiceStore, wanted: WantedFormat) -> Response:
-    """The requests that have ended, in order of their index: a line of JSON each, with the complete
-    answer under `result`. `Accept: text/csv` returns a table of their figures without the answers.
-    """
+    """The ended requests in the order of their index: one line of JSON per request, with the
+    complete answer under `result`. `Accept: text/csv` returns a table of their figures without the
+    answers."""
     if wanted == "csv":
         return StreamingResponse(as_csv(store, job_id), media_type="text/csv")
     return StreamingResponse(as_lines(store, job_id), media_type="application/x-ndjson")

@@ -1,4 +1,4 @@
-"""What `POST /optimize` answers, and its work in a worker."""
+"""Answer of `POST /optimize`, and its computation in a worker."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from joulepath.optimizer.result.solution import Solution, SolvedMotion
 
 
 class Asked(Protocol):
-    """What an answer repeats of its request."""
+    """Fields of the request that its answer repeats."""
 
     robot: str
     method: MethodName
@@ -31,7 +31,7 @@ class Asked(Protocol):
 
     @property
     def objective(self) -> Objective:
-        """The energy that is minimised."""
+        """The minimised energy."""
         ...
 
 
@@ -55,7 +55,14 @@ class OptimizeAnswer(SolvedMotion, MotionAnswer):
     def of(
         cls, request: Asked, request_id: str, solution: Solution, arm: dict[str, Any] | None
     ) -> Self:
-        """The answer to a request, not kept yet. `arm` is that of `arm_fields`."""
+        """Build the answer from a solution; the store adds its id later.
+
+        Args:
+            request: the validated request.
+            request_id: id of the request.
+            solution: the certified solution.
+            arm: figures of the arm, from `arm_fields`.
+        """
         motion = vars(solution.solved_motion()) | {
             "candidates": chosen(solution.candidates, request.candidates)
         }
@@ -70,7 +77,7 @@ class OptimizeAnswer(SolvedMotion, MotionAnswer):
 
     @property
     def figures(self) -> AnswerFigures:
-        """What lists show of this answer."""
+        """Figures of this answer for lists of answers."""
         return AnswerFigures(self.robot, self.energy.of(self.objective), self.duration, self.status)
 
 

@@ -88,7 +88,7 @@ RegionOrPlaces = Annotated[
 
 
 class Group(Request):
-    """Stops and obstacles that move together as one body."""
+    """Stops and obstacles moved together as one rigid body."""
 
     stops: Annotated[list[PlainName], Field(max_length=CYCLE_RANGES.max_stops)] = described(
         "Names of stops; `start` is the start of a cycle.", None, ["pick"], default=[]
@@ -118,12 +118,12 @@ _REGION: dict[str, Any] = {"x": [-0.3, 0.3], "y": [-0.2, 0.2], "z": [0.0, 0.3]}
 
 
 class Moving(Request):
-    """A body that moves, and where to."""
+    """A movable body and its region."""
 
     moves: BaseOrGroup = described(
         "`base`, or stops and obstacles that move together.", None, {"stops": ["pick"]}
     )
-    region: RegionOrPlaces = described("Where it may be.", None, _REGION)
+    region: RegionOrPlaces = described("Admissible places of the body.", None, _REGION)
 
 
 class WeightedCycle(Request):
@@ -141,8 +141,8 @@ class WeightedCycle(Request):
 
 
 class PlacementRequest(Request):
-    """Cycles whose stops and obstacles are in the world, and where the robot may be. It has exactly
-    one of `cycle` and `cycles`."""
+    """Cycles with stops and obstacles in the world frame, and the admissible places of the robot.
+    Exactly one of `cycle` and `cycles` is given."""
 
     cycle: CycleRequest | None = described(
         "A body of `POST /cycle`, with poses, obstacles, directions and `gravity` in the world. "
@@ -155,7 +155,7 @@ class PlacementRequest(Request):
         Annotated[list[WeightedCycle], Field(min_length=1, max_length=PLACEMENT_RANGES.max_cycles)]
         | None
     ) = described(
-        "Several cycles of the same robot, with how often each runs.",
+        "Several cycles of the same robot, with the relative number of their runs.",
         None,
         [{"cycle": CYCLE, "weight": 3.0}],
         default=None,

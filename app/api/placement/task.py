@@ -43,7 +43,7 @@ class PlacedCycle:
 
 @dataclass(frozen=True, kw_only=True)
 class PlacedCycles(PlacedRound):
-    """A place, and what the cycles need there."""
+    """A place, and the cycles at this place."""
 
     cycles: Annotated[list[PlacedCycle], NotEmpty]
     """The cycles, in the order of the request."""
@@ -51,12 +51,12 @@ class PlacedCycles(PlacedRound):
 
 @dataclass(frozen=True, kw_only=True)
 class PlacementAnswer(SolvedPlacement, Answer):
-    """The placement of least energy: best and nominal place, and the map between them."""
+    """The placement of least energy: best place, nominal place and the map of the region."""
 
     best: PlacedCycles
-    """The place of least energy that was found; never dearer than the nominal one."""
+    """The found place of least energy; its energy never exceeds the one at the nominal place."""
     nominal: PlacedCycles | None
-    """The nominal place; null where its cycles cannot be run."""
+    """The nominal place; null if its cycles are infeasible."""
     warnings: list[str]
     """Remarks on the placement. Empty if there are none."""
     answer: str | None = None
@@ -64,7 +64,7 @@ class PlacementAnswer(SolvedPlacement, Answer):
 
     @property
     def figures(self) -> AnswerFigures:
-        """The figures of this answer in lists: those of the best place."""
+        """Figures of this answer for lists of answers: the ones of the best place."""
         return AnswerFigures(self.robot, self.best.energy, self.best.duration, self.status)
 
 
@@ -119,7 +119,7 @@ def _warnings(request: PlacementRequest, found: PlacementSolution) -> list[str]:
 
 
 def _joint_positions(cycles: Sequence[CycleRequest]) -> list[str]:
-    """Names of the stops that are given by joint positions."""
+    """Names of the stops given by joint positions."""
     return [
         stop.name or str(k)
         for cycle in cycles

@@ -42,17 +42,17 @@ Fraction = Annotated[float, Field(gt=0, le=0.9)]
 
 
 class Perturb(Request):
-    """Quantities of the arm that the controller does not know exactly. Each is changed by
-    itself."""
+    """Uncertain quantities of the arm, unknown to the controller and changed one at a time."""
 
     payload: Fraction | None = described(
-        "Fraction by which mass and inertia of the payload are less, and more. Null: not changed.",
+        "Fraction by which mass and inertia of the payload are decreased and increased. Null: "
+        "unchanged.",
         "1",
         0.1,
         default=None,
     )
     friction: Fraction | None = described(
-        "Fraction by which the friction of all joints is less, and more. Null: not changed.",
+        "Fraction by which the friction of all joints is decreased and increased. Null: unchanged.",
         "1",
         0.3,
         default=None,
@@ -60,7 +60,7 @@ class Perturb(Request):
 
 
 class ReplayRequest(AnswerRequest):
-    """An answer whose motion is played in MuJoCo."""
+    """An answer, and the settings of the simulation of its motion in MuJoCo."""
 
     control: Literal["feed_forward", "pd", "both"] = described(
         "Controller of the joints. `feed_forward`: torques known in advance, friction included, "
@@ -78,8 +78,8 @@ class ReplayRequest(AnswerRequest):
         le=1e-2,
     )
     perturb: Perturb | None = described(
-        "Changes of the arm that the controller does not know: how the motion and its savings "
-        "stand them. Null: none.",
+        "Changes of the arm unknown to the controller, to test the robustness of the motion and "
+        "its savings. Null: none.",
         None,
         {"payload": 0.1, "friction": 0.3},
         default=None,
@@ -112,7 +112,7 @@ class ReplayedMotion(Replay, _OfLeg):
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayAnswer(Answer):
-    """Motions of an answer as MuJoCo plays them, beside what the answer says of them."""
+    """Motions of an answer simulated in MuJoCo, compared with the figures of the answer."""
 
     simulator: str
     """The simulator and its version."""
@@ -135,7 +135,8 @@ class ReplayTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /replay`, within about `deadline` seconds.
 
-        Raises PartsNeeded with the answers to be kept at hand first, and the errors of its parts.
+        Raises:
+            PartsNeeded: answers have to be read from the store first; errors of the parts as well.
         """
         simulator, end = f"MuJoCo {mujoco().__version__}", Deadline.after(deadline)
         began = end.clock()
@@ -206,7 +207,7 @@ class ReplayTask:
 
 
 def _perturbation(perturb: Perturb | None) -> dict[Quantity, float]:
-    """The fractions by which the quantities are changed."""
+    """Fractions of change by quantity."""
     given: dict[Quantity, float | None] = (
         {} if perturb is None else {"payload": perturb.payload, "friction": perturb.friction}
     )

@@ -38,7 +38,12 @@ _COULD = {
 
 
 def placement_report(bundle: Bundle) -> Report:
-    """The report of an answer of `POST /placement`. Raises NotCertified or InvalidProblem."""
+    """Build the report of an answer of `POST /placement`.
+
+    Raises:
+        NotCertified: an answer has no certificate.
+        InvalidProblem: the request does not describe a valid problem.
+    """
     best = rows_at(bundle, "best")
     programs = [program_of(of_cycle(bundle, row)) for row in best]
     whole = replace(bundle, request={}, answer=summed(best))
@@ -84,7 +89,7 @@ def placement_report(bundle: Bundle) -> Report:
 
 
 def _asked(request: Json) -> Json:
-    """The first cycle that was asked for."""
+    """The first requested cycle."""
     cycle: Json = request.get("cycle") or request["cycles"][0]["cycle"]
     return cycle
 
@@ -118,7 +123,7 @@ def _subject(bundle: Bundle) -> str:
 
 
 def _facts(bundle: Bundle, whole: Bundle, money: Money) -> tuple[Fact, ...]:
-    """The figures of the best place, with that of the nominal one behind the first."""
+    """Figures of the best place; the energy at the nominal place follows as the second."""
     first, *others = facts(whole, money)
     found = [replace(first, words=f"at the best place, {first.words}")]
     nominal = bundle.answer["nominal"]
@@ -175,7 +180,7 @@ def _rivals(answer: Json) -> tuple[Rival, ...]:
 
 
 def _tolerance(answer: Json) -> str:
-    """Where the best place is, and how precisely it must be kept."""
+    """The best place and its tolerance, in words."""
     said = f"The best place: {_name(answer, answer['best'])}."
     several = len({each["body"] for each in answer["tolerance"]}) > 1
     parts = list[str]()
@@ -231,7 +236,7 @@ def _table(answer: Json) -> Table:
 
 
 def _name(answer: Json, place: Json) -> str:
-    """A place in words: the pose of what moves."""
+    """A place in words: the poses of the moved bodies."""
     nominal = (answer["nominal"] or answer["best"])["base"]
     moved: Sequence[Json] = place["offsets"]
     if not moved or place["base"] != nominal:

@@ -63,8 +63,13 @@ def rival_name(rival: Mapping[str, Any]) -> str:
 def nearest_rival(answer: Mapping[str, Any], period: float | None = None) -> dict[str, Any] | None:
     """The rival within the limits with the least saving.
 
-    It is one that fits into the period [s]; without a period, one that is about as fast as the
-    answer, or any where none is.
+    Args:
+        answer: the answer with its baselines.
+        period: longest duration of the rival [s]. None: about the duration of the answer, or any
+            duration if no rival is as fast.
+
+    Returns:
+        The rival, or None if no rival is within the limits and the period.
     """
     claimed = [each for each in answer["baselines"] if each["saving"] is not None]
     time = _AS_FAST * answer["duration"] if period is None else period
@@ -81,7 +86,7 @@ def saved(saving: float) -> str:
 
 
 def above_least(subject: str, total: float, bound: float) -> str:
-    """What a proven lower bound says, in a sentence."""
+    """A sentence about the gap between an energy and its proven lower bound [J]."""
     if bound <= 0:
         return "How little could be needed at least is not known here."
     return (
@@ -109,7 +114,7 @@ def _in_joules(value: float, total: float) -> tuple[str, str]:
 
 
 def limits_used(worst_ratio: Mapping[str, float | None]) -> str:
-    """How far the limits are used: those to the full, and the shares of the others."""
+    """Use of the limits in words: limits used fully, and the shares of all others."""
     ratios = {
         name: value for name, value in worst_ratio.items() if name in LIMITS and value is not None
     }

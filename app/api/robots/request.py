@@ -1,4 +1,4 @@
-"""A user's own arm: what `POST /robots` and `PUT /robots/{name}` take."""
+"""A user's own arm: requests of `POST /robots` and `PUT /robots/{name}`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ OwnName = Annotated[
 
 class OwnDrives(Request):
     """Motors and gears, joint-side: one value for all joints, or one per joint from base to tip.
-    Null: by a rule from the torque limits, whose range the note of the parameter tells."""
+    Null: estimated from the torque limits; the note of the parameter gives rule and range."""
 
     rotor_inertia: PerJoint | None = described(
         "Inertia of the rotors behind the gear.", "kg·m²", 0.4, default=None
@@ -52,20 +52,20 @@ class OwnDrives(Request):
 
 
 class OwnElectronics(Request):
-    """Power that the electronics draw. Null: a default, which is marked so."""
+    """Power of the electronics. Null: a default, marked as such."""
 
     idle_power: NotNegative | None = described("Of the arm at rest.", "W", 40.0, default=None)
     controller_power: NotNegative | None = described(
         "Of the control box. Null: 0.", "W", 60.0, default=None
     )
     regeneration: Annotated[float, Field(ge=0, le=1)] | None = described(
-        "Share of surplus power that the supply takes back. Null: 0.", "1", 0.0, default=None
+        "Share of the surplus power returned to the supply. Null: 0.", "1", 0.0, default=None
     )
 
 
 class OwnCollision(Request):
-    """Shape of the links. A link without `capsules` has one around each of its `<collision>` shapes
-    in the URDF, meshes as far as they are in `meshes`; a link without shapes has one from joint to
+    """Shape of the links. A link without `capsules` gets one capsule per `<collision>` shape of the
+    URDF; a mesh must be given in `meshes`. A link without shapes gets one capsule from joint to
     joint."""
 
     capsules: dict[Named, Annotated[list[Capsule], Field(max_length=50)]] | None = described(
@@ -83,8 +83,8 @@ class OwnCollision(Request):
         default=None,
     )
     never_meet: Annotated[list[Pair], Field(max_length=200)] | None = described(
-        "Pairs of links that are not compared. Null: those whose capsules meet in nearly every "
-        "configuration.",
+        "Pairs of links without a distance check. Null: all pairs with capsules in contact in "
+        "nearly every configuration.",
         None,
         [["base_link", "upper_arm"]],
         default=None,
@@ -99,7 +99,7 @@ class OwnMotion(Request):
 
 
 class OwnArm(Request):
-    """An arm of a user's own: its URDF, and what a URDF does not hold."""
+    """An arm of a user's own: its URDF, and parameters beyond a URDF."""
 
     urdf: str = described(
         "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they "
@@ -119,7 +119,7 @@ class OwnArm(Request):
         "Manufacturer and model. Null: the name.", None, "Example arm", default=None
     )
     source: Text = described(
-        "Where the URDF and the other values are from.",
+        "Origin of the URDF and the other values.",
         None,
         "maker's repository, 2025",
         default="given by the user",
@@ -244,6 +244,6 @@ class RobotTitle(Request):
 
 
 class RobotQuery(Query):
-    """The robots that are listed."""
+    """The robots to list."""
 
     search: SearchText | None = search_in("the name or the title")

@@ -69,8 +69,8 @@ _SECTIONS = (
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_robots(query: Annotated[RobotQuery, Query()], store: ServiceStore) -> RobotList:
-    """Names, titles and joints of all robots, or of those found by `search`, and what their
-    energies rest on."""
+    """Names, titles, joints and trust in the energies of all robots, or of the robots found by
+    `search`."""
     bundled = await run_in_threadpool(
         lambda: {name: load_robot(name).figures for name in robot_names()}
     )
@@ -110,8 +110,8 @@ async def add(
     store: ServiceStore,
     client: ServiceClient,
 ) -> RobotDetail:
-    """Adds an arm of your own, from its URDF and what a URDF does not hold. What is missing follows
-    from stated rules, is marked with the trust letter E, and listed in `warnings`."""
+    """Adds an arm of your own, from its URDF and further parameters. Missing parameters follow from
+    documented rules, carry the trust letter E, and are listed in `warnings`."""
     robots.check_own(body.name)
     robot = await _computed(request, body.name, body, engine, settings.max_deadline, client)
     try:
@@ -155,8 +155,8 @@ async def put(
     store: ServiceStore,
     client: ServiceClient,
 ) -> RobotDetail:
-    """Adds an arm of your own under this name, or replaces it. Requests from then on use the new
-    one; stored answers stay."""
+    """Adds an arm of your own under this name, or replaces it. Subsequent requests use the new
+    arm; stored answers remain unchanged."""
     robots.check_own(name)
     robot = await _computed(request, name, body, engine, settings.max_deadline, client)
     is_new = await store.create(
@@ -182,7 +182,7 @@ async def rename(
     store: ServiceStore,
     client: ServiceClient,
 ) -> RobotDetail:
-    """Gives a robot that was added another title. Its name in requests stays."""
+    """Changes the title of an added robot. Its name in requests stays."""
     rename = partial(robots.rename, name=name, title=body.title, client=client)
     return await store.write(lambda session: _of_user(rename(session)))
 
@@ -194,7 +194,7 @@ async def rename(
     responses=problem_responses(UnknownRobot, RobotExists, NotOwner, StoreUnavailable),
 )
 async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None:
-    """Deletes a robot that was added. Studies and stored answers about it stay."""
+    """Deletes an added robot. Its studies and stored answers are kept."""
     await store.write(partial(robots.delete, name=name, client=client), frees=True)
 
 
@@ -206,7 +206,7 @@ async def _computed(
     deadline: float,
     client: Client,
 ) -> OwnRobot:
-    """The row of a user's arm. Raises InvalidProblem."""
+    """Compute the row of a user's arm in a worker. Raises InvalidProblem."""
     task = OwnRobotTask(name, arm, request.state.id)
     content = orjson.loads(
         (await unless_disconnected(request, engine.run(task, deadline))).document

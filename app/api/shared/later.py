@@ -53,12 +53,12 @@ _PREFER = Header(
 
 @dataclass(frozen=True)
 class Later:
-    """How the client wants a request to be answered. `wait` is the time [s] that it waits for the
-    answer.
-    """
+    """Preference of the client for a response now or later."""
 
     wanted: bool
+    """Whether the client prefers an asynchronous response."""
     wait: int
+    """Time for which the response waits for the answer [s]."""
     jobs: ServiceJobs
     engine: ServiceClientEngine
     client: ServiceClient
@@ -66,8 +66,21 @@ class Later:
     request: Request
 
     async def respond(self, kind: str, asked: RequestModel | HeldBody) -> Response:
-        """The response to a validated request to the endpoint `kind`. Raises InvalidRequest,
-        KeyReused, TooManyWaiting or StoreUnavailable."""
+        """Create a job of one validated request, and respond to the request.
+
+        Args:
+            kind: the endpoint.
+            asked: the request.
+
+        Returns:
+            The answer if it is there within `wait`, else the job with the status 202.
+
+        Raises:
+            InvalidRequest: the request is malformed.
+            KeyReused: another request had the same idempotency key.
+            TooManyWaiting: too many requests wait already.
+            StoreUnavailable: the store cannot be read or written.
+        """
         longest = deadlines(self.jobs.settings)
         if isinstance(asked, HeldBody):
             new = await self.validated(
@@ -78,8 +91,13 @@ class Later:
         return await self.respond_with(new)
 
     async def validated(self, task: JobBodyTask | JobOfOneTask) -> NewJob:
-        """The job that a worker makes of a body. Raises InvalidRequest, and what `Engine.run`
-        raises.
+        """Validate a body in a worker.
+
+        Returns:
+            The new job.
+
+        Raises:
+            InvalidRequest: the body is malformed; further errors as of `Engine.run`.
         """
         result = await unless_disconnected(
             self.request, self.engine.run(task, self.jobs.settings.max_deadline)
@@ -88,7 +106,7 @@ class Later:
         return result.job
 
     async def respond_with(self, new: NewJob) -> Response:
-        """The response to a request that has become this job."""
+        """Create a job, and respond to its request; errors as of `respond`."""
         job_id, again = await self.jobs.create(new, self.key, self.client.owner)
         view = await self.jobs.ended(job_id, self.wait)
         if self.wait and view.job.ended is not None:
@@ -103,7 +121,7 @@ class Later:
         return response
 
     async def _ended(self, job_id: str) -> Response:
-        """The answer or the problem of a job of one request that has ended."""
+        """Answer or problem of an ended job of one request."""
         request, body = await self.jobs.store.read(
             lambda session: stored_jobs.outcome(session, job_id, 0)
         )

@@ -1,4 +1,4 @@
-"""Files that were built before the service started, as answers: the studio and the pages."""
+"""Static files of the service: the studio and the pages, built before its start."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MEDIA_TYPES = {
     ".png": "image/png",
     ".woff2": "font/woff2",
 }
-# other files that pages link to are for reading
+# other linked files are shown as plain text
 _TEXT = (".conf", ".service", ".sh", ".text", ".yaml")
 _POLICY = (
     "default-src 'none'; script-src {scripts}; style-src {styles}; font-src 'self'; "
@@ -54,14 +54,14 @@ def answer(request: Request, folder: str, path: str) -> Response:
 
     Raises:
         PagesNotBuilt: the folder does not exist.
-        NotFound: it has no such file, or none that is for browsers.
+        NotFound: the folder has no such file for browsers.
     """
     found = _files(folder).get(path)
     if found is None:
         raise NotFound if _files(folder) else PagesNotBuilt
     headers = {
         "ETag": found.tag,
-        # asked for anew each time, so that no page of one version meets a script of another
+        # revalidated on every load: a page and a script of different versions do not mix
         "Cache-Control": "no-cache",
         "X-Content-Type-Options": "nosniff",
     }
@@ -79,7 +79,7 @@ def has(folder: str, path: str) -> bool:
 
 @cache
 def _files(folder: str) -> dict[str, _File]:
-    """Every file of a folder by its path; nothing else can be asked for."""
+    """Every file of a folder by its path. No other path is answered."""
     root = files("joulepath") / "app" / "static" / folder
     found, folders = {}, [(PurePosixPath(), root)] if root.is_dir() else []
     style = root / STYLE

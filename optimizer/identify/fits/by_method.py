@@ -29,13 +29,18 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 def prepare(
     robot: Robot, logs: Sequence[Log], options: IdentificationOptions
 ) -> tuple[list[Log], IdentificationOptions]:
-    """Logs and options in the form that the method of the options needs.
+    """Prepare logs and options for the method of the options.
 
-    Links are refitted to torques behind the gears, unless the options keep them. Torque constants
-    are fitted to the currents that hold known links with a known payload.
+    With `refit` None, the links are refitted if the method is `automatic`, no payload is requested
+    and a log has torques measured behind the gears. With `constants` None, torque constants are
+    fitted if all logs have currents and a known payload, and the masses of the links have a source.
+
+    Returns:
+        The logs with the channels of the method, and the options without None in `refit` and
+        `constants`.
 
     Raises:
-        MethodNotApplicable: the logs lack a channel or a property that the method needs.
+        MethodNotApplicable: the logs lack a channel or a property required by the method.
         InvalidProblem: the options lack the period of the method `periodic`.
     """
     missing = _missing_requirement(logs, options)
@@ -63,7 +68,7 @@ def prepare(
 
 
 def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitResult:
-    """Fit rows of prepared logs by the method of the options."""
+    """Fit the rows of prepared logs by the method of the options."""
     fitted = fit_rows(robot, rows, options)
     if options.method == "threshold_velocity":
         found = thresholds_of(fitted.arm, rows, motor_torque(fitted.arm, rows))
@@ -81,7 +86,7 @@ def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> F
 
 
 def _constants_are_told(robot: Robot, logs: Sequence[Log], options: IdentificationOptions) -> bool:
-    """Whether torque constants are fitted without being requested."""
+    """Whether to fit torque constants without a request."""
     links = trust_letters(
         {name: robot.figures["inertials"][name] for name in ("mass", "center_of_mass")}
     )
@@ -91,7 +96,7 @@ def _constants_are_told(robot: Robot, logs: Sequence[Log], options: Identificati
         and not {"torque_constant", "payload"} & set(options.fit)
         and not (options.refit or options.couplings)
         and all(log.effort_meaning == "current" and log.payload_known for log in logs)
-        # links that nobody measured are known less well than the constants
+        # inertials without a source are less certain than the torque constants
         and ENGINEERING not in links
     )
 
@@ -101,7 +106,7 @@ def _behind_gears(log: Log) -> bool:
 
 
 def _missing_requirement(logs: Sequence[Log], options: IdentificationOptions) -> str:
-    """Requirement of the method that the logs do not meet, as a sentence; empty if none."""
+    """Unmet requirement of the method on the logs, as a sentence; empty if all are met."""
     if options.method in ("threshold_velocity", "temperature") and any(map(_behind_gears, logs)):
         return (
             "it needs motor currents or torques of the motors in every log. Torques of sensors "

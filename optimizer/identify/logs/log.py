@@ -104,7 +104,7 @@ class Log:
 
     @property
     def carries_weight(self) -> bool:
-        """Whether efforts with gravity were logged, which identify figures."""
+        """Whether the logged efforts contain gravity, as the identification requires."""
         return self.effort_meaning in ("current", "torque")
 
     @property
@@ -119,19 +119,19 @@ class Log:
 
     @cached_property
     def cycle_rows(self) -> Indices:
-        """Rows at which the cycles of a log that repeats begin, and the row at which the last one
-        ends; empty if it does not repeat."""
+        """First row of each cycle of a repetitive log, and the end of the last cycle; empty if the
+        motion does not repeat."""
         return cycle_edges(self.q, self.v, self._rest, self.rate, self._moves_and_rests)
 
     @property
     def segment_rows(self) -> list[int]:
-        """Rows that bound the segments: the first and last row, and each row at which motion or
-        rest begins, or a cycle."""
+        """Boundaries of the segments: the first row, the starts of motions, rests and cycles, and
+        the last row."""
         return sorted({*self._moves_and_rests, *self.cycle_rows.tolist()})
 
     @property
     def _moves_and_rests(self) -> list[int]:
-        """The first and last row, and each row at which motion or rest begins."""
+        """The first row, the starts of motions and rests, and the last row."""
         begins = [
             move.start for before, move in pairwise(self.moves) if move.at_rest != before.at_rest
         ]
@@ -147,8 +147,7 @@ class Log:
         return rest
 
     def recording(self) -> Recording:
-        """The logged motion in the form of `evaluate`, with a segment for each move and each
-        rest, and its cycles."""
+        """The logged motion in the form of `evaluate`, divided into moves, rests and cycles."""
         rows = self.segment_rows
         edges = (self.time[rows[1:-1]] - self.time[0]).tolist()
         q, v, a = (channel.astype(float) for channel in (self.q, self.v, self.a))

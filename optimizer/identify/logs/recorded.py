@@ -1,4 +1,4 @@
-"""Energy measured in each segment of a log."""
+"""Measured energy of the segments of a log."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from joulepath.optimizer.problem.arm import Arm
 
 @dataclass(frozen=True)
 class MeasuredEnergy:
-    """Electrical energy by measurement during a part of a log."""
+    """Measured electrical energy during a part of a log."""
 
     electrical: Joules | None
     """Integral of the logged power of the arm's bus. Null if the log has none."""
@@ -41,8 +41,14 @@ class MeasuredEnergy:
 
 
 def measured(log: Log, arm: Arm) -> list[MeasuredEnergy]:
-    """Measured energy of each segment of `log.recording()`; empty if neither power nor efforts were
-    logged.
+    """Integrate the measured power over the segments of a log.
+
+    Args:
+        log: the log.
+        arm: the arm, for its drives and, with torques measured behind the gears, its friction.
+
+    Returns:
+        Energy of each segment of `log.recording()`; empty without logged power and efforts.
     """
     drives = arm.drives
     torque = None
@@ -74,13 +80,13 @@ def _part(log: Log, plant: Plant, torque: Array | None, rows: slice) -> Measured
     tau, motor = plant.torques(q, v, a), torque[rows]
     if log.torque_side == "link":
         motor = motor + plant.arm.drives.rotor_inertia * a + plant.friction.torque(v, motor)
-    # the measured torque beyond that of the motion is lost
+    # the excess of the measured torque over the rigid-body torque counts as loss
     energy = breakdown(weights, v, a, tau, 0.0, plant.arm, tau_friction=motor - tau)
     return MeasuredEnergy(drawn, energy.electrical.total)
 
 
 def _pieces(first: int, last: int) -> Iterator[tuple[int, int]]:
-    """Ranges of limited size, so that memory does not grow with the length of a log."""
+    """Ranges of limited size, to bound the memory for long logs."""
     return pairwise([*range(first, last, MOTION_LIMITS.block_rows), last])
 
 

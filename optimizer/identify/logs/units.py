@@ -1,4 +1,4 @@
-"""Units that a log names, in its header as `q1 [deg]` or in a line below the header."""
+"""Units named by a log, in its header as `q1 [deg]` or in a line below the header."""
 
 from __future__ import annotations
 
@@ -57,8 +57,13 @@ def split_units(names: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _split_unit(name: str) -> tuple[str, str]:
-    """A name without its unit in brackets, and the unit; a number in brackets is that of a
-    joint."""
+    """Split a name from the unit in brackets behind it.
+
+    A number in brackets is the number of a joint and remains in the name.
+
+    Returns:
+        Name and unit; the unit is empty if there is none.
+    """
     begin = max(name.rfind("["), name.rfind("("))
     bare, unit = name[: max(begin, 0)].rstrip(), name[begin + 1 : -1]
     is_unit = bare and name.endswith((")", "]")) and not {*unit} & {*")]"}
@@ -77,13 +82,13 @@ def is_line_of_units(cells: Sequence[str]) -> bool:
 def check_units(
     columns: Columns, units: Sequence[str], row: int, scales: Mapping[ChannelName, float]
 ) -> None:
-    """Check that named units are the units in which the columns are read.
+    """Check the named units of the columns against the expected units.
 
     Args:
         columns: columns of the file.
         units: unit of each column, or empty.
         row: number of the line with the units.
-        scales: factor to SI units of each group; 1 for SI units.
+        scales: factor from the unit of each group to its SI unit; 1 for SI units.
 
     Raises:
         InvalidTable: a column has another unit.

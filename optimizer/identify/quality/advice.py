@@ -1,10 +1,11 @@
-"""What to measure next, in the order of its share in the interval of an energy.
+"""Advice on the next measurement, ordered by the shares of figures in the variance of an energy.
 
-The interval is that of the answers: of identified figures by their covariance, and of all others by
-the ranges that they have before any log. If a figure were known, the variance of the energy would
-fall by the share of their squared correlation. Errors of figures compensate each other, so the term
-of a single figure in the variance can exceed the whole variance and is no measure. Each further
-share is that of a figure beside those before it, so errors that figures share count once.
+The variance equals the one of the answers: identified figures contribute their covariance, all other
+figures their prior ranges. Exact knowledge of a figure would reduce the variance of the energy by
+the squared correlation of the two. The diagonal term of a figure is no measure of its influence,
+because errors of figures compensate each other and a single term can exceed the total variance. The
+figures are selected one by one, and each selection conditions the covariance on the figures before,
+so that a shared error counts once.
 
 The standard deviation of a figure falls with the square root of the time in motion: halving it
 takes four times the moves (Verdonck 2004, Radkhah 2007: the excitation determines how well a log
@@ -64,11 +65,15 @@ ADVICE = AdviceSettings()
 
 
 def advice_of(energies: AnsweredEnergies, rows: Rows) -> tuple[Advice, ...]:
-    """The figures to measure better for motions like those of the rows, the most useful first.
+    """Select the figures to measure better for motions like the given rows.
 
     Args:
-        energies: energies of the fitted arm, as answers have them.
+        energies: energies of the fitted arm and their uncertainty, as in the answers.
         rows: rows of the motions.
+
+    Returns:
+        Advice per figure, the greatest share of the variance first; empty if the variance is not
+        positive and finite.
     """
     gradient, total = energies.gradient(rows), energies.variance(rows)
     if not np.isfinite(total) or total <= 0:
@@ -91,7 +96,7 @@ def advice_of(energies: AnsweredEnergies, rows: Rows) -> tuple[Advice, ...]:
 
 
 def _figures(nq: int, size: int) -> Iterator[tuple[str, int | None, IntArray]]:
-    """Name, joint and places in the vector (size,) of each figure that a log can determine."""
+    """Name, joint and indices in the vector (size,) for all figures a log can determine."""
     for name in _LOGGING_ADVICE:
         if name == "idle_power":
             yield name, None, np.arange(size)[place(BASE_POWER, nq)]
@@ -104,12 +109,12 @@ def _figures(nq: int, size: int) -> Iterator[tuple[str, int | None, IntArray]]:
 
 
 def _explained(covariance: Array, gradient: Array, at: IntArray) -> float:
-    """Variance [J²] that vanishes if the figures at these places (k,) are known."""
+    """Reduction of the variance [J²] by exact knowledge of the figures at the indices `at` (k,)."""
     return float(gradient @ _determined(covariance, at) @ gradient)
 
 
 def _determined(covariance: Array, at: IntArray) -> Array:
-    """Part of the covariance (p, p) that vanishes if the figures at these places (k,) are known."""
+    """Reduction of the covariance (p, p) by exact knowledge of the figures at `at` (k,)."""
     sd = np.sqrt(np.maximum(np.diag(covariance)[at], 0.0))
     at, sd = at[sd > 0], sd[sd > 0]
     correlation = covariance[np.ix_(at, at)] / np.outer(sd, sd)

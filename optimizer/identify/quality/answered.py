@@ -1,7 +1,7 @@
-"""Uncertainty of energies in answers that use identified figures.
+"""Uncertainty of the energies of answers with identified figures.
 
-Identified figures have the covariance of their document, and all others the ranges that they have
-before any log.
+The covariance of the identified figures comes from their document; all other figures keep their
+prior ranges.
 """
 
 from __future__ import annotations
@@ -28,14 +28,20 @@ MAX_ROWS = 2000
 
 @dataclass(frozen=True)
 class AnsweredEnergies:
-    """Energies of an arm with identified figures, as answers have them."""
+    """Energies of an arm with identified figures, and their uncertainty as in the answers."""
 
     arm: Arm
     fitted: FittedArm
 
     @classmethod
     def of(cls, robot: Robot, document: dict[str, Any], fitted: FittedArm) -> Self:
-        """Energies of a fitted arm, whose figures are in the document."""
+        """Energies of a fitted arm.
+
+        Args:
+            robot: the robot before the identification.
+            document: document of the identified figures.
+            fitted: the fitted arm.
+        """
         figures = with_document(robot.name, robot.figures, document)
         return cls(Arm(robot=robot_of(robot.name, figures)), fitted)
 
@@ -45,7 +51,14 @@ class AnsweredEnergies:
         return arm_spread(self.arm)
 
     def gradient(self, rows: Rows) -> Array:
-        """Derivatives (p,) of the energy [J] of the rows by the figures."""
+        """Derivatives of the energy of the rows with respect to the figures.
+
+        Uses evenly chosen rows if there are more than `MAX_ROWS`, with their weights scaled to the
+        same time.
+
+        Returns:
+            Derivatives, shape (p,) [J per unit of the figure].
+        """
         every = -(-len(rows.q) // MAX_ROWS)
         part = rows.take(np.arange(len(rows.q)) % every == 0)
         weight = part.weight * float(rows.weight.sum()) / float(part.weight.sum())

@@ -1,4 +1,4 @@
-"""How the friction of some rows of logs, such as those of one day, differs from the fitted one."""
+"""Measured over fitted friction in parts of logs, such as the rows of one day."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFriction:
-    """Friction of the motors of a log beside the fitted friction, row by row (n, nq) [N²·m²]; 0
-    where a joint is slow, or no torque of its motor was logged."""
+    """Products of measured and fitted friction torques per row and joint, shape (n, nq) [N²·m²].
+
+    The products are 0 for slow joints and without a logged motor torque.
+    """
 
     product: Array
     """Product of measured and fitted friction."""
@@ -24,7 +26,7 @@ class MeasuredFriction:
 
     @classmethod
     def of(cls, arm: FittedArm, rows: Rows, threshold: float) -> MeasuredFriction:
-        """Friction of joints that are faster than a threshold [rad/s]."""
+        """Friction of the joints at speeds above `threshold` [rad/s]."""
         torque = motor_torque(arm, rows)
         use = np.isfinite(torque) & (np.abs(rows.v) > threshold)
         fitted = np.where(use, arm.friction_torque(rows) - arm.offset, 0.0)
@@ -32,11 +34,18 @@ class MeasuredFriction:
         return cls(fitted * measured, fitted**2)
 
     def factor(self, use: Mask) -> Array:
-        """Measured over fitted friction (nq,) of some rows (n,); NaN of joints that are slow."""
+        """Least-squares ratio of measured to fitted friction per joint.
+
+        Args:
+            use: mask of the rows, shape (n,).
+
+        Returns:
+            Ratio, shape (nq,) [1]; NaN for a joint without a fast row.
+        """
         product, square = self.product[use].sum(axis=0), self.square[use].sum(axis=0)
         return np.asarray(product / np.where(square > 0, square, np.nan))
 
     def mean_factor(self, use: Mask) -> float:
-        """Measured over fitted friction of all joints together."""
+        """Least-squares ratio of measured to fitted friction over all joints [1]."""
         square = self.square[use].sum()
         return float(self.product[use].sum() / square) if square > 0 else np.nan
