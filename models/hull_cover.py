@@ -1,4 +1,4 @@
-"""Convex hulls that cover links: distances of points from them, and their fit."""
+"""Convex hulls as covers of links: signed distances of points, and the fit of hulls."""
 
 from __future__ import annotations
 
@@ -29,10 +29,16 @@ HULL_FIT = HullFitSettings()
 
 
 def from_hull(points: Array, corners: Array, within: float = np.inf) -> Array:
-    """Signed distances (k,) [m] of points (k, 3) [m] from the convex hull of corners (m, 3) [m].
+    """Signed distances of points from a convex hull; negative inside.
 
-    Inside, the distance is minus that of the nearest face. Distances above `within` [m] are lower
-    bounds that are also above it, and found much sooner.
+    Args:
+        points: points, shape (k, 3) [m].
+        corners: points with the hull in question, shape (m, 3) [m].
+        within: distance up to which the result is exact [m]. Beyond it, the result is a lower bound
+            above `within`, which is much cheaper to compute.
+
+    Returns:
+        Signed distances, shape (k,) [m]; inside, minus the distance from the nearest face.
     """
     hull = ConvexHull(corners)
     planes = hull.equations
@@ -79,10 +85,21 @@ def hull_around(
     checkpoint: Checkpoint = unwatched,
     radius: float = HULL_FIT.radius,
 ) -> Array:
-    """Points (n, 3) [m] whose hull, grown by the radius [m], contains points (k, 3) [m].
+    """Choose few of the given points with a grown hull around all points.
 
-    The point that is the farthest outside is added until none is, or until there are more than
-    `most`: then the hull is too small. Raises QhullError for flat points.
+    The algorithm adds the outermost point until the grown hull contains all points.
+
+    Args:
+        points: points to contain, shape (k, 3) [m].
+        most: number of chosen points at which the search gives up.
+        checkpoint: called in every iteration; may raise to interrupt.
+        radius: radius by which the hull is grown [m].
+
+    Returns:
+        Chosen points, rounded, shape (n, 3) [m]. With n > `most`, the hull is too small.
+
+    Raises:
+        QhullError: the points lie in a plane.
     """
     points = points[ConvexHull(points).vertices]
     # Rounding moves a point, and with it the hull, by at most half of a cell's diagonal.
@@ -101,8 +118,8 @@ def hull_around(
 
 
 def _spanning(points: Array) -> list[int]:
-    """Indices of four points: each is the farthest from the point, line or plane through those
-    before.
+    """Indices of four points, chosen one by one at the greatest distance from the point, line or
+    plane through the points before.
     """
     chosen, away = [0], points - points[0]
     for _ in range(3):

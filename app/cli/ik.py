@@ -36,11 +36,11 @@ def ik(
     output: Path | None,
     wanted: Literal["json", "csv"],
 ) -> None:
-    """Finds all arm configurations that reach a pose.
+    """Finds all arm configurations at a pose.
 
     FILE is the JSON of `POST /ik`, or - for standard input. The answer is JSON, or a CSV with the
-    columns q1, q2, … [rad] and one line per configuration, which `joulepath evaluate` reads. If
-    standard error is a terminal, a summary follows: the branches, and which collide.
+    columns q1, q2, … [rad] and one line per configuration, readable by `joulepath evaluate`. If
+    standard error is a terminal, a summary of the branches and their collisions follows.
     """
     from joulepath.app.api.ik.task import IKRequest, IKTask
 

@@ -35,7 +35,7 @@ def studies(context: click.Context, url: str, key: str | None) -> None:
     """Lists the studies of a service; begins, continues, shows and deletes them.
 
     A study improves one motion step by step until its energy is low enough. These commands need a
-    service that runs, and the extra `client` of the package.
+    running service, and the extra `client` of the package.
     """
     connect(context, url, key)
     if context.invoked_subcommand is None:
@@ -81,7 +81,7 @@ def add(client: Client, id: str, file: str, output: Path | None) -> None:
     input, and writes its figures as JSON.
 
     FILE has the JSON of `POST /optimize`, or a step: an object with `optimize` or `evaluate`.
-    Robot, figures and objective are those of the study.
+    Robot, figures and objective are taken from the study.
     """
     body = json_of(file)
     step = body if len(body) == 1 and next(iter(body)) in STEPS else {"optimize": body}
@@ -123,8 +123,8 @@ Example:
 @OUTPUT
 @click.pass_obj
 def suggest(client: Client, id: str, output: Path | None) -> None:
-    """Writes changes of the best motion of the study ID that need less energy, each with a request
-    that `add` takes."""
+    """Writes changes of the best motion of the study ID with less energy, and a request for `add`
+    with every change."""
     with answered():
         found = client.suggestions(id)
     write(orjson.dumps(found), output)

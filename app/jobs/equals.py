@@ -36,7 +36,7 @@ class Sorted:
 
 
 class Equals:
-    """Requests waiting for an equal one; `released` returns them once its answer is stored."""
+    """Requests waiting for an equal request; `released` returns them after its answer is stored."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -76,7 +76,12 @@ class Equals:
                 )
 
     def ended(self, held: Held, outcome: Outcome) -> list[tuple[Held, Outcome]]:
-        """Outcomes of waiting requests failing in the same way as a request which has ended."""
+        """Pass the outcome of an ended request on to the requests waiting for it.
+
+        Returns:
+            Outcomes of the waiting requests if the request failed by an error of its own; empty if
+            they must compute or read the answer, see `released`.
+        """
         if held.asked is None or not held.leads:
             return []
         held.leads = False
@@ -99,7 +104,7 @@ class Equals:
         ]
 
     def released(self) -> list[Held]:
-        """Requests which no longer wait: their answer is stored, or they were dropped."""
+        """Remove and return the requests with a stored answer, and dropped requests."""
         for key, followers in self._followers.items():
             self._released += [each for each in followers if each.dropped]
             self._followers[key] = [each for each in followers if not each.dropped]
@@ -107,7 +112,7 @@ class Equals:
         return released
 
     def _follows(self, held: Held) -> bool:
-        """Whether the request waits for an equal one; otherwise equal ones may wait for it."""
+        """Whether the request waits for an equal request. If not, it becomes the leader."""
         if held.asked is None:
             return False
         followers = self._followers.get(held.asked.key)

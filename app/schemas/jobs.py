@@ -1,4 +1,4 @@
-"""What the routes under `/jobs` take and answer."""
+"""Requests and responses of the routes under `/jobs`."""
 
 from __future__ import annotations
 
@@ -95,11 +95,11 @@ RequestOfJob = Annotated[
 
 
 class NewJob(Request):
-    """Requests that are computed while their client does not wait."""
+    """Requests computed in the background."""
 
     requests: list[RequestOfJob] = described(
         "The requests, in any mixture. `deadline` counts from the begin of the work on a request. "
-        "It may be longer than that of a request that is answered at once: up to "
+        "It may exceed the deadline of a synchronous request, up to "
         "`JOULEPATH_MAX_JOB_DEADLINE`.",
         None,
         [{"optimize": OPTIMIZE}, {"evaluate": EVALUATE}],
@@ -117,7 +117,7 @@ class NewJob(Request):
 
 
 class Counts(Response):
-    """Number of requests in each state."""
+    """Number of requests by state."""
 
     waiting: int = described("Wait for a worker.", "1", 1)
     running: int = described("Handed out to workers.", "1", 1)
@@ -212,7 +212,7 @@ class JobList(Response):
 
 
 class JobPage(Query):
-    """The part of the list of jobs that is returned."""
+    """The requested part of the list of jobs."""
 
     limit: int = limit_of("jobs")
     after: str | None = after_of(JOB_ID)
@@ -221,7 +221,7 @@ class JobPage(Query):
     )
     search: Name | None = search_in("the name")
     identifications: bool = described(
-        "Whether identifications, which are jobs as well, are in the list.",
+        "Whether the list includes identifications, which are jobs as well.",
         None,
         True,
         default=True,
@@ -229,7 +229,7 @@ class JobPage(Query):
 
 
 class RequestPage(Query):
-    """The part of a job's requests that is returned."""
+    """The requested part of a job's requests."""
 
     limit: int = described(
         "Largest number of requests in the answer.", "1", 100, default=100, ge=1, le=1000

@@ -43,7 +43,11 @@ class StudyRequest(Request):
         default=None,
     )
     threshold: float = described(
-        "Energy of the objective at or below which the study has reached its aim.", "J", 60.0, gt=0, le=1e9
+        "Energy of the objective at or below which the study has reached its aim.",
+        "J",
+        60.0,
+        gt=0,
+        le=1e9,
     )
     objective: Objective = described(
         "Energy minimised by the iterations and compared with the threshold.",
@@ -156,7 +160,9 @@ class StudySummary(Response):
         None,
         "electrical",
     )
-    threshold: float = described("Energy of the objective at or below which the study has reached its aim.", "J", 60.0)
+    threshold: float = described(
+        "Energy of the objective at or below which the study has reached its aim.", "J", 60.0
+    )
     created: datetime = described("Time at which the study was created, in UTC.", None, CREATED)
     owner: str | None = described(
         "Name of the API key that created it; null without one.", None, "press_shop"

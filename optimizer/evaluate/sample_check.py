@@ -27,16 +27,16 @@ SAMPLE_CHECK = SampleCheckSettings()
 
 
 def check_samples(arm: Arm, spline: Spline, t: Array, samples: Sequence[Array]) -> None:
-    """Check that samples of a motion belong to a spline on an arm.
+    """Compare given samples of a motion with its spline on an arm.
 
-    The torques show a different payload, mounting or robot.
+    The torques reveal another payload, mounting or robot.
 
     Args:
-        arm: arm that is said to make the motion.
+        arm: claimed arm of the motion.
         spline: motion of the arm.
         t: times of the samples, shape (k,) [s].
-        samples: q [rad], v [rad/s], a [rad/s²], and tau [N·m] of rigid bodies and rotors,
-            shape (k, nq) each.
+        samples: q [rad], v [rad/s], a [rad/s²], and tau [N·m] of rigid bodies and rotors, all
+            of shape (k, nq).
 
     Raises:
         NotCertified: the samples differ by more than rounding errors.

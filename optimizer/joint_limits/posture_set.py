@@ -16,7 +16,7 @@ SPEED_TOLERANCE = 1e-5
 
 @dataclass(frozen=True)
 class PostureSet:
-    """Boxes with middles `centre` and half sides `half`, shape (n, nq) each [rad]."""
+    """Boxes with middles `centre` and half sides `half`, both of shape (n, nq) [rad]."""
 
     centre: Array
     half: Array
@@ -30,10 +30,15 @@ class PostureSet:
 
     @classmethod
     def along(cls, spline: Spline, arm: Arm, parts: int = 200) -> PostureSet:
-        """Boxes that contain a motion within the speed limits, one for each of equal times.
+        """Boxes around a motion within the speed limits, one per interval of equal duration.
 
-        Within a time h, a joint stays within v_max · h / 2 of the mean of its positions at both
-        ends.
+        Within an interval of duration h, a joint stays within v_max · h / 2 of the mean of its
+        positions at both ends.
+
+        Args:
+            spline: the motion.
+            arm: the arm, for its speed limits.
+            parts: number of intervals.
         """
         t = np.linspace(0.0, spline.duration, parts + 1)
         q = sample(spline, t)[0]
@@ -41,7 +46,7 @@ class PostureSet:
         return cls((q[:-1] + q[1:]) / 2, np.repeat(half[None], parts, axis=0))
 
     def draw(self, count: int) -> Array:
-        """Random postures in the boxes, shape (count, nq) [rad]; the same ones every time."""
+        """Random postures in the boxes, shape (count, nq) [rad], from a fixed seed."""
         random = np.random.default_rng(0)
         box = random.integers(len(self.centre), size=count)
         share = random.uniform(-1.0, 1.0, (count, self.centre.shape[1]))

@@ -1,4 +1,4 @@
-"""Candidates along a tool path: one for each start configuration from which the arm follows it."""
+"""Candidates along a tool path: one per start configuration with a complete trace of the path."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PATH_ENDS = PathEndSettings()
 
 
 def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
-    """A candidate for each start configuration from which the arm follows the tool path to its end.
+    """Trace the tool path from all start configurations, and build a candidate of each full trace.
 
     Raises:
         PathInfeasible: no configuration follows the path to its end.
@@ -73,10 +73,10 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
 
 
 def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> list[Trace]:
-    """The traces of the tool path from each start configuration.
+    """Trace the tool path from the start configurations.
 
-    From a free start the tool turns evenly. For a branch without an angle from which an even turn
-    reaches the end, a course of turning is computed from one angle.
+    With a free start, the tool turns at an even rate. If no start angle of a branch leads to the
+    end this way, an uneven course of the rotation is computed from one angle.
     """
     course, arm = prepared.course, prepared.arm
     assert course is not None
@@ -99,17 +99,17 @@ def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> li
 def bound_beside(
     prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline, enough: float
 ) -> float:
-    """Lower bound on motions along the tool path between other ends than those of candidates [J].
+    """Lower bound [J] on motions along the tool path with other ends than the candidates.
 
-    A path may come so near to a singularity that a motion within its tolerance continues in another
-    branch than the followed one, and of a self-motion at the start only samples were followed. So
-    the bound covers all motions between the first and the last pose in other configurations. If an
-    end leaves a rotation free, it covers all configurations of both ends.
+    The bound covers all motions between the first and the last pose in other configurations, for
+    two reasons: close to a singularity, a motion within the tolerance of the path may continue in
+    another branch, and only samples of a self-motion at the start were followed. With a free
+    rotation at an end, the bound covers all configurations of both ends.
 
     Args:
         prepared: problem of the motions.
         followed: candidates along the path.
-        deadline: instant at which the search for the bound ends.
+        deadline: end of the search for the bound.
         enough: sufficient bound for ends with a free rotation [J].
     """
     start, goal = prepared.problem.start, prepared.problem.goal
@@ -142,7 +142,14 @@ def bound_beside(
 def _bound_to_free(
     problem: Problem, goal: EndConfiguration, deadline: Deadline, enough: float
 ) -> float:
-    """Lower bound [J] on motions to any configuration of a partly free goal, from one of them."""
+    """Lower bound [J] on motions to any configuration of a partly free goal.
+
+    Args:
+        problem: the problem without its tool path.
+        goal: any configuration of the goal.
+        deadline: end of the search for the bound.
+        enough: sufficient bound [J].
+    """
     prepared = PreparedProblem.of(problem)
     anywhere = [Candidate(start, goal, start.q, goal.q) for start in ends(prepared, "start")[0]]
     return min(
@@ -185,7 +192,7 @@ def _candidate(
 
 
 def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[float]]:
-    """Positions of each joint at the start that lead to a given goal; all if none does."""
+    """Start positions by joint consistent with a given goal; all positions if none is."""
     if not isinstance(goal, np.ndarray):
         return start.choices
     needed = goal - (trace.q[-1] - trace.q[0])
@@ -207,5 +214,5 @@ def attempt_of(limits: Limits, start: EndConfiguration, trace: Trace) -> PathAtt
 
 
 def _least_turns(trace: Trace, choices: Sequence[Sequence[float]]) -> Array:
-    """Full turns (nq,) [rad] to the choice of each joint at the start nearest to zero."""
+    """Full turns (nq,) [rad] from the trace to the start positions nearest to zero."""
     return np.asarray([min(each, key=abs) for each in choices] - trace.q[0])

@@ -1,4 +1,4 @@
-"""Changes of a task that may need less energy."""
+"""Changes of a task with a prospect of less energy."""
 
 from __future__ import annotations
 
@@ -41,14 +41,19 @@ class Variant:
 
 
 def over_period(task: Task, period: float) -> Task:
-    """The task with all the time from one start to the next to itself."""
+    """The task with the period from one start to the next as its time [s]."""
     if isinstance(task, CycleRequest):
         return task.model_copy(update={"time": period})
     return task.model_copy(update={"dwell": Dwell(time=period), "duration": None})
 
 
 def variants(task: Task, rests: float) -> Iterator[Variant]:
-    """Changes of a task in which the arm rests for `rests` [s]."""
+    """Changes of a task.
+
+    Args:
+        task: the task.
+        rests: time at rest [s]; brakes pay only beyond their delay.
+    """
     if rests > ADVICE.brake_delay and (braked := _braked(task)) is not None:
         yield Variant("brakes", braked)
     if isinstance(task, CycleRequest):
@@ -62,7 +67,7 @@ def variants(task: Task, rests: float) -> Iterator[Variant]:
 
 
 def _braked(task: Task) -> Task | None:
-    """The task with brakes at rest; None if it has them, or does not rest."""
+    """The task with brakes at rest; None for a task with brakes already, or without rest."""
     name = "hold" if isinstance(task, CycleRequest) else "dwell"
     holding: Holding | None = getattr(task, name)
     if holding is None or holding.hold == "brakes":
@@ -72,8 +77,8 @@ def _braked(task: Task) -> Task | None:
 
 
 def _without_home(task: CycleRequest) -> CycleRequest | None:
-    """The cycle that begins and ends at its last stop; None if the arm would carry something else
-    there, or begins there.
+    """The cycle from its last stop back to it, without the start; None if the payloads there and at
+    the start differ, or if the last stop is the start.
     """
     last = task.stops[-1]
     if not task.closed or task.order == "free" or len(task.stops) < 2:

@@ -1,4 +1,4 @@
-"""The report of a motion or a cycle: nothing is computed but sums, shares and costs."""
+"""The report of a motion or a cycle. It only computes sums, shares and costs."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
 
 
 def _saved(answer: dict[str, Any], rival: dict[str, Any]) -> float:
-    """What is saved against a rival [J], in the time of the longer of both."""
+    """Saving over a rival [J], in the time of the longer motion."""
     objective, saving = answer["objective"], float(rival["saving"])
     if rival["duration"] > answer["duration"]:
         return saving * float(rival[objective])
@@ -141,7 +141,7 @@ def _share(answer: dict[str, Any], rival: dict[str, Any], held: float) -> float:
 
 
 def _yearly(bundle: Bundle, rival: dict[str, Any]) -> str:
-    """What the saving is in a year, where its shifts are given."""
+    """Saving per year, as a sentence; empty without the number of shifts."""
     money = Money.of(bundle)
     if bundle.answer["objective"] != "electrical" or money.shifts is None:
         return ""
@@ -154,7 +154,7 @@ def _words(rival: dict[str, Any]) -> str:
 
 
 def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
-    """The answer, then its rivals, those within the limits first."""
+    """The answer, then its rivals; rivals within the limits precede the others."""
     answer = bundle.answer
     objective = answer["objective"]
     total = answer["energy"][objective]["total"]
@@ -236,7 +236,7 @@ def course_of(bundle: Bundle, program: Program) -> Course:
 
 
 def proven(answer: dict[str, Any]) -> str:
-    """What the certificate of an answer proves, in sentences."""
+    """Statements of the certificate of an answer, in sentences."""
     used = limits_used(answer["certificate"]["worst_ratio"])
     sentences = [f"Every limit is kept: {used}."]
     clearance = answer["certificate"].get("clearance")

@@ -76,7 +76,8 @@ async def mjcf(
     request: Request, name: Name, settings: ServiceSettings, engine: ServiceArmEngine
 ) -> Response:
     """The chain of joints from `base` to `flange` with rotor inertias, friction, limits, torque
-    motors and the capsules of the links, for MuJoCo, whose torques are then those of the answers.
+    motors and the capsules of the links, for MuJoCo. Torques in MuJoCo equal the torques of the
+    answers.
     """
     work = engine.run(MjcfTask(name, request.state.id), settings.max_deadline)
     return result_response(await unless_disconnected(request, work))
@@ -109,8 +110,8 @@ async def joint_limits(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
 ) -> Response:
-    """Limits on speed and acceleration that keep the torque limits in every posture, at all speeds
-    and accelerations within the limits, with every payload up to the given mass: proven."""
+    """Limits on speed and acceleration with a proof: motions within them respect the torque limits
+    in every posture, with every payload up to the given mass."""
     work = engine.run(JointLimitsTask(name, query, request.state.id), settings.max_deadline)
     return result_response(await unless_disconnected(request, work))
 
@@ -142,8 +143,8 @@ async def meshes(
     engine: ServiceClientEngine,
     store: ServiceStore,
 ) -> Response:
-    """The maker's meshes, simplified, as a glTF file with one node for each link, named as it and
-    in its frame. Where `has_meshes` of `GET /robots/{name}` is true."""
+    """Simplified meshes of the maker as a glTF file, with one node per link. A node has the name and
+    the frame of its link. Available if `has_meshes` of `GET /robots/{name}` is true."""
     tag = await run_in_threadpool(digest, name) if name in robot_names() else None
     if tag is None:
         if name not in robot_names():

@@ -1,4 +1,4 @@
-"""What `POST /whatif` answers: a motion, and the same and the best motion of each changed arm."""
+"""Answer of `POST /whatif`: a motion, and the same and the best motion of all changed arms."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Difference:
 
     @classmethod
     def of(cls, base: float, value: float) -> Self:
-        """The difference of a value from that of the base."""
+        """Difference of a value from the base value."""
         difference = value - base
         return cls(value, difference, difference / abs(base) if abs(base) > ENERGY_FLOOR else None)
 
@@ -72,7 +72,7 @@ class PowerChange(Difference):
 
 @dataclass(frozen=True)
 class ElectricalChange:
-    """Energy drawn from the supply and its parts, each compared with the base; parts as in
+    """Energy drawn from the supply and its parts, compared with the base; parts as in
     `POST /optimize`."""
 
     total: EnergyChange
@@ -90,9 +90,9 @@ class ElectricalChange:
     inverter: EnergyChange
     """Loss in the inverters."""
     braking: EnergyChange
-    """Regenerated energy that no joint uses and no energy storage takes."""
+    """Regenerated energy beyond the use of the joints and the energy storage."""
     recovered: EnergyChange
-    """The part of `braking` that the supply takes back; zero or negative."""
+    """The part of `braking` returned to the supply; zero or negative."""
     storage_loss: EnergyChange
     """Loss in the energy storage on the bus."""
     dwell: EnergyChange
@@ -100,7 +100,7 @@ class ElectricalChange:
 
     @classmethod
     def of(cls, base: ElectricalEnergy, value: ElectricalEnergy) -> Self:
-        """The differences of an energy and its parts from those of the base."""
+        """Differences of an energy and its parts from the base."""
         parts = [(getattr(base, each.name), getattr(value, each.name)) for each in fields(cls)]
         return cls(*(EnergyChange.of(before, after) for before, after in parts))
 
@@ -122,7 +122,7 @@ class ChangedMotion:
 
     @classmethod
     def of(cls, base: Motion, energy: Energy, duration: float, **own: Any) -> Self:
-        """A motion of the changed arm. `own` are the fields that the class has beside these."""
+        """A motion of the changed arm; `own` has the further fields of a subclass."""
         before = base.energy
         return cls(
             duration=DurationChange.of(base.duration, duration),
@@ -156,7 +156,7 @@ class SameMotion(ChangedMotion, Verdict):
 
 @dataclass(frozen=True, kw_only=True)
 class KeptMotion:
-    """An optimised motion whose complete answer is kept."""
+    """An optimised motion with a stored complete answer."""
 
     answer: str
     """Path of the complete answer of `POST /optimize`."""
@@ -191,7 +191,7 @@ class ChangeResult:
 
 @dataclass(frozen=True, kw_only=True)
 class WhatifBase:
-    """The motion on the unchanged arm, with which the changes are compared."""
+    """The motion on the unchanged arm, the reference of all changes."""
 
     answer: str
     """Path of the complete answer of `POST /optimize` or `POST /evaluate`."""
@@ -212,7 +212,7 @@ class WhatifBase:
 
     @classmethod
     def of(cls, motion: Motion, answer: str, status: Status | None, holds: bool) -> Self:
-        """The base of a motion, whose complete answer is kept under the path `answer`."""
+        """The base of a motion; its complete answer is stored under the path `answer`."""
         energy = motion.energy
         return cls(
             answer=answer,

@@ -1,10 +1,10 @@
 """Examples of requests and answers, from the files in the folder `examples` of the repository.
 
-`examples/openapi/<path>.json` lists the requests that the OpenAPI document shows, by the names of
-their files in `examples/<path>`, each with its summary and description. It has an answer, too,
-unless the models of the answer have examples of their own, and no requests if they are in a module
-of this room. Parameters are left out of a path: where
-it has one, the files may be in folders, which give the examples their names.
+`examples/openapi/<path>.json` lists the requests of the OpenAPI document by the names of their files
+in `examples/<path>`, with summary and description. The file also has an answer, unless the models
+of the answer have examples of their own. It has no requests if a module of this package defines
+them. The name of the file omits the parameters of a path; for a path with a parameter, the files
+may be in folders, and the examples take the names of the folders.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MEDIA_TYPES = {".json": "application/json", ".csv": "text/csv"}
 
 @cache
 def folder() -> Path:
-    """The folder of the examples: the copy in the wheel, or that of the repository."""
+    """Folder of the examples: the copy in the wheel, or the folder of the repository."""
     app = Path(__file__).resolve().parents[2]
     installed = app / "static" / "examples"
     return installed if installed.is_dir() else app.parent / "examples"
@@ -31,7 +31,7 @@ def folder() -> Path:
 
 @cache
 def shown() -> dict[str, dict[str, Any]]:
-    """What `examples/openapi` has, by the path of the endpoint."""
+    """Contents of `examples/openapi` by the path of the endpoint."""
     listed = folder() / "openapi"
     return {
         f"/{file.relative_to(listed).with_suffix('').as_posix()}": json.loads(

@@ -1,9 +1,9 @@
-"""Base parameters: the fewest combinations of standard parameters that determine the torques.
+"""Base parameters: the minimal set of combinations of standard parameters behind the torques.
 
 Most parameters of a body have no effect on any torque, or only together with others. At random
 states, the regressor has as many independent columns as there are base parameters. A QR
-decomposition with column pivoting finds these columns, and the dependent columns as combinations
-of them (Gautier 1991).
+decomposition with column pivoting finds these columns, and expresses the dependent columns by the
+independent ones (Gautier 1991).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ BASE_PARAMETERS = BaseParameterSettings()
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """Base parameters as combinations of standard ones: base = combination @ standard."""
+    """Base parameters as linear combinations: base = combination @ standard."""
 
     names: tuple[str, ...]
     """Names (p,) of the standard parameters: bodies first, then rotors if there are any."""
@@ -60,14 +60,14 @@ class BaseParameters:
 
     @property
     def expressions(self) -> tuple[str, ...]:
-        """Each base parameter as a sum of standard parameters."""
+        """Base parameters as sums of standard parameters, for display."""
         return tuple(
             self._expression(row, main)
             for row, main in zip(self.combination, self.independent, strict=True)
         )
 
     def single_rotors(self, body_count: int) -> tuple[int, ...]:
-        """Numbers of the base parameters that consist of a single rotor inertia.
+        """Indices of the base parameters equal to a single rotor inertia.
 
         Args:
             body_count: number of standard parameters of bodies.
@@ -87,7 +87,12 @@ class BaseParameters:
 
 
 def base_parameters(model: pin.Model, rotors: bool = True) -> BaseParameters:
-    """The base parameters of an arm, of bodies and optionally of rotors."""
+    """Find the base parameters of an arm.
+
+    Args:
+        model: model of the arm.
+        rotors: whether to include the inertias of the rotors.
+    """
     generator, settings = np.random.default_rng(0), BASE_PARAMETERS
     nq = model.nq
     q, v, a = (
@@ -110,11 +115,12 @@ def independent_columns(
 
     Args:
         matrix: the matrix (n, p).
-        tolerance: diagonal entry of R over the largest one, up to which a column is dependent.
+        tolerance: largest ratio of the diagonal entry of a dependent column in R to the greatest
+            diagonal entry [1].
 
     Returns:
-        Numbers (b,) of the independent columns, and the coefficients (b, p) that combine all
-        columns from them.
+        Indices (b,) of the independent columns, and coefficients (b, p) of all columns as
+        combinations of the independent ones.
     """
     _, R, order = qr(matrix, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(R))

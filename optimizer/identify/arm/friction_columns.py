@@ -27,15 +27,18 @@ UNBOUNDED = ("offset", SENSOR_GAIN)
 
 
 def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: float = 1.0) -> Array:
-    """Column (n,) of one coefficient.
+    """Column of one coefficient in the linear model of the torque.
 
     Args:
         term: name of the coefficient.
         v: velocity (n,) [rad/s].
         a: acceleration (n,) [rad/s²].
         rigid: rigid-body torque (n,) [N·m].
-        knee: speed over which Coulomb friction reverses [rad/s].
-        speed: speed at which the curved term bends [rad/s].
+        knee: range of speed in which Coulomb friction reverses [rad/s].
+        speed: speed scale of the curved term [rad/s].
+
+    Returns:
+        Derivative of the torque with respect to the coefficient, shape (n,).
     """
     if term in ("viscous", SENSOR_VISCOUS):
         return v
@@ -52,8 +55,10 @@ def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: floa
 
 
 def deciding_term(terms: Collection[str]) -> str | None:
-    """The first of the `LAW_TERMS` among `terms`: a joint where it is held keeps the terms of the
-    robot's own law that are not among them. None if none of them is a term of the law."""
+    """First of the `LAW_TERMS` among `terms`; None if there is none.
+
+    A joint with this term held keeps the unrequested terms of the robot's own friction law, too.
+    """
     return next((term for term in LAW_TERMS if term in terms), None)
 
 

@@ -1,4 +1,4 @@
-"""Regression of joints that are fitted together."""
+"""Linear regression of blocks of joints; the joints of a block are fitted together."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 @dataclass(frozen=True)
 class BlockFitSettings:
-    """Solutions of each estimator; all but the first reweight the rows."""
+    """Number of solutions per estimator; the second and later ones use new weights of the rows."""
 
     ols_passes: int = 1
     wls_passes: int = 2
@@ -41,7 +41,7 @@ class BlockFitSettings:
     irls_passes: int = 8
 
     def passes(self, estimator: Estimator, joints: int) -> int:
-        """Solutions of an estimator for a number of joints."""
+        """Number of solutions of an estimator for a block of some joints."""
         return {
             "ols": self.ols_passes,
             "wls": self.wls_passes if joints > 1 else 1,
@@ -72,43 +72,43 @@ class JointBlock:
     own: Mapping[Name, float]
     """The robot's own values of the terms."""
     own_sd: dict[Name, float]
-    """Standard deviations of these before the logs; 0 for other terms than friction and rotors."""
+    """Prior standard deviations of the own values; 0 for terms besides friction and rotors."""
     spread: Mapping[int | None, float]
     """Standard deviation of the rigid torque of each joint [N·m]."""
     speed: Array
-    """Speeds (nq,) at which the curved terms bend [rad/s]."""
+    """Speed scales (nq,) of the curved terms [rad/s]."""
     nuisances: frozenset[str]
-    """Terms that are no figures of the robot."""
+    """Terms of the measurement, no figures of the robot."""
     unrequested: Array
-    """Torque (n,) of the terms of the robot's own law that are not requested [N·m]. A joint whose
-    deciding term is held keeps them; the law of any other joint has the requested terms alone."""
+    """Torque (n,) of the unrequested terms of the robot's own friction law [N·m]. A joint keeps
+    these terms if its deciding term is held; otherwise its law has only the requested terms."""
     deciding: str | None
-    """That term; None if no friction is fitted."""
+    """Name of the deciding term, from `deciding_term`; None if no friction is fitted."""
 
     def keeps(self, held: Container[Name]) -> Mask:
-        """Whether joints (nq,) keep the terms that are not requested, for terms that are held."""
+        """Whether joints (nq,) keep their unrequested terms, given the held terms."""
         return np.array(
             [self.deciding is None or (self.deciding, j) in held for j in range(len(self.speed))]
         )
 
     @property
     def unrequested_columns(self) -> Array:
-        """Torques (n, nq) of the terms that are not requested [N·m], each in its joint's rows."""
+        """Torques of the unrequested terms (n, nq) [N·m]; nonzero only in the rows of the joint."""
         return np.where(
             self.joint[:, None] == np.arange(len(self.speed)), self.unrequested[:, None], 0
         )
 
     def kept_torque(self, held: Container[Name]) -> Array:
-        """Torque (n,) [N·m] of terms that are not requested and kept, for terms that are held."""
+        """Torque of the kept unrequested terms (n,) [N·m], given the held terms."""
         return np.where(self.keeps(held)[self.joint], self.unrequested, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class LawEquations:
-    """Normal equations of G groups for p unknowns, by the joints that keep unrequested terms."""
+    """Normal equations of G groups for p unknowns, for any set of joints with kept terms."""
 
     every: GroupedEquations
-    """With the unknowns first, and then the torques (nq,) of unrequested terms."""
+    """Equations in the unknowns, followed by the torques (nq,) of unrequested terms."""
     nq: int
 
     def keeping(self, joints: Mask) -> GroupedEquations:
@@ -119,7 +119,7 @@ class LawEquations:
 
 
 def terms_of(options: IdentificationOptions) -> list[str]:
-    """Names of the fitted terms of each joint."""
+    """Names of the terms fitted per joint."""
     friction = options.joint_terms if "friction" in options.targets else ()
     scale = (SCALE,) if "torque_constant" in options.targets else ()
     return [*friction, *(("rotor_inertia",) if "rotor" in options.targets else ()), *scale]
@@ -228,7 +228,7 @@ def _coupled_columns(
 
 
 def _unrequested_law(robot: Robot, terms: Sequence[str], knee: float) -> FrictionLaw:
-    """The terms of the robot's own law that are not among those of a fit."""
+    """The robot's own friction law without the terms of a fit."""
     law, none = robot.friction, np.zeros(robot.nq)
     parts: dict[str, Any] = {name: none for name in LAW_TERMS if name in terms}
     return replace(law, **parts, knee=knee)
@@ -237,7 +237,7 @@ def _unrequested_law(robot: Robot, terms: Sequence[str], knee: float) -> Frictio
 def moving_rows(
     rows: Rows, torque: Array, joint: int, threshold: float, couplings: Sequence[Coupling]
 ) -> Mask:
-    """Rows (n,) with a torque in which a joint and the motors coupled to it move.
+    """Select the rows with a torque and with motion of a joint and its coupled motors.
 
     Args:
         rows: rows of the logs.
@@ -283,7 +283,7 @@ def own_value(robot: Robot, name: Name) -> float:
 
 
 def _known_torque(robot: Robot, rows: Rows, options: IdentificationOptions) -> Array:
-    """Torque (n, nq) [N·m] of the rigid bodies, and of rotors that are not fitted."""
+    """Torque of the rigid bodies and of rotors without a fit, shape (n, nq) [N·m]."""
     known = np.zeros_like(rows.rigid) if "torque_constant" in options.targets else rows.rigid.copy()
     if "rotor" not in options.targets:
         known += robot.drives.rotor_inertia * rows.a

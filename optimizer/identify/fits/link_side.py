@@ -1,8 +1,9 @@
-"""Fits to torques that sensors measure behind the gears.
+"""Fits to torques measured by sensors behind the gears.
 
-Such torques carry links and load, but neither rotors nor the friction of motors and gears. They
-identify links, and what the sensors themselves add: an offset, a gain, and the small friction of
-the bearings behind them. Friction and rotors of the drives stay the robot's own.
+Such torques contain the dynamics of the links and the load, but neither the rotors nor the friction
+of motors and gears. They identify the links and three terms of the sensors: an offset, a gain, and
+the small friction of the bearings behind the sensors. Friction and rotors of the drives keep the
+values of the robot.
 """
 
 from __future__ import annotations
@@ -33,20 +34,19 @@ BEHIND_GEARS = (
 
 @dataclass(frozen=True, kw_only=True)
 class SensorOptions(IdentificationOptions):
-    """Options of a fit to torques behind the gears, none of whose terms is a figure of the
-    robot."""
+    """Options of a fit to torques behind the gears. No fitted term is a figure of the robot."""
 
     best_reversal: int
-    """Number of the distance over which the friction reverses, among those of the rows."""
+    """Index, among the candidates of the rows, of the distance in which the friction reverses."""
 
     @property
     def reversal(self) -> int:
-        """The best one."""
+        """Index of the best distance."""
         return self.best_reversal
 
     @property
     def joint_terms(self) -> tuple[str, ...]:
-        """Terms of the sensors. Only the robot's own links tell their gains from other links."""
+        """Terms of the sensors. The gain is identifiable only with a prior on the links."""
         gain = (SENSOR_GAIN,) if self.refit else ()
         return (SENSOR_COULOMB, SENSOR_VISCOUS, "offset", *gain)
 
@@ -57,7 +57,7 @@ class SensorOptions(IdentificationOptions):
 
 
 def seen_behind_gears(robot: Robot) -> Robot:
-    """The robot as sensors behind its gears see it: without friction and rotors."""
+    """The robot without friction and rotors, as observed by sensors behind the gears."""
     zero = np.zeros(robot.nq)
     law = FrictionLaw("sensor", zero, zero, np.ones(robot.nq), zero, robot.friction.knee)
     return replace(
@@ -75,9 +75,10 @@ def sensor_options(rows: Rows, torque: Array, options: IdentificationOptions) ->
 
 
 def _best_reversal(rows: Rows, torque: Array, options: IdentificationOptions) -> int:
-    """Number of the distance that makes the torques most likely, all joints together.
+    """Index of the distance of reversal with the greatest likelihood of the torques of all joints.
 
-    The links of each joint are fitted, too, so that the errors of the robot's own do not count.
+    The links are fitted per joint as well, so that errors of the robot's own inertials do not bias
+    the choice.
     """
     assert rows.drags is not None
     cost = np.zeros(rows.drags.shape[2])
@@ -99,7 +100,7 @@ def _best_reversal(rows: Rows, torque: Array, options: IdentificationOptions) ->
 
 
 def sensor_of(nq: int, names: Sequence[Name], value: Array, reversal: int) -> LinkSensor:
-    """What sensors see beside the bodies, from fitted terms with values (p,)."""
+    """Terms of the sensors, from the names and values (p,) of the fitted terms."""
     terms = (SENSOR_COULOMB, SENSOR_VISCOUS, SENSOR_GAIN, "offset")
     parts = {term: np.zeros(nq) for term in terms}
     for (name, joint), found in zip(names, value.tolist(), strict=True):

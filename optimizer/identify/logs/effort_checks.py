@@ -1,4 +1,4 @@
-"""Plausibility of the efforts of each joint: sign, size, and share explained by the motion."""
+"""Plausibility of logged efforts by joint: sign, size, and agreement with the motion."""
 
 from __future__ import annotations
 
@@ -74,7 +74,15 @@ class JointEffort:
 
 
 def joint_efforts(motion: LoggedMotion, effort: Array) -> list[JointEffort]:
-    """Regressions of efforts (n, joints), of the joints that move enough."""
+    """Regress the efforts on the motion, joint by joint.
+
+    Args:
+        motion: the logged motion of n rows.
+        effort: logged efforts, shape (n, joints) [A or N·m].
+
+    Returns:
+        Regressions of all joints with enough rows in motion.
+    """
     rows = thinned(len(effort), EFFORT_CHECKS.max_rows)
     part = motion.at(rows)
     rigid, found = part.rigid_torques(), list[JointEffort]()
@@ -111,13 +119,13 @@ def _regression(joint: int, rigid: Array, v: Array, a: Array, effort: Array) -> 
 
 
 def _jackknife_sd(parts: Array) -> float:
-    """Standard deviation of a value from its values (blocks,) without one block each."""
+    """Jackknife standard deviation from the values (blocks,) with one block left out."""
     count = EFFORT_CHECKS.blocks
     return float(np.sqrt((count - 1) / count * ((parts - parts.mean()) ** 2).sum()))
 
 
 def check_signs(found: Sequence[JointEffort], names: Sequence[str]) -> None:
-    """Check that the efforts of all joints have the same sign relative to the motion.
+    """Check the efforts of all joints for equal signs relative to the motion.
 
     Args:
         found: regressions of the joints.
@@ -142,13 +150,16 @@ def check_signs(found: Sequence[JointEffort], names: Sequence[str]) -> None:
 def effort_warnings(
     robot: Robot, found: Iterable[JointEffort], effort: Array, meaning: EffortMeaning | None
 ) -> Iterator[str]:
-    """Warnings of efforts that are too large, or that the motion does not explain.
+    """Warnings of implausibly large efforts, and of efforts in contradiction to the motion.
 
     Args:
         robot: the robot.
         found: regressions of the joints.
-        effort: efforts (n, joints).
+        effort: efforts (n, joints) [A or N·m].
         meaning: meaning of the efforts.
+
+    Yields:
+        One text per kind of warning, with all joints concerned.
     """
     if meaning == "external":
         return

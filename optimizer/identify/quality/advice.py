@@ -1,11 +1,11 @@
 """Advice on the next measurement, ordered by the shares of figures in the variance of an energy.
 
-The variance equals the one of the answers: identified figures contribute their covariance, all other
-figures their prior ranges. Exact knowledge of a figure would reduce the variance of the energy by
-the squared correlation of the two. The diagonal term of a figure is no measure of its influence,
-because errors of figures compensate each other and a single term can exceed the total variance. The
-figures are selected one by one, and each selection conditions the covariance on the figures before,
-so that a shared error counts once.
+The variance equals the one of the answers: identified figures contribute their covariance, others
+their prior ranges. Exact knowledge of a figure would reduce the variance of the energy by the share
+of the squared correlation between both. The diagonal term of a figure is no measure of its
+influence: errors of figures compensate each other, so a single term can exceed the total variance.
+The figures are selected one by one. Every selection conditions the covariance on the figures
+selected before, so that a shared error counts once.
 
 The standard deviation of a figure falls with the square root of the time in motion: halving it
 takes four times the moves (Verdonck 2004, Radkhah 2007: the excitation determines how well a log

@@ -26,7 +26,7 @@ def sinusoid(a: float, b: float, c: float) -> Polynomial:
 
 
 def weighted_sum(*terms: tuple[float, Polynomial]) -> Polynomial:
-    """Sum of polynomials, each times a factor."""
+    """Linear combination of polynomials, given as pairs of factor and polynomial."""
     total = [0j] * max(len(each) for _, each in terms)
     for factor, each in terms:
         for k, coefficient in enumerate(each):
@@ -40,7 +40,7 @@ def product(p: Polynomial, r: Polynomial) -> Polynomial:
     for k, a in enumerate(p):
         for j, b in enumerate(r):
             total[k + j] += a * b
-            # The product with the conjugate power; the power of both that is not negative is kept.
+            # the product with the conjugate power: only non-negative powers are stored
             if k and j:
                 other = a * b.conjugate() if k >= j else a.conjugate() * b
                 total[abs(k - j)] += other if k != j else 2 * other.real
@@ -48,7 +48,11 @@ def product(p: Polynomial, r: Polynomial) -> Polynomial:
 
 
 def zero_angles(polynomial: Polynomial) -> list[float]:
-    """Angles q [rad] at which a polynomial is zero, or nearly zero."""
+    """Find the zeros of a polynomial by the eigenvalues of its companion matrix.
+
+    Returns:
+        Angles q of zeros and near zeros [rad]; empty for a constant polynomial.
+    """
     size = [abs(each) for each in polynomial]
     least, degree = NEGLIGIBLE * max(size), len(size) - 1
     while degree and size[degree] <= least:
