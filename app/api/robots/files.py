@@ -143,8 +143,8 @@ async def meshes(
     engine: ServiceClientEngine,
     store: ServiceStore,
 ) -> Response:
-    """Simplified meshes of the maker as a glTF file, with one node per link. A node has the name and
-    the frame of its link. Available if `has_meshes` of `GET /robots/{name}` is true."""
+    """Simplified meshes of the maker as a glTF file, with one node per link. A node has the name
+    and the frame of its link. Available if `has_meshes` of `GET /robots/{name}` is true."""
     tag = await run_in_threadpool(digest, name) if name in robot_names() else None
     if tag is None:
         if name not in robot_names():

@@ -1,8 +1,8 @@
 """Examples of requests and answers, from the files in the folder `examples` of the repository.
 
-`examples/openapi/<path>.json` lists the requests of the OpenAPI document by the names of their files
-in `examples/<path>`, with summary and description. The file also has an answer, unless the models
-of the answer have examples of their own. It has no requests if a module of this package defines
+`examples/openapi/<path>.json` lists the requests of the OpenAPI document by the names of their
+files in `examples/<path>`, with summary and description. The file also has an answer, unless the
+models of the answer have examples of their own. It has no requests if a module of this package defines
 them. The name of the file omits the parameters of a path; for a path with a parameter, the files
 may be in folders, and the examples take the names of the folders.
 """
