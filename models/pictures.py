@@ -68,7 +68,8 @@ def picture(robot: str) -> bytes:
             mesh_placement(robot, link),
         )
         scene.add_geometry(mesh, node_name=name, geom_name=name)
-    return bytes(scene.export(file_type="glb", include_normals=True))  # type: ignore[no-untyped-call]
+    content = scene.export(file_type="glb", include_normals=True)  # type: ignore[no-untyped-call]
+    return bytes(content)
 
 
 def _links(robot: str) -> list[str]:

@@ -19,16 +19,18 @@ FOLDER = Path(__file__).parents[1] / "docs" / "reference"
 PAGE, ERRORS = FOLDER / "fields.md", FOLDER / "errors.md"
 HEAD = """# Endpoints and fields
 
-Every endpoint with its request, answer and problems, and the fields of each of them. SI units; arrays over time are
-`[sample][joint]`. This page is written by `python -m scripts.reference` from the OpenAPI document at `/openapi.json`.
-"""  # noqa: E501
+All endpoints with their requests, answers and problems, and the fields of all objects. SI units;
+arrays over time are `[sample][joint]`. This page is written by `python -m scripts.reference` from
+the OpenAPI document at `/openapi.json`.
+"""
 ERRORS_HEAD = """# Errors
 
-Every error is an `application/problem+json` document (RFC 9457) with `type`, `title`, `status`, `detail`, `instance`
-(the id of the request) and the fields below. `type` is the path of a page that explains it, for example
-`/problems/duration-too-short`. Problems with the status 429 or 503 come with the header `Retry-After` [s]. The library
-raises the same errors as exceptions. This page is written by `python -m scripts.reference`.
-"""  # noqa: E501
+Every error is an `application/problem+json` document (RFC 9457) with `type`, `title`, `status`,
+`detail`, `instance` (the id of the request) and the fields below. `type` is the path of the page
+about the error, for example `/problems/duration-too-short`. Problems with the status 429 or 503
+have the header `Retry-After` [s]. The library raises the same errors as exceptions. This page is
+written by `python -m scripts.reference`.
+"""
 _RANGES = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
 # fields of every problem
 _EVERY = {"type", "title", "status", "detail", "instance"}

@@ -126,7 +126,8 @@ def _type(hint: Any) -> Any:
     if origin is NotRequired:
         return _type(args[0])
     if origin in (Union, types.UnionType):
-        return Union[tuple(_type(option) for option in args)]  # noqa: UP007 - their number is not known here
+        # `|` would need the number of the options in advance
+        return Union[tuple(_type(option) for option in args)]  # noqa: UP007
     if origin is tuple:
         # fixed in length here, a plain list in JSON
         return list[_type(args[0])]  # type: ignore[misc]

@@ -17,8 +17,8 @@ from joulepath.app.cli.search import proof, search
 Examples:
   joulepath optimize --robot ur10e --from '[0,-90,90,-90,-90,0]deg' --to 'p[.6,-.3,.4,2.22,-2.22,0]'
   joulepath optimize request.json --output answer.json
-  echo '{"start": {"q": [0, -1.57, 1.57, -1.57, -1.57, 0]}, "goal": {"q": [1, -1.2, 1.8, -2, -1.3, 0.5]}}' \\
-    | joulepath optimize - > answer.json"""  # noqa: E501
+  echo '{"start": {"q": [0, -1.57, 1.57, -1.57, -1.57, 0]},
+    "goal": {"q": [1, -1.2, 1.8, -2, -1.3, 0.5]}}' | joulepath optimize - > answer.json"""
 )
 @motion_options
 @OUTPUT

@@ -12,7 +12,8 @@ from joulepath.app.cli.answer import refused
     epilog="""\b
 Examples:
   joulepath ros2 --ros-args -p robot:=ur5e
-  joulepath ros2 --ros-args -p robot:=ur5e -r '~/trajectory:=/joint_trajectory_controller/joint_trajectory'""",  # noqa: E501
+  joulepath ros2 --ros-args -p robot:=ur5e \\
+    -r '~/trajectory:=/joint_trajectory_controller/joint_trajectory'""",
 )
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
 def ros2(arguments: tuple[str, ...]) -> None:

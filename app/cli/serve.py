@@ -11,13 +11,13 @@ import click
     epilog="""\b
 Exit codes:
     0  ended by SIGTERM or Ctrl-C
-    1  a setting is wrong, or another program has the port: standard error says which, and what to do
+    1  a setting is wrong, or another program has the port: see standard error for the remedy
     2  wrong usage
     3  the service cannot start: the log on standard error says why
 
 \b
 Example:
-  joulepath serve --port 8080"""  # noqa: E501
+  joulepath serve --port 8080"""
 )
 @click.option(
     "--host", help="Address to listen on. Default: JOULEPATH_HOST, or 127.0.0.1: this machine only."

@@ -53,7 +53,8 @@ class _Samples(Part):
 
     def arrays(self) -> tuple[Array, Array, Array, Array]:
         """q, v, a, tau (k, nq)."""
-        return tuple(_array(rows, "samples") for rows in (self.q, self.v, self.a, self.tau))  # type: ignore[return-value]
+        given = (self.q, self.v, self.a, self.tau)
+        return tuple(_array(rows, "samples") for rows in given)  # type: ignore[return-value]
 
 
 class _Trajectory(_Samples):

@@ -29,7 +29,8 @@ def to_kept(motions: KnownMotions) -> dict[str, bytes]:
 def _to_motion(kept: dict[str, object]) -> KnownMotion:
     degree, knots, points = (kept[name] for name in _SPLINE)
     assert isinstance(degree, int)
-    return KnownMotion(Spline(degree, np.array(knots), np.array(points)), kept["stationarity"])  # type: ignore[arg-type]
+    spline = Spline(degree, np.array(knots), np.array(points))
+    return KnownMotion(spline, kept["stationarity"])  # type: ignore[arg-type]
 
 
 def _kept(motion: KnownMotion) -> bytes:

@@ -167,8 +167,9 @@ class Store:
         """Truncates the log of SQLite, unless a reader uses it."""
         with contextlib.suppress(*_UNAVAILABLE, sqlite3.Error):
             connection = self._engine.raw_connection()
+            checkpoint = "PRAGMA wal_checkpoint(TRUNCATE)"
             try:
-                connection.driver_connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # type: ignore[union-attr]
+                connection.driver_connection.execute(checkpoint)  # type: ignore[union-attr]
             finally:
                 connection.close()
 

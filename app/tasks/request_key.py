@@ -27,7 +27,8 @@ def meaning_of(kind: str, body: Any) -> Meaning:
     assert isinstance(body, BaseModel)
     content = [__version__, _FORM, kind, body.model_dump(mode="json", exclude={"deadline"})]
     base = (body.optimize or body.evaluate) if isinstance(body, WhatifRequest) else body
-    meaning: Meaning = {"version": __version__, "digest": _hash(content), "robot": base.robot}  # type: ignore[union-attr]
+    robot = base.robot  # type: ignore[union-attr]
+    meaning: Meaning = {"version": __version__, "digest": _hash(content), "robot": robot}
     if isinstance(body, CycleRequest):
         meaning["cell"] = cell_of(body)
     return meaning

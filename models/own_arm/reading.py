@@ -23,8 +23,9 @@ from joulepath.models.own_arm.mesh_files import in_folder, in_zip
 from joulepath.models.own_arm.xacro_file import SUFFIX, expanded, package_folders
 
 # no conversion of types, no unknown fields
+_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 for _part in (Collision, Description, Drives, Electronics, Motion):
-    _part.__pydantic_config__ = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)  # type: ignore[union-attr]
+    _part.__pydantic_config__ = _STRICT  # type: ignore[union-attr]
 _DESCRIPTION = TypeAdapter(Description)
 
 

@@ -8,6 +8,7 @@ draws are a Latin hypercube with fixed seed, so that equal figures have equal dr
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -147,7 +148,7 @@ class _Sources:
         order = np.random.default_rng([SETTINGS.seed, self._columns]).permutation(DRAWS)
         return np.asarray(ndtri((order + 0.5) / DRAWS))
 
-    def _factor(self, name: str, letters: set[str] = frozenset()) -> Array:  # type: ignore[assignment]
+    def _factor(self, name: str, letters: AbstractSet[str] = frozenset()) -> Array:
         """Draws (n,) of a factor or value with the range of this name."""
         low, high = range_of(name, letters)
         normal = self._normal()

@@ -11,7 +11,8 @@ rest to rest, with p = M(q) v, N = Σ_i ω_i ∂M/∂q_i and the gravity torques
 As proven in `net_energy.electrical`, energy ≥ ∫ P_net dt on every bus. So with the base power and
 the constants of the inverters
 
-    energy ≥ ΔU + ∫ (base - Σ c λ² + Σ_j (v_j + ω_j) tau_f(v_j) + ω · g - ω̇ · M v - v · N v / 2) dt.
+    energy ≥ ΔU + ∫ (base - Σ c λ² + Σ_j (v_j + ω_j) tau_f(v_j)
+                     + ω · g - ω̇ · M v - v · N v / 2) dt.
 
 **Work.** ω + 2 η v may replace ω for any η above -1/2 that is the same for all joints. The product
 grows by 2 η v · (tau + tau_f), with the integral 2 η (ΔU + ∫ v · tau_f dt); the square that is

@@ -32,8 +32,9 @@ So ∫ Φ̂'(b) w dt ≥ Φ̂'(c_j) ∫ w dt = 0, and
 
     ∫ Φ_j dt ≥ ∫ Φ̂_j(b_j) dt + k_j / 2 ∫ w_j² dt.
 
-**Place.** Let x̄(t) be the straight line at even speed, x_b the path of the speeds b, e = x_b - x̄, δ
-= q - x_b. Then δ̇ = w, and δ = 0 at both ends. With B_lm = Σ_i |ω_i| · (bounds on ∂³U by i, l, m)
+**Place.** Let x̄(t) be the straight line at even speed, x_b the path of the speeds b,
+e = x_b - x̄ and δ = q - x_b. Then δ̇ = w, and δ = 0 at both ends. With
+B_lm = Σ_i |ω_i| · (bounds on ∂³U by i, l, m)
 and the gradient A of ω · g on the line,
 
     ω · g(q) ≥ ω · g(x̄) + A · (e + δ) - Σ_l B̂_l (e_l + δ_l)² / 2,

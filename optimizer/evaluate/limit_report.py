@@ -126,7 +126,8 @@ class LimitMonitor:
             for c, path_name in enumerate(self._path.names):
                 at, bound = int(path_ratios[:, c].argmax()), self._path_bounds[path_name]
                 worst = float(path_ratios[at, c])
-                self._update_worst(path_name, worst, None, float(t[at]), worst * bound, bound)  # type: ignore[arg-type]
+                found = (path_name, worst, None, float(t[at]), worst * bound, bound)
+                self._update_worst(*found)  # type: ignore[arg-type]
 
     def update_breakpoints(
         self, motion: PiecewiseMotion, before: PiecewiseMotion | None

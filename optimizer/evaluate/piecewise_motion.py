@@ -135,7 +135,8 @@ def _pieces_of_curve(motion: Waypoints, ends: Array) -> PiecewiseMotion:
     """The curve of degree 5 through all waypoints, at the times `ends` (n,) [s]."""
     standstill = [(order, np.zeros(motion.q.shape[1])) for order in (1, 2)]
     # its knots are these times; scipy's type stubs know no list of derivatives
-    curve = make_interp_spline(ends, motion.q, k=5, bc_type=(standstill, standstill))  # type: ignore[arg-type]
+    at_ends = (standstill, standstill)
+    curve = make_interp_spline(ends, motion.q, k=5, bc_type=at_ends)  # type: ignore[arg-type]
     powers = [curve(ends[:-1], order) / math.factorial(order) for order in range(5, -1, -1)]
     return PiecewiseMotion.of(PPoly(np.stack(powers), ends), np.arange(motion.segments))
 

@@ -172,7 +172,9 @@ class Recording:
             for low, high in pairwise([*range(0, len(t), MOTION_LIMITS.block_rows), len(t)])
         ]
         blocks = [
-            RecordedRows(*(None if each is None else each[part] for each in columns))  # type: ignore[arg-type]
+            RecordedRows(
+                *(None if c is None else c[part] for c in columns)  # type: ignore[arg-type]
+            )
             for part in rows
         ]
         return cls(blocks, edges=edges, cycles=cycles)

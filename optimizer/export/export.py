@@ -188,8 +188,9 @@ def export(
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
     scale = program.speed_scale
+    speed = "" if scale == 1 else f"-speed-{scale:g}"
     return ExportedFile(
-        name=f"joulepath-{program.robot.name}{'' if scale == 1 else f'-speed-{scale:g}'}.{written.extension}",  # noqa: E501
+        name=f"joulepath-{program.robot.name}{speed}.{written.extension}",
         content=written.content,
         media_type=written.media_type,
         speed_scale=scale,

@@ -67,7 +67,10 @@ def to_krl(program: Program, options: KrlOptions | None = None) -> WrittenFile:
 
 def _load(load: Payload) -> str:
     x, y, z = (1000 * each for each in load.com)
-    return f"$LOAD={{M {load.mass:.4f},CM {{X {x:.3f},Y {y:.3f},Z {z:.3f},A 0.0,B 0.0,C 0.0}},J {{X 0.0,Y 0.0,Z 0.0}}}}"  # noqa: E501
+    return (
+        f"$LOAD={{M {load.mass:.4f},CM {{X {x:.3f},Y {y:.3f},Z {z:.3f},A 0.0,B 0.0,C 0.0}},"
+        "J {X 0.0,Y 0.0,Z 0.0}}"
+    )
 
 
 def _axes(options: KrlOptions, q: Array) -> str:

@@ -157,7 +157,9 @@ class Arm:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tcp", rigid_transform(self.T_flange_tcp, "tcp"))
-        gravity = self.gravity if self.gravity is not None else self.robot.gravity  # type: ignore[redundant-expr]
+        gravity = self.gravity
+        if gravity is None:
+            gravity = self.robot.gravity  # type: ignore[unreachable]
         object.__setattr__(self, "gravity", frozen(gravity, (3,), "gravity"))
         object.__setattr__(
             self, "limits", self.robot.limits if self.limits is None else self.limits

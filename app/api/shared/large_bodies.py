@@ -77,5 +77,6 @@ def _taking_held(
         )
         for each in signature.parameters.values()
     ]
-    taking_held.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    declared = signature.replace(parameters=parameters)
+    taking_held.__signature__ = declared  # type: ignore[attr-defined]
     return taking_held

@@ -2,9 +2,9 @@
 
 `examples/openapi/<path>.json` lists the requests of the OpenAPI document by the names of their
 files in `examples/<path>`, with summary and description. The file also has an answer, unless the
-models of the answer have examples of their own. It has no requests if a module of this package defines
-them. The name of the file omits the parameters of a path; for a path with a parameter, the files
-may be in folders, and the examples take the names of the folders.
+models of the answer have examples of their own. It has no requests if a module of this package
+defines them. The name of the file omits the parameters of a path; for a path with a parameter, the
+files may be in folders, and the examples take the names of the folders.
 """
 
 from __future__ import annotations
