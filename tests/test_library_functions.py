@@ -236,7 +236,11 @@ def test_a_solution_needs_its_own_problem() -> None:
         joulepath.replay(solution(), problem=other)
     with pytest.raises(joulepath.NotCertified, match="torques"):
         joulepath.export(solution(), "csv", problem=other)
-    for function in (joulepath.replay, lambda found: joulepath.export(found, "csv")):  # type: ignore[call-overload]
+    functions: tuple[typing.Any, ...] = (
+        joulepath.replay,
+        lambda found: joulepath.export(found, "csv"),
+    )
+    for function in functions:
         with pytest.raises(joulepath.InvalidProblem, match="give the problem") as caught:
             function(solution())
         assert caught.value.field == "problem"

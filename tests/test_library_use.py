@@ -290,7 +290,8 @@ def test_the_types_of_arguments_are_public() -> None:
 
 
 def argument_types(function: object) -> Iterator[type]:
-    for name, hint in typing.get_type_hints(inspect.unwrap(function)).items():  # type: ignore[arg-type]
+    hints = typing.get_type_hints(inspect.unwrap(function))  # type: ignore[arg-type]
+    for name, hint in hints.items():
         if name != "return":
             yield from own_types(hint)
 
@@ -379,9 +380,10 @@ def test_it_works_beside_packages_of_the_same_names(tmp_path: Path) -> None:
     code = """
 import app, compare, evaluate, exceptions, models, optimizer, problem, robot, solution
 import joulepath
-assert all(each.MINE for each in (app, compare, evaluate, exceptions, models, optimizer, problem, robot, solution))
+mine = (app, compare, evaluate, exceptions, models, optimizer, problem, robot, solution)
+assert all(each.MINE for each in mine)
 arm = joulepath.Arm(robot=joulepath.load_robot("ur5e"), collisions=False)
 motion = joulepath.Waypoints([[0.0] * 6, [0.1] * 6], 1.0)
 print(joulepath.evaluate(arm, motion).total.duration)
-"""  # noqa: E501
+"""
     assert in_a_process(code, tmp_path) == "1.0"

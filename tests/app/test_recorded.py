@@ -55,7 +55,8 @@ def test_recordings_have_the_shape_of_new_ones(kind: str) -> None:
 
 
 def test_recorded_answers_differ_in_their_ids(recorded: TestClient) -> None:
-    body = TASKS["pareto"].request.model_dump(mode="json", exclude_unset=True)  # type: ignore[attr-defined]
+    request = TASKS["pareto"].request  # type: ignore[attr-defined]
+    body = request.model_dump(mode="json", exclude_unset=True)
     fronts = [recorded.post("/pareto", json=body).json() for _ in range(2)]
     paths = [point["answer"] for front in fronts for point in front["points"]]
     assert len(set(paths)) == len(paths) > 1

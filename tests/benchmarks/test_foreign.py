@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import orjson
 import pytest
@@ -22,11 +23,12 @@ AMPLE = 60.0  # s
 
 def written(folder: Path, families: tuple[str, ...] = ("posts",)) -> Path:
     """A file with a problem of each family: a joint goal that is near, and the pose of another."""
+    upright: Any = {**POST["pose"], "quaternion": [0.0, 0.0, 0.0, 1.0]}  # type: ignore[dict-item]
     problem = {
         "start": START,
         "goal": [-0.4, *START[1:]],
         "goal_pose": {"position": [-0.4, -0.3, 0.4], "quaternion": [0.0, 1.0, 0.0, 0.0]},
-        "obstacles": [{**POST, "pose": {**POST["pose"], "quaternion": [0.0, 0.0, 0.0, 1.0]}}],  # type: ignore[dict-item]
+        "obstacles": [{**POST, "pose": upright}],
     }
     problems = [
         {**problem, "name": f"{family}/{k}", "family": family}

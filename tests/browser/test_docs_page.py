@@ -21,8 +21,9 @@ SCREEN: ViewportSize = {"width": 1280, "height": 900}
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 POST = """([url, mode, key]) => fetch(url + "/studies", {
-    method: "POST", mode, body: '{"name": "x", "threshold": 1}', headers: key ? {Authorization: "Bearer " + key} : {},
-}).then(answer => answer.type, error => "refused")"""  # noqa: E501
+    method: "POST", mode, body: '{"name": "x", "threshold": 1}',
+    headers: key ? {Authorization: "Bearer " + key} : {},
+}).then(answer => answer.type, error => "refused")"""
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +130,8 @@ def test_a_page_of_another_site_reaches_nothing(guarded: tuple[Server, str], pag
         assert page.evaluate(POST, [server.url, "cors", secret]) == "refused"
         page.set_content(
             f"<form method=post enctype=text/plain action={server.url}/studies>"
-            """<input name='{"name": "x", "threshold": 1, "a' value='": 1}'><button>go</button></form>"""  # noqa: E501
+            """<input name='{"name": "x", "threshold": 1, "a' value='": 1}'>"""
+            "<button>go</button></form>"
         )
         with page.expect_response(f"{server.url}/studies") as answer:
             page.locator("button").click()

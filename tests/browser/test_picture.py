@@ -70,7 +70,10 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
 def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
     clearance = state(page, "answered.solution.certificate.clearance")
     drawn = page.evaluate(
-        """() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]"""  # noqa: E501
+        """() => {
+            const { geometry } = studio.view.parts.nearest.children.at(-1);
+            return [...geometry.attributes.position.array];
+        }"""
     )
     assert np.array(drawn).reshape(2, 3) == pytest.approx(np.array(clearance["points"]), abs=DRAWN)
     expect(page.locator(".label.near")).to_contain_text(" – ".join(clearance["pair"]))
@@ -115,12 +118,13 @@ def test_what_stands_before_the_arm_fades(page: Page) -> None:
         view.eye.fade = (frames, ignored, _, moving) => own(frames, ignored, show, moving);
         position.set(-2.4, -0.6, 0.45);
         view.render();
-        const faint = view.parts.obstacles.children.filter(({ userData }) => userData.material.opacity < 0.5);
+        const faint = view.parts.obstacles.children
+            .filter(({ userData }) => userData.material.opacity < 0.5);
         position.copy(before);
         delete view.eye.fade;
         view.render();
         return faint.map(({ userData }) => userData.name);
-    }"""  # noqa: E501
+    }"""
     page.locator("#view").press("End")
     assert page.evaluate(faint, True) == ["shelf side"]
     assert page.evaluate(faint, False) == []
@@ -144,14 +148,21 @@ def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> 
     shells = "() => studio.view.parts.margins.children.filter(({ visible }) => visible).length"
     x, y = page.evaluate("""() => {
         const { view } = studio;
-        const top = view.parts.obstacles.children.find(({ userData }) => userData.name === "shelf top");
-        const at = top.children[0].getWorldPosition(view.camera.position.clone()).project(view.camera);
+        const top = view.parts.obstacles.children
+            .find(({ userData }) => userData.name === "shelf top");
+        const at = top.children[0].getWorldPosition(view.camera.position.clone());
+        at.project(view.camera);
         const box = view.renderer.domElement.getBoundingClientRect();
         return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
-    }""")  # noqa: E501
+    }""")
     assert page.evaluate(shells) == 0
+
     # a scene that was drawn anew meanwhile has its shell again when the pointer moves
-    assert any(page.mouse.move(x + k % 2, y) or page.evaluate(shells) == 1 for k in range(10))  # type: ignore[func-returns-value]
+    def shown(k: int) -> bool:
+        page.mouse.move(x + k % 2, y)
+        return bool(page.evaluate(shells) == 1)
+
+    assert any(map(shown, range(10)))
     expect(page.locator(".label.hover")).to_have_text("shelf top, margin 10.0 mm")
     page.mouse.move(5, 5)
     expect(page.locator(".label.hover")).to_have_count(0)

@@ -47,19 +47,23 @@ CONTRASTS = """() => {
         if (!text || !owner.checkVisibility({ visibilityProperty: true })) continue;
         if (owner.closest("script, style, :disabled, .skip")) continue;
         const grounds = [];
-        for (let node = owner; node; node = node.parentElement) grounds.unshift(getComputedStyle(node).backgroundColor);
+        for (let node = owner; node; node = node.parentElement) {
+            grounds.unshift(getComputedStyle(node).backgroundColor);
+        }
         const style = getComputedStyle(owner);
         const ink = owner instanceof SVGElement ? style.fill : style.color;
         const [a, b] = [luminance(grounds), luminance([...grounds, ink])];
         found.push([text, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)]);
     }
     return found;
-}"""  # noqa: E501
+}"""
 # pairs of controls and headings of which one covers the other, and those that are cut at the edge
 # of the page
 CROWDED = """() => {
-    const all = [...document.querySelectorAll("h1, h2, button, .button, select, summary, label, #joules, #facts")]
-        .filter((each) => each.checkVisibility({ visibilityProperty: true }) && each.getBoundingClientRect().width);
+    const kinds = "h1, h2, button, .button, select, summary, label, #joules, #facts";
+    const all = [...document.querySelectorAll(kinds)]
+        .filter((each) => each.checkVisibility({ visibilityProperty: true }))
+        .filter((each) => each.getBoundingClientRect().width);
     const wide = document.documentElement.clientWidth;
     const name = (each) => `${each.tagName} ${each.id} ${each.textContent.trim().slice(0, 30)}`;
     const beyond = all.filter((each) => each.getBoundingClientRect().right > wide + 1);
@@ -74,7 +78,7 @@ CROWDED = """() => {
         if (width > 1 && height > 1) over.push(`${name(a)} / ${name(b)}`);
     }
     return [...out.map(name), ...over];
-}"""  # noqa: E501
+}"""
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

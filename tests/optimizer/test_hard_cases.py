@@ -67,7 +67,13 @@ def varied(seed: int, index: int) -> Problem:
     start = q_start if rng.random() < 0.6 else pose(q_start)
     goal = pose(q_goal) if rng.random() < 0.8 else q_goal
     # drawn without regard to what the arm could hit
-    return problem_with(start=start, goal=goal, deadline=60.0, collisions=False, **options)  # type: ignore[arg-type]
+    return problem_with(
+        start=start,
+        goal=goal,
+        deadline=60.0,
+        collisions=False,
+        **options,  # type: ignore[arg-type]
+    )
 
 
 CASES = {
@@ -111,6 +117,8 @@ def test_very_slow_motions(jerk: float, duration: float, displacement: float) ->
         "deadline": 60.0,
         "collisions": False,
     }
-    solution = optimize(problem_with(start, start + displacement, limits=limits, **fixed))  # type: ignore[arg-type]
+    goal = start + displacement
+    problem = problem_with(start, goal, limits=limits, **fixed)  # type: ignore[arg-type]
+    solution = optimize(problem)
     assert solution.certificate.valid
     assert solution.duration == duration

@@ -19,11 +19,12 @@ import time
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved
 with progress_bar("Searching", delay={delay}) as tell:
-    for event in (CandidatesFound(4), CandidateTried(0, "solved", 50.0, 60.0), Improved(60.0, 1.0, 50.0)):
-        tell(event)
+    tell(CandidatesFound(4))
+    tell(CandidateTried(0, "solved", 50.0, 60.0))
+    tell(Improved(60.0, 1.0, 50.0))
     time.sleep({lasts})
 print("done")
-"""  # noqa: E501
+"""
 STEPS = """
 from joulepath.optimizer.presentation.progress_bar import progress_bar
 from joulepath.optimizer.progress import Steps

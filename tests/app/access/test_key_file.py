@@ -107,8 +107,10 @@ BROKEN: dict[str, str] = {
     "no hash": "- {name: press, role: compute, sha256: plain-text-key, created: "
     "2026-01-01T00:00:00Z}",
     "no role": f"- {{name: press, role: root, sha256: {'0' * 63}a, created: 2026-01-01T00:00:00Z}}",
-    "no name": f"- {{name: '../x', role: read, sha256: {'0' * 63}a, created: 2026-01-01T00:00:00Z}}",  # noqa: E501
-    "a word too much": f"- {{name: x, role: read, sha256: {'0' * 63}a, created: 2026-01-01T00:00:00Z, admin: true}}",  # noqa: E501
+    "no name": f"- {{name: '../x', role: read, sha256: {'0' * 63}a, "
+    "created: 2026-01-01T00:00:00Z}",
+    "a word too much": f"- {{name: x, role: read, sha256: {'0' * 63}a, "
+    "created: 2026-01-01T00:00:00Z, admin: true}",
     "an object": "!!python/object/apply:os.system ['true']",
 }
 

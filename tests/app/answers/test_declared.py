@@ -97,7 +97,8 @@ WHOLE = Whole(
 
 def test_json_has_the_shown_fields_in_their_order() -> None:
     assert json_document(WHOLE) == (
-        b'{"name":"a","bound":null,"q":[2.0,4.0],"rows":[[1.0,null]],"places":[{"x":1.5}],"parts":{"total":2.0},'
+        b'{"name":"a","bound":null,"q":[2.0,4.0],"rows":[[1.0,null]],"places":[{"x":1.5}],'
+        b'"parts":{"total":2.0},'
         b'"pair":["arm","table"],"is_far":true}'
     )
     assert shown_fields(Place) == ("x",) and as_json(Place(2.0)) == {"x": 2.0}

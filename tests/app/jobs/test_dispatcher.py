@@ -161,7 +161,8 @@ def test_a_long_request_is_not_taken_over(tmp_path: Path) -> None:
 
             async def renewed(at: object = leased) -> bool:
                 (only,) = await requests(store, job_id)
-                return only.leased_until is not None and only.leased_until >= at  # type: ignore[operator]
+                end = only.leased_until
+                return end is not None and end >= at  # type: ignore[operator]
 
             await until(renewed)
         first.work.free.set()

@@ -60,7 +60,9 @@ def test_each_knows_the_best_so_far(tmp_path: Path) -> None:
             {"energy": energy} for energy in ENERGIES
         ]
         state = await store.read(partial(studies.state, study_id=study.id))
-        assert (state.best.number, state.last.number, state.last.met_by) == (4, 6, 2)  # type: ignore[union-attr]
+        best, last = state.best, state.last
+        assert best is not None and last is not None
+        assert (best.number, last.number, last.met_by) == (4, 6, 2)
         # one at a time, or all at once: the same
         history = entries(await store.read(partial(studies.history, study_id=study.id)))
         assert [

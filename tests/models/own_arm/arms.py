@@ -29,11 +29,15 @@ RICH = """<robot name="rich">
   <link name="world"/><link name="pedestal"/><link name="elbow"/><link name="hand"/>
   <joint name="fixed_1" type="fixed"><parent link="world"/><child link="pedestal"/>
     <origin xyz="0.1 -0.2 0.5" rpy="0.1 0.2 0.3"/></joint>
-  <joint name="pan" type="continuous" tool:note="endless"><parent link="pedestal"/><child link="flange_arm"/>
-    <origin xyz="0 0 0.1" rpy="0 0 0.4"/><axis xyz="0 0 -2"/><limit effort="40" velocity="2"/></joint>
-  <link name="flange_arm"><inertial><origin xyz="0.02 0.01 0.1" rpy="0.1 0.5 -0.2"/><mass value="2.5"/>
+  <joint name="pan" type="continuous" tool:note="endless">
+    <parent link="pedestal"/><child link="flange_arm"/>
+    <origin xyz="0 0 0.1" rpy="0 0 0.4"/><axis xyz="0 0 -2"/>
+    <limit effort="40" velocity="2"/></joint>
+  <link name="flange_arm">
+    <inertial><origin xyz="0.02 0.01 0.1" rpy="0.1 0.5 -0.2"/><mass value="2.5"/>
     <inertia ixx="0.02" ixy="0.001" ixz="0.002" iyy="0.03" iyz="-0.001" izz="0.015"/></inertial>
-    <collision><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.1 0.3"/></geometry></collision></link>
+    <collision><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.1 0.3"/></geometry></collision>
+  </link>
   <joint name="elbow" type="revolute"><parent link="flange_arm"/><child link="elbow"/>
     <origin xyz="0.05 0 0.3" rpy="1.5707963267948966 0.3 0"/><axis xyz="1 1 0.5"/>
     <limit lower="-2" upper="2.5" effort="30" velocity="2.5"/></joint>
@@ -41,20 +45,22 @@ RICH = """<robot name="rich">
     <origin xyz="0 0.05 0.1" rpy="0 1.5707963267948966 0"/></joint>
   <link name="forearm"><inertial><origin xyz="0.1 0 0"/><mass value="1.5"/>
     <inertia ixx="0.004" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
-    <collision><origin xyz="0.1 0 0" rpy="0 1.57 0"/><geometry><cylinder radius="0.04" length="0.2"/></geometry>
-    </collision><collision><geometry><mesh filename="forearm.stl"/></geometry></collision></link>
+    <collision><origin xyz="0.1 0 0" rpy="0 1.57 0"/>
+    <geometry><cylinder radius="0.04" length="0.2"/></geometry></collision>
+    <collision><geometry><mesh filename="forearm.stl"/></geometry></collision></link>
   <joint name="twist" type="revolute"><parent link="forearm"/><child link="wrist"/>
     <origin xyz="0.25 0 0"/><limit lower="-3" upper="3" effort="12" velocity="4"/></joint>
   <link name="wrist"><inertial><mass value="0.8"/>
     <inertia ixx="0.002" ixy="0" ixz="0" iyy="0.002" iyz="0" izz="0.001"/></inertial>
     <collision><geometry><sphere radius="0.05"/></geometry></collision></link>
-  <joint name="mount" type="fixed"><parent link="wrist"/><child link="hand"/><origin xyz="0.1 0 0" rpy="0 1.2 0"/>
-  </joint>
-  <joint name="finger" type="prismatic"><parent link="hand"/><child link="finger"/><origin xyz="0 0 0.08"/>
-    <axis xyz="0 1 0"/><limit lower="0" upper="0.05" effort="20" velocity="0.1"/></joint>
+  <joint name="mount" type="fixed"><parent link="wrist"/><child link="hand"/>
+    <origin xyz="0.1 0 0" rpy="0 1.2 0"/></joint>
+  <joint name="finger" type="prismatic"><parent link="hand"/><child link="finger"/>
+    <origin xyz="0 0 0.08"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper="0.05" effort="20" velocity="0.1"/></joint>
   <link name="finger"><inertial><origin xyz="0 0 0.02"/><mass value="0.1"/>
     <inertia ixx="0.0001" ixy="0" ixz="0" iyy="0.0001" iyz="0" izz="0.00005"/></inertial></link>
-</robot>"""  # noqa: E501
+</robot>"""
 
 
 HELD = {"finger": 0.03}

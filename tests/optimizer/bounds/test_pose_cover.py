@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -116,7 +117,8 @@ def problem_between(robot: Robot, rng: np.random.Generator) -> Problem:
 def least_of_pairs(problem: Problem, seed: int) -> float:
     """Least bound of any pair of configurations, with the full turns that bring joints nearest."""
     prepared = PreparedProblem.of(problem)
-    sides = [configurations(problem.arm, pose, seed) for pose in (problem.start, problem.goal)]  # type: ignore[arg-type]
+    poses: Any = (problem.start, problem.goal)
+    sides = [configurations(problem.arm, pose, seed) for pose in poses]
     starts, goals = (each[within(each, problem.arm)] for each in sides)
     s, g = (rows.ravel() for rows in np.indices((len(starts), len(goals))))
     starts, goals = starts[s], goals[g]

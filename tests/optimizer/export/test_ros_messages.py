@@ -90,7 +90,8 @@ def test_what_no_points_can_follow_is_refused(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize("message", ["goal", "trajectory"])
 def test_json_is_an_operation_of_rosbridge(message: str) -> None:
     program = one_move()
-    content = json.loads(to_ros2(program, Ros2Options(message, "json", "arm/jtc")).content)  # type: ignore[arg-type]
+    options = Ros2Options(message, "json", "arm/jtc")  # type: ignore[arg-type]
+    content = json.loads(to_ros2(program, options).content)
     if message == "goal":
         assert (
             content["op"] == "send_action_goal"
@@ -106,7 +107,8 @@ def test_json_is_an_operation_of_rosbridge(message: str) -> None:
 @pytest.mark.parametrize("encoding", ["yaml", "json"])
 def test_moveit_gets_a_robot_trajectory(encoding: str) -> None:
     program = one_move()
-    content = yaml.safe_load(to_moveit(program, MoveitOptions(encoding)).content)  # type: ignore[arg-type]
+    options = MoveitOptions(encoding)  # type: ignore[arg-type]
+    content = yaml.safe_load(to_moveit(program, options).content)
     assert content.keys() == {"joint_trajectory", "multi_dof_joint_trajectory"}
     check(program, content["joint_trajectory"])
 

@@ -22,7 +22,8 @@ EVIL = 'pick"\n  set_standard_digital_out(7, True)\r# \u2028 end'
 
 
 def text_of(program: Program, **options: object) -> str:
-    return to_urscript(program, UrscriptOptions(**options)).content.decode()  # type: ignore[arg-type]
+    written = to_urscript(program, UrscriptOptions(**options))  # type: ignore[arg-type]
+    return written.content.decode()
 
 
 def run(

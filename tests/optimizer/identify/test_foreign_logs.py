@@ -171,7 +171,8 @@ def test_joint_states_as_ros_2_prints_them(recording: Recording) -> None:
     ]
     rows = np.hstack(parts).tolist()
     lines = [
-        f"{START + int(t)},{round((t - int(t)) * 1e9)},base_link,{','.join(joints)},{','.join(f'{x:.9g}' for x in row)}"  # noqa: E501
+        f"{START + int(t)},{round((t - int(t)) * 1e9)},base_link,{','.join(joints)},"
+        + ",".join(f"{x:.9g}" for x in row)
         for t, row in zip(recording.time.tolist(), rows, strict=True)
     ]
     reading = read_log(joined(lines), ROBOT)

@@ -35,13 +35,19 @@ from tests.identification_logs import recorded, truth_of
 robot = load_robot("ur10e")
 short = recorded(robot, truth_of(robot), moves=30, rate=500.0).log()
 rows, times = len(short.q), -(-1_000_000 // len(short.q))
-moves = tuple(LogMove(k * rows + m.start, k * rows + m.end, m.at_rest) for k in range(times) for m in short.moves)
-again = {{name: np.concatenate([getattr(short, name)] * times) for name in ("q", "v", "a", "effort", "power")}}
-log = replace(short, **again, time=np.arange(rows * times) / short.rate, temperature=None, moves=moves)
+moves = tuple(
+    LogMove(k * rows + m.start, k * rows + m.end, m.at_rest)
+    for k in range(times)
+    for m in short.moves
+)
+channels = ("q", "v", "a", "effort", "power")
+again = {{name: np.concatenate([getattr(short, name)] * times) for name in channels}}
+time = np.arange(rows * times) / short.rate
+log = replace(short, **again, time=time, temperature=None, moves=moves)
 before = peak()
 identify(robot, [log], IdentificationOptions(refit=True))
 print(len(log.time), peak() - before)
-"""  # noqa: E501
+"""
 
 # bytes of the whole process, from the file to the figures: with 26 columns on a uniform grid, and
 # with 33 whose times jitter, so that they are interpolated

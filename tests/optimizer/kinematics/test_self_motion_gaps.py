@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +39,8 @@ def test_members_follow_a_redundant_arm_past_a_singularity() -> None:
 def test_evenly_spread_members_are_left_as_they_are() -> None:
     robot = load_robot("fr3")
     T = flange(robot, np.array([0.3, -0.8, 0.4, -1.9, 0.5, 1.7, 0.2]))
-    for motion in required_inverse_kinematics(robot, "goal")._solver.self_motions(T, robot.limits):  # type: ignore[attr-defined]
+    solver: Any = required_inverse_kinematics(robot, "goal")._solver
+    for motion in solver.self_motions(T, robot.limits):
         u = spread(motion, COUNT)
         q = motion.at(u)
         if np.abs(wrapped(np.diff(q, axis=0))).max() < SELF_MOTION.largest_gap:

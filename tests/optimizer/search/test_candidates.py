@@ -199,8 +199,9 @@ def test_a_branch_that_does_not_reach_the_pose_is_refused() -> None:
         ("right", "up"),
         ("right", "down"),
     } - reached:
+        branch = BranchFilter(shoulder=shoulder, elbow=elbow)  # type: ignore[arg-type]
         with pytest.raises(UnreachablePose) as refusal:
-            candidates(replace(one_elbow, branch=BranchFilter(shoulder=shoulder, elbow=elbow)))  # type: ignore[arg-type]
+            candidates(replace(one_elbow, branch=branch))
         assert refusal.value.target == "goal"
 
 

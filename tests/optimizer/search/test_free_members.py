@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -62,5 +64,6 @@ def test_a_posture_between_colliding_samples_is_found(end: str) -> None:
 def test_a_pose_without_a_free_posture_is_refused(end: str, error: type[Exception]) -> None:
     """A ball in the flange, which does not move along the self-motion."""
     arm = among(*BALLS, T[:3, 3].tolist())
+    ends: dict[str, Any] = {"start": HOME, "goal": HOME, end: Pose(T)}
     with pytest.raises(error):
-        optimize(Problem(arm=arm, **{"start": HOME, "goal": HOME, end: Pose(T)}))  # type: ignore[arg-type]
+        optimize(Problem(arm=arm, **ends))

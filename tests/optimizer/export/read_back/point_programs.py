@@ -22,7 +22,8 @@ RAPID = re.compile(
     r"(?P<tool>\w+):=\[TRUE,\[\[0,0,0\],\[1,0,0,0\]\],"
     rf"\[(?P<mass>{NUMBER}),\[(?P<com>[\d.,-]+)\],\[1,0,0,0\],0,0,0\]\];"
     r"|MoveAbsJ "
-    rf"\[\[(?P<axes>({NUMBER},){{5}}{NUMBER})\],\[9E9(,9E9){{5}}\]\]\\NoEOffs,v\d+(\\T:=(?P<time>{NUMBER}))?,"
+    rf"\[\[(?P<axes>({NUMBER},){{5}}{NUMBER})\],\[9E9(,9E9){{5}}\]\]\\NoEOffs,"
+    rf"v\d+(\\T:=(?P<time>{NUMBER}))?,"
     rf"(?P<zone>fine|z10),(?P<used>\w+);|WaitTime (?P<wait>{NUMBER});|SetDO "
     r"(?P<signal>\w+),(?P<value>[01]);"
 )
@@ -32,7 +33,8 @@ KRL = re.compile(
     rf"|(?P<block>PTP_SPLINE|ENDSPLINE)|TIME_BLOCK START"
     rf"|TIME_BLOCK PART = (?P<part>{NUMBER})|TIME_BLOCK END = (?P<total>{NUMBER})"
     rf"|WAIT SEC (?P<wait>{NUMBER})|\$OUT\[(?P<output>\d+)\]=(?P<value>TRUE|FALSE)"
-    rf"|\$LOAD=\{{M (?P<mass>{NUMBER}),CM \{{X {NUMBER},Y {NUMBER},Z (?P<z>{NUMBER}),A 0.0,B 0.0,C 0.0\}},"  # noqa: E501
+    rf"|\$LOAD=\{{M (?P<mass>{NUMBER}),"
+    rf"CM \{{X {NUMBER},Y {NUMBER},Z (?P<z>{NUMBER}),A 0.0,B 0.0,C 0.0\}},"
     rf"J \{{X 0.0,Y 0.0,Z 0.0\}}\}}"
 )
 
