@@ -49,12 +49,16 @@ from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 POINTS = 40
-# members of each self-motion, and orientations of each free goal, among which the attack draws
-MEMBERS, ORIENTATIONS = 64, 64
+MEMBERS = 64
+"""Samples of a self-motion from which the attack draws."""
+ORIENTATIONS = 64
+"""Samples of the orientation of a partly free goal from which the attack draws."""
 # share of the starts that take the nearest goal, of the rest that take the next, and so on
 ODDS = 0.4
-# time for a request, and for one start [s]
-DEADLINE, PATIENCE = 60.0, 20.0
+DEADLINE = 60.0
+"""Deadline of a request [s]."""
+PATIENCE = 20.0
+"""Longest time for the solve from one start [s]."""
 # relative rounding of an energy and of a bound
 ROUNDING = 1e-9
 

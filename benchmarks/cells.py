@@ -39,8 +39,10 @@ from joulepath.optimizer.problem.scene import (
 
 Cell = Literal["table", "shelf", "bin", "cage"]
 CELLS: tuple[Cell, ...] = ("table", "shelf", "bin", "cage")
-# margin of every obstacle [m], and longest time for the path planner [s]
-MARGIN, AMPLE = 0.01, 5.0
+MARGIN = 0.01
+"""Margin of every obstacle [m]."""
+AMPLE = 5.0
+"""Longest time for the path planner [s]."""
 # a gripper 10 cm long, and where it grips
 TOOL = capsule_between(np.zeros(3), np.array([0.0, 0.0, 0.1]), 0.03)
 GRIP = 0.15

@@ -18,12 +18,20 @@ from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
 
-# as the contract has them
-RATIO, REACH, BALANCE = 1 + 1e-6, 1e-6, 1e-3
-# relative: two durations within SAME are equal; a baseline needs less energy only beyond SLACK, the
-# quadrature error. Ruckig's motion, of which the answer is a spline, is slower as one by up to
-# MERGED where jumps of its jerk are close
-SAME, SLACK, MERGED = 1e-9, 1e-6, 2e-5
+# RATIO, REACH and BALANCE are promises of the documentation of `POST /optimize`
+RATIO = 1 + 1e-6
+"""Largest ratio of a quantity to its limit [1]."""
+REACH = 1e-6
+"""Largest error of an end: position [m], orientation and joint positions [rad]."""
+BALANCE = 1e-3
+"""Largest relative error of the energy balance [1]."""
+SAME = 1e-9
+"""Relative difference below which two durations are equal [1]; rounding."""
+SLACK = 1e-6
+"""Relative difference of energy below which a baseline is no better [1]; quadrature error."""
+MERGED = 2e-5
+"""The same for Ruckig's motion [1]: its representation as a spline merges close jumps of jerk, and
+is slower by up to this share."""
 LIMITS = ("position", "velocity", "acceleration", "jerk", "torque")
 PARTS = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered")
 

@@ -34,14 +34,25 @@ from joulepath.models.robot import Array, LinkCapsule, LinkHull
 from joulepath.models.tool_meshes import TOOL_MESHES, between, installed_tool
 from joulepath.models.tools.registry import tool_figures
 
-# limits of the excess of hulls [m]: 99th percentile over the surface of an arm, and maximum; of
-# bent links, which have several hulls, holes remain that planes do not divide, as in Gen3's flange
-P99, MOST = 3e-3, 8e-3
-BENT_P99, BENT_MOST = 4e-3, 10e-3
-# of tools with fingers on turning links; in the hollow of the 2F-85's coupling, 9 mm
-LINKED_P99, LINKED_MOST = 6.5e-3, 10e-3
-# points of a cover's surface per m², of every mesh, and directions that stand for a ball
-DENSITY, MESH_POINTS, DIRECTIONS = 100_000, 200_000, 2_000
+P99 = 3e-3
+"""Limit on the 99th percentile of the excess of hulls over the surface of an arm [m]."""
+MOST = 8e-3
+"""Limit on the maximum of this excess [m]."""
+BENT_P99 = 4e-3
+"""The same percentile for arms with bent links [m]. Such links have several hulls, and planes do
+not divide every hole, for example in Gen3's flange."""
+BENT_MOST = 10e-3
+"""The same maximum for arms with bent links [m]."""
+LINKED_P99 = 6.5e-3
+"""The same percentile for tools with fingers on turning links [m]."""
+LINKED_MOST = 10e-3
+"""The same maximum for these tools [m]; the hollow of the 2F-85's coupling takes 9 mm."""
+DENSITY = 100_000
+"""Sampled points per area of the surface of a cover [1/m²]."""
+MESH_POINTS = 200_000
+"""Sampled points of a mesh."""
+DIRECTIONS = 2_000
+"""Directions that represent a ball."""
 
 
 @dataclass(frozen=True)

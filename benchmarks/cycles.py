@@ -53,9 +53,16 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.stops import Stop
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
-PART, NOTHING = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])), Payload()
-# ring around the base, heights [m], and greatest tilt of the tool [rad]
-NEAREST, FARTHEST, HEIGHTS, TILT = 0.35, 0.7, (0.05, 0.4), 0.2
+PART = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05]))
+NOTHING = Payload()
+NEAREST = 0.35
+"""Inner radius of the ring of stops around the base [m]."""
+FARTHEST = 0.7
+"""Outer radius of this ring [m]."""
+HEIGHTS = (0.05, 0.4)
+"""Smallest and largest height of a stop above the base [m]."""
+TILT = 0.2
+"""Largest roll and pitch of the tool at a stop [rad]."""
 
 # of a stop [s]
 DWELL = 0.3
@@ -63,8 +70,9 @@ DWELL = 0.3
 # rests, and without its parts, relative. All are sums of the same numbers in another order
 SUMS = ("joins [rad]", "energy of the legs", "parts of the energy")
 EXACT = 1e-9
-# relative: as exact as energies of equal motions are
-EXCESS, NO_EXCESS = "excess over the least of all", 1e-6
+EXCESS = "excess over the least of all"
+NO_EXCESS = 1e-6
+"""Relative difference within which energies of equal motions agree [1]."""
 
 
 def poses(rng: np.random.Generator, count: int) -> list[Pose]:

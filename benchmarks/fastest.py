@@ -37,11 +37,20 @@ from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 
 NEAR = 1.5  # rad
-# payloads as shares of the robot's rating, and where their centre of mass is [m], at most
-LOAD, ASIDE, AHEAD = (0.5, 1.0), 0.05, 0.12
-# a random start: amplitudes of its sines [rad], the greatest first, samples, and durations in
-# multiples of the shortest
-AMPLITUDE, SINES, SAMPLES, SLOWER = 0.6, 4, 121, (1.0, 3.0)
+LOAD = (0.5, 1.0)
+"""Smallest and largest payload as a share of the rated payload [1]."""
+ASIDE = 0.05
+"""Largest lateral offset of the centre of mass of a payload in the flange frame [m]."""
+AHEAD = 0.12
+"""Largest distance of this centre from the flange [m]."""
+AMPLITUDE = 0.6
+"""Standard deviation of the amplitude of the first sine of a random start [rad]."""
+SINES = 4
+"""Number of sines of a random start."""
+SAMPLES = 121
+"""Samples of a random start over time."""
+SLOWER = (1.0, 3.0)
+"""Smallest and largest duration of a random start over the least duration [1]."""
 # a share by which another motion has to be faster to count
 COUNTS = 0.01
 

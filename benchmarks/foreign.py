@@ -41,8 +41,10 @@ from joulepath.optimizer.optimize import warm_up
 
 Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")
-# deadline of a request, and period of the replay [s]
-DEADLINE, REPLAY = 10.0, 1e-3
+DEADLINE = 10.0
+"""Deadline of a request [s]."""
+REPLAY = 1e-3
+"""Period of the replay of capsules and hulls [s]."""
 # period of the replay of meshes [s]
 MESH_REPLAY = 1e-4
 # robot of the problems, unless --robot names another

@@ -27,10 +27,16 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.dynamics.link_regressor import rigid_torques
 from joulepath.optimizer.identify.logs.log import Log
 
-# rows of a log that are compared, rad/s over which Coulomb friction reverses, and the share of the
-# greatest deviation of a rigid torque from which on a joint carries much
-ROWS, KNEE, MUCH = 5000, 0.02, 0.3
-LEAST, MOST = 0.97, 1.03
+ROWS = 5000
+"""Largest number of compared rows per log, about."""
+KNEE = 0.02
+"""Range of speed in which Coulomb friction reverses [rad/s]."""
+MUCH = 0.3
+"""Share of the largest standard deviation of a rigid torque above which a joint is compared [1]."""
+LEAST = 0.97
+"""Smallest admissible slope of measured over computed torque [1]."""
+MOST = 1.03
+"""Largest admissible slope of measured over computed torque [1]."""
 
 
 def logs(place: Path) -> Iterator[tuple[str, Robot, Log]]:

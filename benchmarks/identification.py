@@ -55,9 +55,9 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, csv_of, off_the_model, recorded, truth_of
 
-# of simulated arms, days of each, the first that of the fit, and the standard deviation of their
-# friction
-UNITS, DAYS, DAY_SD = 4, 8, 0.03
+UNITS = 4  # simulated arms
+DAYS = 8  # logs per arm, one a day; the first one is fitted
+DAY_SD = 0.03  # standard deviation of the friction between days, relative
 DRAWS = 100
 MOVES_OF_A_DRAW = 5
 # share of the runs in which a figure is told, for its own share to count

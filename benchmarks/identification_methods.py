@@ -34,8 +34,10 @@ from tests.identification_logs import recorded, truth_of
 
 METHODS: tuple[Method, ...] = get_args(Method)
 REFIT = "automatic, links refitted"
-# K, of a joint over a simulated log, and 1/K, by which its friction falls
-WARMING, RATE = 20.0, 0.012
+WARMING = 20.0
+"""Rise of the temperature of a joint over a simulated log [K]."""
+RATE = 0.012
+"""Relative decrease of friction with temperature [1/K]."""
 # N and N·m, noise of a sensor beneath the base
 SENSOR = (0.5, 0.2)
 # of the masses of an arm over the robot's

@@ -24,11 +24,14 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 
-# rad/s, from which on a joint moves and its errors count; and the share of the greatest singular
-# value below which a combination of parameters is not determined
-MOVING, LEAST_SINGULAR = 0.02, 1e-6
-# of the outsider's error: for a joint of the UR10e, and of the Pandas
-UR10E, PANDA = 1.03, 1.0
+MOVING = 0.02
+"""Speed above which the errors of a joint count [rad/s]."""
+LEAST_SINGULAR = 1e-6
+"""Share of the largest singular value below which a combination of parameters is undetermined."""
+UR10E = 1.03
+"""Largest admissible ratio of our error to the outsider's, per joint of the UR10e [1]."""
+PANDA = 1.0
+"""The same per joint of the Pandas [1]."""
 
 
 def outsider(place: Path | None, _: int) -> list[Gate]:

@@ -22,9 +22,12 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import off_the_model, recorded, truth_of
 
 NUMBERS = (1, 2, 6)
-# simulated arms, of which fewer have a standard error like the width of the gate; days of each,
-# those of the fits first, and moves of a day
-UNITS, DAYS, MOVES = 24, 10, 8
+UNITS = 24
+"""Simulated arms; with fewer, the standard error of the share is like the width of the gate."""
+DAYS = 10
+"""Days per arm; the first ones are fitted."""
+MOVES = 8
+"""Moves per day."""
 # of the friction of each joint, by itself
 DAY_SD = 0.025
 # draws of the logs of a fit among the real ones
@@ -33,8 +36,10 @@ DRAWS = 12
 # move's energy
 MOVE_EFFECT = 0.6
 WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
-# of the 90 % that the interval promises
-LEAST, MOST = 0.87, 0.93
+LEAST = 0.87
+"""Smallest admissible share of energies in their interval, with a promise of 0.9 [1]."""
+MOST = 0.93
+"""Largest admissible share of energies in their interval [1]."""
 
 
 def sessions(_: Path | None, __: int) -> list[Gate]:

@@ -29,10 +29,20 @@ from tests.identification_logs import (
 )
 
 RATE = 500.0
-# of friction: its fall over a log, and the ripple of the gears with their waves per radian
-WARMING, RIPPLE, WAVES = 0.03, 0.01, 37.0
-# s of the drive's filter, A of its steps, rad of the sensors' steps, s of the times' jitter
-FILTER, CURRENT_STEP, POSITION_STEP, JITTER = 0.004, 0.005, 1e-5, 1e-4
+WARMING = 0.03
+"""Relative decrease of the friction over a log [1]."""
+RIPPLE = 0.01
+"""Amplitude of the ripple of the gears relative to the friction [1]."""
+WAVES = 37.0
+"""Angular frequency of this ripple over the joint position [1]."""
+FILTER = 0.004
+"""Time constant of the filter of the logged current in the drive [s]."""
+CURRENT_STEP = 0.005
+"""Resolution of the logged current [A]."""
+POSITION_STEP = 1e-5
+"""Resolution of the logged positions [rad]."""
+JITTER = 1e-4
+"""Largest jitter of the logged times [s]."""
 # of the friction beneath the gears that a torque sensor behind them sees
 BEHIND = 0.15
 TORQUE_SENSOR = Noise(current=0.005)

@@ -45,8 +45,10 @@ from joulepath.optimizer.problem.scene import Scene
 from joulepath.optimizer.search.errors import DurationTooShort
 
 MOTIONS = ("ours", "free", "slowed", "quintic")
-# centre of the mass in the flange frame [m], and samples of a motion
-COM, SAMPLES = [0.0, 0.0, 0.1], 4_001
+COM = [0.0, 0.0, 0.1]
+"""Centre of mass of the payload in the flange frame [m]."""
+SAMPLES = 4_001
+"""Samples of a motion."""
 # deadline of a request [s]
 DEADLINE = 30.0
 # of the fastest motion found, to the duration of motions that cannot be shorter

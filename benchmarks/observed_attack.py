@@ -19,7 +19,8 @@ import numpy as np
 from benchmarks.attack_bodies import move
 from benchmarks.service import Client, Service, resident
 
-HONEST, PROBE = "127.0.0.1", "127.0.0.2"
+HONEST = "127.0.0.1"  # address of the client with valid requests
+PROBE = "127.0.0.2"  # address of the client for /healthz
 PROBE_PERIOD = 0.025  # between two requests for /healthz [s]
 SETTLING = 3.0  # from the end of an attack to the last measurement of memory [s]
 

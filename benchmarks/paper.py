@@ -31,7 +31,8 @@ from joulepath.optimizer.problem.arm import Arm
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "explained" / "paper.md"
-BEGIN, END = "<!-- made by python -m benchmarks.paper --write -->", "<!-- end of what it made -->"
+BEGIN = "<!-- made by python -m benchmarks.paper --write -->"
+END = "<!-- end of what it made -->"
 REFERENCE = ROOT / "tests" / "reference"
 
 SECONDS = 1.5

@@ -51,10 +51,22 @@ from joulepath.optimizer.problem.stops import Stop
 
 ROBOTS = ("ur5e", "ur10e", "kr10_r1100")
 NOTHING = Payload()
-# shares of the reach: distances of stops from the nominal base, their heights, half the region
-NEAR, FAR, HEIGHTS, AROUND, ABOVE = 0.5, 0.7, (0.05, 0.35), 0.4, 0.2
-# half angle of each side [rad], tool above a table [m], step of the exhaustive grid [m]
-SIDE, CLEARANCE, GRID = 0.5, 0.06, 0.05
+NEAR = 0.5
+"""Smallest distance of a stop from the nominal base as a share of the reach [1]."""
+FAR = 0.7
+"""Largest distance of a stop from the nominal base as a share of the reach [1]."""
+HEIGHTS = (0.05, 0.35)
+"""Smallest and largest height of a stop as a share of the reach [1]."""
+AROUND = 0.4
+"""Horizontal width of the region as a share of the reach [1]."""
+ABOVE = 0.2
+"""Vertical half width of the region as a share of the reach [1]."""
+SIDE = 0.5
+"""Angle around the base over which the stops of one side spread [rad]."""
+CLEARANCE = 0.06
+"""Height of the stops of a side above their table [m]."""
+GRID = 0.05
+"""Step of the exhaustive grid [m]."""
 AMPLE = 1e6  # so long that no computation on the exhaustive grid ends early [s]
 TOOL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.12], [0, 0, 0, 1]])
 

@@ -35,8 +35,10 @@ UR10E_DAYS: dict[str, tuple[str, ...]] = {
     "20_02_19": ("14harm50sec", "15harm50sec"),
 }
 """Logs without payload, by day."""
-# rad and rad/s, of rows that the recorder garbled
-POSSIBLE_Q, POSSIBLE_V = 7.0, 4.0
+POSSIBLE_Q = 7.0
+"""Joint position above which the recorder garbled a row [rad]."""
+POSSIBLE_V = 4.0
+"""Joint speed above which the recorder garbled a row [rad/s]."""
 
 
 def ur10e_days(

@@ -44,9 +44,11 @@ from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 FILE = Path(__file__).with_name("reference_energies.json")
-SEED, TASKS = 1, 100
-STARTS, POINTS = 64, 25
-IPOPT_STARTS = 4
+SEED = 1
+TASKS = 100
+STARTS = 64  # initial guesses of the SQP per task
+POINTS = 25  # control points
+IPOPT_STARTS = 4  # initial guesses of IPOPT per task
 FINE_POINTS = 45  # spans of half the length
 MODES = 3  # half waves of a perturbation
 PERTURBATIONS = (0.1, 1.5)  # least and largest standard deviation of the waves' amplitudes [rad]

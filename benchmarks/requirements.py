@@ -8,7 +8,8 @@ from typing import Any
 
 Results = dict[str, Any]
 
-MS, PERCENT = 1e3, 1e2
+MS = 1e3  # per second
+PERCENT = 1e2
 
 
 @dataclass(frozen=True)

@@ -43,15 +43,22 @@ from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 SlowKind = Literal["all joints", "one joint", "tenth"]
 SLOW_KINDS: tuple[SlowKind, ...] = ("all joints", "one joint", "tenth")
-# speeds [rad/s] of all joints, and the least and greatest of one; share of the limits of speed
-REDUCED, ONE_JOINT, TENTH = 0.25, (0.02, 0.6), 0.1
+REDUCED = 0.25
+"""Speed limit of all joints in the kind `all joints` [rad/s]."""
+ONE_JOINT = (0.02, 0.6)
+"""Smallest and largest speed limit of the joint in the kind `one joint` [rad/s]."""
+TENTH = 0.1
+"""Share of the robot's speed limits in the kind `tenth` [1]."""
 # greatest 95th percentile of the excess that is allowed
 MOST_EXCESS = 3e-3
 # durations that are tried, in multiples of the answer's
 NEAR = (0.9, 0.97, 0.99, 0.997, 1.003, 1.01, 1.03, 1.1)
-# multiple of the control points, those of a first solve, and the relative decrease that ends the
-# solve
-MORE, FEW, PROGRESS = 4, 13, 1e-5
+FEW = 13
+"""Control points of a first solve."""
+MORE = 4
+"""Factor on the number of control points in the fine solve."""
+PROGRESS = 1e-5
+"""Relative decrease of the energy at which a fine solve ends [1]."""
 # so long that no search ends early [s]
 AMPLE = 600.0
 

@@ -8,8 +8,9 @@ from typing import Protocol
 from benchmarks.motion import Motion
 from joulepath.models.robot import Array
 
-# of planners that minimise energy: control points and nodes of joulepath's own first solve
-CONTROL_POINTS, NODES = 13, 31
+# planners that minimise energy get the discretisation of joulepath's own first solve
+CONTROL_POINTS = 13
+NODES = 31
 
 
 class Planner(Protocol):
