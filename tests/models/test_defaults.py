@@ -15,8 +15,11 @@ from tests.mesh_folders import FOUND, meshes
 
 # relative; the figures have two or three digits
 DIGITS = 0.03
-# W/(N·m)² times N·m, kg·m² at 1 N·m, share of the torque limit, s/rad times share, m at 9 N·m
-COPPER, ROTOR, COULOMB, VISCOUS, RADIUS = 0.5, 0.00404, 0.06, 0.055, 0.0322
+COPPER = 0.5  # copper loss times the torque limit [W/(N·m)]
+ROTOR = 0.00404  # rotor inertia of a joint with a torque limit of 1 N·m [kg·m²]
+COULOMB = 0.06  # Coulomb friction over the torque limit [1]
+VISCOUS = 0.055  # viscous friction over the torque limit [s/rad]
+RADIUS = 0.0322  # radius of a link at a torque limit of 9 N·m [m]
 OF_ONE_MAKER = [name for name in robot_names() if name.startswith("ur")]
 LARGEST = ("ur15", "ur20", "ur30")
 

@@ -41,9 +41,12 @@ from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
 from tests.selection import long_but
 
-# what the work of a call takes on one core [s]: per node of the kernel, instant of Pinocchio's
-# recursion, forward kinematics, distance by Coal, row of a quadratic program
-NODE, INSTANT, PLACEMENT, DISTANCE, ROW = 1.2e-6, 1.5e-6, 3e-6, 6e-6, 2e-5
+# time of the work of a call on one core [s]
+NODE = 1.2e-6  # per node of the kernel
+INSTANT = 1.5e-6  # per instant of Pinocchio's recursion
+PLACEMENT = 3e-6  # per forward kinematics
+DISTANCE = 6e-6  # per distance by Coal
+ROW = 2e-5  # per row of a quadratic program
 # relative; the same sums in the same order
 ROUNDING = 1e-12
 # the most that a deadline may be overrun [s]

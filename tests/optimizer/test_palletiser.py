@@ -39,11 +39,13 @@ from joulepath.optimizer.replay.simulated_arm import SimulatedArm
 from tests.models.own_arm.arms import robot
 from tests.models.own_arm.palletiser import PALLETISER, PLATE, description
 
-START, GOAL = np.array([-1.0, 0.1, 0.6, 0.0]), np.array([1.2, 0.7, 0.2, 1.0])
-# relative: Simpson's rule against Gauss's at kinks of the drawn power; central differences
-QUADRATURE, DIFFERENCES, STEP = 1e-4, 1e-6, 1e-6
-# m and rad: residual of a pose, and difference of a configuration found again
-ACCURACY, FOUND = 1e-9, 1e-6
+START = np.array([-1.0, 0.1, 0.6, 0.0])
+GOAL = np.array([1.2, 0.7, 0.2, 1.0])
+QUADRATURE = 1e-4  # relative: Simpson's rule against Gauss's at kinks of the drawn power
+STEP = 1e-6  # of central differences [rad]
+DIFFERENCES = 1e-6  # relative error of central differences with this step
+ACCURACY = 1e-9  # residual of a pose [m, rad]
+FOUND = 1e-6  # difference of a configuration found again [rad]
 
 
 @pytest.fixture(scope="module")

@@ -34,16 +34,18 @@ from tests.selection import long_but
 NOZZLE = Arm(
     robot=ROBOT, collisions=False, T_flange_tcp=Pose.from_quaternion([0.15, 0, 0.1], [0, 0, 0, 1]).T
 )
-DOWN, AXIS = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0])
+DOWN = np.array([0.0, 0.0, -1.0])
+AXIS = np.array([0.0, 0.0, 1.0])
 TURNING = ToolPath(about=(0.0, 0.0, 1.0))
-FROM, TO = (0.7, -0.2, 0.2), (0.7, 0.2, 0.2)
+FROM = (0.7, -0.2, 0.2)  # ends of the seam in the base frame [m]
+TO = (0.7, 0.2, 0.2)
 # m, and of unit vectors: the tolerances of a path
 NEAR = 2e-3
 # of the deadline: what is certified after it has passed
 OVERRUN = 0.1
-# rad: a cone at a stop; m, rad: what a configuration on the manifold, or at a given pose, may miss
-# it by; rad: rounding
-TILT, ON_MANIFOLD, EXACT = 0.3, 1e-8, 1e-9
+TILT = 0.3  # half angle of the cone at a stop [rad]
+ON_MANIFOLD = 1e-8  # largest error of a configuration at its pose [m, rad]
+EXACT = 1e-9  # rounding of joint positions [rad]
 # relative: by so much a cycle at given orientations may be better than one at chosen ones, which
 # are local optima
 CHOSEN = 1e-3
