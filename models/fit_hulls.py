@@ -1,10 +1,10 @@
-"""Fit hulls to the links: `python -m joulepath.models.fit_hulls ROBOT MESHES [link …]` prints rows
-for the section `hulls` of figures.yaml, which has the radius already.
+"""Fit hulls to the links: `python -m joulepath.models.fit_hulls ROBOT MESHES [link …]`.
 
-MESHES is a folder as in `joulepath.models.meshes`. A bent link is divided into parts, with one hull
-each. The hollows that the hulls of a neighbouring link fill at every angle are not divided, so the
-links of a new robot are fitted twice. The points of a hull are vertices of the convex hull of its
-part, so that the hull reaches at most its radius beyond that convex hull.
+The command prints rows for the section `hulls` of figures.yaml; the section already needs the
+radius. MESHES is a folder as in `joulepath.models.meshes`. A bent link is divided into parts, one
+hull per part. A hollow filled by the hulls of a neighbouring link at every angle of the joint is
+not divided; therefore the links of a new robot are fitted twice. The points of a hull are vertices
+of the convex hull of its part, so the grown hull exceeds this convex hull by at most its radius.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from joulepath.models.robot import LinkHull, Robot
 
 
 def fitted_hulls(folder: Path, robot: Robot, link: int) -> list[LinkHull]:
-    """The hulls around the parts of a link."""
+    """Fit hulls to the parts of a link."""
     radius = robot.figures["hulls"]["radius"]["value"]
     surfaces = list(link_surfaces(folder, robot.name, link).values())
     inside = partial(within_neighbours, robot, link, robot.hulls)

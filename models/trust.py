@@ -11,7 +11,7 @@ TRUST = {
     "T": "transferred from a sister robot",
     "E": "engineering default, no source",
 }
-# sections of a robot's figures on which its energies depend
+# sections of figures with an influence on energies
 ENERGY_SECTIONS = ("inertials", "friction_laws", "drives", "electronics")
 _GROUPS = {
     "A": "the maker's own figures",
@@ -35,7 +35,7 @@ def energy_trust(figures: dict[str, Any]) -> str:
 
 
 def figures_by_letter(figures: dict[str, Any]) -> dict[str, list[str]]:
-    """What an energy depends on, in words, by the trust letters, best first."""
+    """Phrases for the figures behind an energy, by their trust letters, best letter first."""
     by_letter: dict[str, list[str]] = {letter: [] for letter in _GROUPS}
     for words, section in _energy_figures(figures).items():
         by_letter[worst_letter(section)].append(words)
@@ -43,7 +43,7 @@ def figures_by_letter(figures: dict[str, Any]) -> dict[str, list[str]]:
 
 
 def _energy_figures(figures: dict[str, Any]) -> dict[str, Any]:
-    """Figures on which an energy depends, by a phrase for each; friction of the default law."""
+    """Figures behind an energy by phrases for them; the friction is the default law's."""
     inertials, drives, electronics = (
         figures[section] for section in ("inertials", "drives", "electronics")
     )

@@ -19,12 +19,15 @@ def location(error: InvalidProblem, where: str) -> list[str | int]:
 
 
 def moved(error: E, field: str, own: Collection[str] | None = None) -> E | InvalidProblem:
-    """An error of a request that is a `field` of the body; others than InvalidProblem as they are.
+    """Move an error of a part of the body to its path in the body.
+
+    Errors besides InvalidProblem are returned unchanged.
 
     Args:
         error: error of the request.
         field: path of the request in the body.
-        own: fields that the request has, by default all. An error in another is one of `field`.
+        own: fields of the request, by default all. An error in another field becomes an error of
+            `field` itself.
     """
     if not isinstance(error, InvalidProblem):
         return error
@@ -34,7 +37,7 @@ def moved(error: E, field: str, own: Collection[str] | None = None) -> E | Inval
 
 @contextmanager
 def inside(field: str, own: Collection[str] | None = None) -> Iterator[None]:
-    """Raise what the body raises, InvalidProblem by `moved`."""
+    """Move the InvalidProblem of the body by `moved`."""
     try:
         yield
     except InvalidProblem as error:

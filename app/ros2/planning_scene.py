@@ -1,6 +1,6 @@
 """Obstacles of `POST /optimize` from messages of MoveIt's planning scene.
 
-Messages are read by their fields, so that this module needs no installation of ROS.
+The module reads the fields of the messages by name and needs no installation of ROS.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class PlanningScene:
         """Begin without objects.
 
         Args:
-            base_frames: frames at the robot's base, in which objects may be given.
+            base_frames: admissible frames of objects, all at the robot's base.
             topic: topic of the messages, for errors.
         """
         self._frames, self._topic = frozenset(base_frames), topic
@@ -49,9 +49,9 @@ class PlanningScene:
         """Take over a moveit_msgs/msg/PlanningScene, whole or a difference.
 
         Raises:
-            InvalidRequest: the scene has what plans cannot avoid: an octomap, an attached body, a
-                shape that is no box, sphere, cylinder or mesh, or an unknown frame. No motion is
-                planned then until a whole scene arrives.
+            InvalidRequest: the scene has an unsupported part: an octomap, an attached body, a
+                shape besides box, sphere, cylinder and mesh, or an unknown frame. Planning is then
+                refused until a whole scene arrives.
         """
         try:
             self._take_over(message)
@@ -76,7 +76,13 @@ class PlanningScene:
         self._objects = objects
 
     def added_to(self, scene: Json | None) -> Json:
-        """The objects as obstacles of a `scene` of `POST /optimize`, beside those that it has.
+        """Add the objects to the obstacles of a `scene` of `POST /optimize`.
+
+        Args:
+            scene: the scene; None is an empty scene.
+
+        Returns:
+            The scene with all obstacles.
 
         Raises:
             InvalidRequest: the scene is in another frame than `base_link`, or the last message
@@ -140,7 +146,7 @@ class PlanningScene:
                     f"world.collision_objects.{message.id}",
                     f"There are {len(poses)} poses for {len(found)} shapes: give one for each.",
                 )
-            # a shape without a pose has that of its object
+            # a shape without a pose takes the pose of its object
             shapes += zip_longest((read(message.id, each) for each in found), poses)
         return tuple(shapes)
 
@@ -169,7 +175,7 @@ class PlanningScene:
                 "which do not exist: number its vertices from 0.",
             )
         corners = points[triangles].astype("<f4")
-        # every triangle: normal, which readers ignore, corners, attribute
+        # per triangle: normal (ignored by readers), corners, attribute
         faces = b"".join(bytes(12) + each.tobytes() + bytes(2) for each in corners)
         content = bytes(80) + struct.pack("<I", len(corners)) + faces
         return {"shape": "mesh_file", "format": "stl", "data": base64.b64encode(content).decode()}
@@ -179,7 +185,12 @@ class PlanningScene:
 
 
 def _pose(outer: Any, inner: Any) -> Json:
-    """The pose of a shape in the base frame, from those of its object and within it."""
+    """Pose of a shape in the base frame.
+
+    Args:
+        outer: pose of the object in the base frame.
+        inner: pose of the shape in the object.
+    """
     p, q = _numbers(inner)
     o, r = _numbers(outer)
     return {

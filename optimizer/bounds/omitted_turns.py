@@ -1,9 +1,9 @@
-"""Bound on the motions between two branches with full turns that no candidate has.
+"""Bound on the motions between two branches with full turns omitted from the candidates.
 
-Without `windings`, full turns that make a motion longer are no candidates, nor between two poses
+Without `windings`, the candidates exclude longer motions by full turns and, between two poses,
 displacements beyond one turn (`search.candidates.pairs`). The plain lower bound rises with the
-displacement of each joint, so the bound of the candidates holds for motions with such turns. A
-bound raised by other means than the displacement need not hold for them.
+displacement of every joint, so the bound of a candidate also holds for the omitted turns. A bound
+raised by other means than the displacement does not necessarily hold for the omitted turns.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Data and effort that the dual bounds of all pairs of a problem share."""
+"""Common data and effort of the dual bounds of all pairs of a problem."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Effort:
     """Longest time [s] for a group of an arm with six joints on an idle machine."""
 
     def time_for(self, joints: int) -> float:
-        """Time [s] without which a group of an arm is not begun.
+        """Least remaining time [s] to begin the bounds of a group of pairs.
 
         It grows with joints⁵, the number of bounds on third derivatives of the inertia.
         """
@@ -44,7 +44,7 @@ class Effort:
 
 @dataclass(frozen=True)
 class PairBounds:
-    """Data that the dual bounds of all pairs of a problem share."""
+    """Common data of the dual bounds of all pairs of a problem."""
 
     prepared: PreparedProblem
     chain: ChainDerivatives
@@ -56,11 +56,15 @@ class PairBounds:
 
     @classmethod
     def of(cls, prepared: PreparedProblem) -> PairBounds | None:
-        """The data; None where the dual bound does not hold or cannot be higher than the plain one.
+        """Collect the data.
 
-        It needs the electrical objective, a concave friction law, and at least two joints, none of
-        which follows another: bounds on the derivatives of a chain are known by its own joints.
-        Friction of the same torque at every speed has no convexity to spare for the confinement.
+        The dual bound requires the electrical objective, a concave friction law, and at least two
+        independent joints, because bounds on the derivatives of a chain are known for its own
+        joints. With a friction torque independent of speed, the friction loss has no convexity for
+        the confinement, and the dual bound cannot exceed the plain one.
+
+        Returns:
+            The data; None if a requirement is not met.
         """
         arm = prepared.arm
         friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)

@@ -1,19 +1,20 @@
 """Boxes around all configurations of a pose, for any chain of revolute joints.
 
-They need no inverse kinematics, so none of its omissions weakens a bound. The largest boxes are
-split first, and `PoseFamily.narrowed` drops those that cannot reach the pose and shrinks the others
-onto its configurations. Few small boxes are left around isolated configurations. Where the
-configurations are many, or curves, the boxes that the effort leaves are larger, and cover them all.
+The cover uses no inverse kinematics, so a branch missed by inverse kinematics cannot spoil a bound.
+The search splits the largest boxes first. `PoseFamily.narrowed` drops unreachable boxes and shrinks
+the others around the configurations. Isolated configurations end in few small boxes. Curves and
+large numbers of configurations end in larger boxes; the boxes cover all configurations at any limit
+on the effort.
 
-`PoseFamily` leaves the rotation about an axis free. Here it is that of the last joint, so that the
-boxes are narrowed in the other joints alone. The orientation R of the last link then determines the
-last joint: Rz(q_n) = M with M = R_{n-1}ᵀ R, R_{n-1} the orientation of its frame before its
-rotation. Within a box, R_{n-1} turns from that of the middle by no more than σ, the sum of the half
-sides of the other joints, since each joint turns all that it carries by its own angle. So Rz(q_n)
-is within the angle σ of M at the middle. With M = (w, x, y, z) as a unit quaternion, the angle
-between them is 2 acos|w cos(q_n/2) + z sin(q_n/2)|, so that |cos(q_n/2 - α)| ≥ cos(σ/2) /
-hypot(w, z) with α = atan2(z, w): q_n is within 2 acos of this ratio of 2 α, or the box is empty if
-the ratio exceeds 1.
+`PoseFamily` leaves the rotation about one axis free: the axis of the last joint. The boxes are
+therefore narrowed in the other joints alone. The orientation R of the last link then determines the
+last joint: Rz(q_n) = M with M = R_{n-1}ᵀ R and R_{n-1} the orientation of the last joint's frame at
+q_n = 0. Every joint rotates the links behind it by its own angle. Within a box, R_{n-1} thus
+deviates from its value at the middle by at most σ, the sum of the half sides of the other joints,
+and Rz(q_n) is within the angle σ of M at the middle. With M = (w, x, y, z) as a unit quaternion,
+the angle between both is 2 acos|w cos(q_n/2) + z sin(q_n/2)|. Hence |cos(q_n/2 - α)| ≥ cos(σ/2) /
+hypot(w, z) with α = atan2(z, w): q_n is within 2 acos of this ratio around 2 α, and the box is
+empty if the ratio exceeds 1.
 """
 
 from __future__ import annotations
@@ -70,10 +71,10 @@ POSE_COVER = PoseCoverSettings()
 
 @dataclass(frozen=True)
 class CoveredPose:
-    """A pose in terms of the last joint, whose axis the other joints alone place."""
+    """A pose divided into the axis of the last joint, placed by the other joints, and its angle."""
 
     family: PoseFamily
-    """Configurations that bring the last joint's frame to its pose, turned about its axis."""
+    """Configurations with the last joint's frame at its pose, up to a rotation about its axis."""
     R: Array
     """Orientation (3, 3) of the last link at the pose."""
 
@@ -84,7 +85,7 @@ class CoveredPose:
         Args:
             problem: problem of the motions, without a tool path.
             pose: pose of the TCP.
-            given: whether the starts have no other full turns than those they are given with.
+            given: whether the full turns of the starts are fixed.
         """
         T_flange_last = np.asarray(np.linalg.inv(problem.arm.robot.T_last_flange))
         arm = replace(problem.arm, T_flange_tcp=T_flange_last)
@@ -94,7 +95,7 @@ class CoveredPose:
         return cls(PoseFamily(prepared, turned, given), T[:3, :3])
 
     def boxes(self, limits: SearchLimits) -> EndBoxes:
-        """Boxes that hold, up to full turns, all configurations within the position limits.
+        """Cover all configurations within the position limits, up to full turns.
 
         Args:
             limits: limits on the effort; less effort leaves larger boxes.
@@ -108,8 +109,14 @@ class CoveredPose:
         return united(*self._with_last_joint(parts.centre, parts.half), POSE_COVER.most_boxes)
 
     def _with_last_joint(self, centre: Array, half: Array) -> EndBoxes:
-        """The boxes (b, nq) [rad] that hold configurations of the pose, narrowed in the last
-        joint.
+        """Narrow boxes in the last joint, and drop boxes without a configuration of the pose.
+
+        Args:
+            centre: middles, shape (b, nq) [rad].
+            half: half sides, shape (b, nq) [rad].
+
+        Returns:
+            Middles and half sides of the remaining boxes.
         """
         prepared = self.family.prepared
         placements, coupling = joint_placements(prepared.model), prepared.arm.robot.coupling
@@ -134,7 +141,7 @@ def cover(family: PoseFamily, limits: SearchLimits) -> EndBoxes:
 
 
 class _PoseCover(Subdivision[Boxes]):
-    """Boxes of a pose, whose values are their sizes with a minus: the largest come first."""
+    """Subdivision of the boxes of a pose; the value of a box is its negative size."""
 
     def __init__(self, family: PoseFamily) -> None:
         self.family = family
@@ -145,7 +152,7 @@ class _PoseCover(Subdivision[Boxes]):
         return self._narrowed(*one_turn_boxes(nq, POSE_FAMILY.boxes_per_joint[0]))
 
     def chosen(self, parts: Boxes, number: int) -> Indices:
-        """The largest boxes that are not settled."""
+        """The largest boxes above the size at which a box is final."""
         return np.flatnonzero(parts.value[: POSE_COVER.boxes_per_round] < -POSE_COVER.settled)
 
     def divided(self, parts: Boxes, rows: Indices) -> Boxes:
@@ -153,7 +160,7 @@ class _PoseCover(Subdivision[Boxes]):
         return self._narrowed(*halved(self.family, parts.centre[rows], parts.half[rows]))
 
     def _narrowed(self, centre: Array, half: Array) -> Boxes:
-        """The boxes that may hold configurations within the position limits, narrowed."""
+        """Narrow boxes, and drop boxes without configurations within the position limits."""
         limits = self.family.prepared.arm.active_limits
         for _ in range(POSE_COVER.narrowings):
             centre, half, reached = self.family.narrowed(centre, half)
@@ -164,14 +171,17 @@ class _PoseCover(Subdivision[Boxes]):
 
 
 def united(centre: Array, half: Array, most: int) -> tuple[Array, Array]:
-    """At most so many boxes that hold all of the boxes given.
+    """Cover boxes by at most `most` boxes.
 
-    The group of boxes with the widest side is bisected, again and again.
+    All boxes form one group at first; the group with the widest side is bisected repeatedly.
 
     Args:
         centre: middles, shape (b, nq) [rad].
         half: half sides, shape (b, nq) [rad].
         most: largest number of boxes.
+
+    Returns:
+        Middles and half sides of the covering boxes [rad].
     """
     if len(centre) <= most:
         return centre, half

@@ -1,9 +1,9 @@
 """A cycle through the configurations of a cycle at a nearby place.
 
 A place a few centimetres away mostly has its best cycle in nearly the same configurations. With
-them as its targets, a cycle has one move between two stops in place of thousands, and is computed
-in a fraction of the time. It is a cycle through the same poses, and thus never better than the best
-one at its place.
+these configurations as targets, a cycle has a single candidate per move in place of thousands and
+is computed in a fraction of the time. The cycle passes the same poses, so its energy is never below
+the least one at its place.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ NEARBY = NearbySettings()
 
 @dataclass(frozen=True, eq=False)
 class Visited:
-    """The configurations of a cycle, and the poses from which they come.
+    """The configurations of a cycle, and the poses behind them.
 
     Attributes:
-        q: joint positions at every stop and at the start, shape (nq,) [rad], by their names.
-        T_base_stop: pose (4, 4) of the body that each moves with, in the frame of the base.
+        q: joint positions by the name of the stop or start, shape (nq,) [rad].
+        T_base_stop: pose of the body of the stop in the base frame, by the same names, (4, 4).
     """
 
     q: Mapping[str, Array]
@@ -69,12 +69,12 @@ class Visited:
 
 
 def nearby_cycle(cycle: Cycle, visited: Visited, T_base_stop: Mapping[str, Array]) -> Cycle | None:
-    """The cycle through configurations near those of another place.
+    """The cycle through configurations near the ones of another place.
 
     Args:
         cycle: cycle at its place, in the given order.
         visited: configurations of the same cycle at another place.
-        T_base_stop: pose (4, 4) of the body that each stop moves with, in the frame of the base.
+        T_base_stop: pose of the body of a stop in the base frame, by its name, shape (4, 4).
 
     Returns:
         The cycle with joint positions as its targets; None if some are out of reach or far away, or
@@ -95,7 +95,7 @@ def nearby_cycle(cycle: Cycle, visited: Visited, T_base_stop: Mapping[str, Array
     at = np.array(q)
     near, inside, residual = at, np.ones(at.shape, dtype=bool), np.zeros(len(at))
     for _ in range(1 + NEARBY.set_back):
-        # a redundant arm may reach a pose within its limits though the nearest way leaves them
+        # a redundant arm may have a solution within its limits even if the nearest one has not
         within = np.clip(near, limits.q_min + NEARBY.inset, limits.q_max - NEARBY.inset)
         near, residual = solved(chain, np.where(inside, near, within), np.array(poses))
         inside = (near >= limits.q_min) & (near <= limits.q_max)
@@ -110,7 +110,7 @@ def nearby_cycle(cycle: Cycle, visited: Visited, T_base_stop: Mapping[str, Array
 
 
 def _pose(cycle: Cycle, targets: tuple[Single, ...], q: Array, T: Array) -> Array:
-    """Flange pose (4, 4) at a stop whose body has moved by T (4, 4) in the frame of the base."""
+    """Flange pose (4, 4) at a stop after a displacement T (4, 4) of its body in the base frame."""
     arm = cycle.arm
     if not any(isinstance(each, Pose | ConeOrientedPose) for each in targets):
         return flange_pose(tcp_pose(arm, q), arm.T_flange_tcp)

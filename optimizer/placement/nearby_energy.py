@@ -1,4 +1,4 @@
-"""Energies at places near one whose best cycles are known."""
+"""Energies at places near a place with known best cycles."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from joulepath.optimizer.placement.space import Place
 
 
 class NearbyEnergy:
-    """Energies at places through configurations near those of a known round.
+    """Energies at places, through configurations near the ones of a known round.
 
     Args:
         rounds: computes the rounds.
         start: round at the first place.
         end: deadline.
-        solve: finds the best cycles at a place. It is asked far from the last place that it was
-            asked for, and where there are no nearby configurations.
+        solve: finds the best cycles at a place. It is called far from the place of its last call,
+            and in the absence of nearby configurations.
         estimates: whether estimates suffice, if there are any for the cycles.
     """
 

@@ -11,8 +11,8 @@ def required(module: str, purpose: str, requirement: str) -> Any:
 
     Args:
         module: dotted name of the module.
-        purpose: name of the function that needs the module, for the message of the error.
-        requirement: argument of `pip install` that provides the module.
+        purpose: name of the calling function, for the message of the error.
+        requirement: argument of `pip install` to install the module.
 
     Returns:
         The module.

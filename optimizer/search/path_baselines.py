@@ -1,4 +1,4 @@
-"""Baselines along a tool path, whose joints follow the same curve as ours.
+"""Baselines along the joint path of the answer to a tool path.
 
 - `even_speed`: an even speed between two smooth ramps, like the linear motion of a controller
 - `quintic`: the rest-to-rest polynomial of degree 5
@@ -46,8 +46,14 @@ PATH_BASELINES = PathBaselineSettings()
 
 
 def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
-    """The baselines along the joint path of the best candidate, without those whose duration the
-    problem does not allow.
+    """Compute the baselines along the joint path of the best candidate.
+
+    Args:
+        state: state of the search.
+        best: the solved candidate of least energy.
+
+    Returns:
+        The baselines with an admissible duration.
     """
     prepared, problem, settings = state.prepared, state.problem, PATH_BASELINES
     path = prepared.followed.joint_path(best.q_start)
@@ -65,7 +71,7 @@ def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
 
     even = [motion(ramped.fraction(t, ramp)) for ramp in settings.ramps]
     motions: dict[BaselineName, SampledMotion] = {
-        # without the rounding of equal durations, of which the first has the shortest ramps
+        # rounded, so that among equal durations the first has the shortest ramps
         "even_speed": min(even, key=lambda each: round(each.duration, 9)),
         "quintic": motion(quintic.fraction(t)),
     }

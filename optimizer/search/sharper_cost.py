@@ -1,9 +1,9 @@
 """Motions of little net energy, solved again with sharper corners of the cost.
 
-The NLP smooths the corners of friction and of the power drawn. That shifts its cost by less than a
-thousandth of the energy that flows. Where a payload descends, gravity pays for nearly all of this:
-the shift is then some percent of the net energy, and solves of near durations end in optima that
-differ as much.
+The NLP smooths the corners of friction and of the power drawn. The smoothing shifts its cost by
+less than a thousandth of the energy flow. If a descending payload provides nearly all of this
+energy, the shift reaches some percent of the net energy, and solves with similar durations end in
+optima with differences of this size.
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ def sharpen_cost(
 ) -> None:
     """Improve a motion by solves with a sharper cost, if its cost is imprecise.
 
-    A motion of free duration is solved for fixed durations near its own, each of which is then
-    freed: the optimum may be in another valley of the duration.
+    A motion of free duration is solved for several fixed durations near its own, then again with a
+    free duration from these solutions: the optimum may be at another local minimum of the energy
+    over the duration.
 
     Args:
         state: state of the search.
@@ -81,7 +82,7 @@ def sharpen_cost(
 
 
 def _is_imprecise(state: SearchState, candidate: Candidate, settings: SharperCostSettings) -> bool:
-    """Whether the cost promised by the solve of a motion is far from the energy of the motion."""
+    """Whether the cost of the NLP differs much from the energy of the motion."""
     promised = None if candidate.attempt is None else candidate.attempt.promised_cost
     if promised is None:
         return False
@@ -92,7 +93,17 @@ def _is_imprecise(state: SearchState, candidate: Candidate, settings: SharperCos
 def _solved(
     state: SearchState, candidate: Candidate, interval: DurationInterval, start: Spline
 ) -> Spline | None:
-    """The motion solved from another one, which the candidate takes if it needs less energy."""
+    """Solve from a motion; the candidate takes the solution if it has less energy.
+
+    Args:
+        state: state of the search.
+        candidate: the candidate.
+        interval: admissible durations.
+        start: motion to begin with.
+
+    Returns:
+        The solution; None without one, or after the deadline.
+    """
     if state.deadline.passed:
         return None
     solver = solver_of(state, candidate, interval)

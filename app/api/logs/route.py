@@ -80,9 +80,9 @@ async def add(
     store: ServiceStore,
     client: ServiceClient,
 ) -> LogDetail:
-    """Adds a log of one arm, from which its friction, rotors and powers can be identified: a CSV
-    file, plain or packed with gzip. The columns are those of RTDE, of ROS `JointState`, of this
-    service, or what `columns` says."""
+    """Adds a log of one arm for the identification of its friction, rotors and powers: a CSV file,
+    plain or compressed with gzip. The columns follow RTDE, ROS `JointState`, this service, or the
+    names in `columns`."""
     declared = media_type(request.headers)
     if declared not in _TAKEN:
         raise UnsupportedMediaType
@@ -164,7 +164,7 @@ def _detail(log: StoredLog) -> LogDetail:
 
 
 def _packed(file: IO[bytes]) -> bytes:
-    """What was received, packed with gzip."""
+    """The received file, compressed with gzip."""
     file.seek(0)
     body = file.read()
     # the fastest level: a client waits

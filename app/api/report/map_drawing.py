@@ -59,14 +59,14 @@ REASONS = {
 
 
 def at_floor(place: Json) -> tuple[float, float]:
-    """Position on the floor [m]: of the first group that moves, or else of the base."""
+    """Position on the floor [m] of the first moved group, or else of the base."""
     moved = place["offsets"][0] if place["offsets"] else place["base"]
     x, y, _ = moved["position"]
     return x, y
 
 
 def columns_of(places: Sequence[Json]) -> list[Json]:
-    """Of the places above one another the best; without an energy, one that was left out."""
+    """The best place of every vertical column; without an energy, a place left out."""
     best = dict[tuple[float, float], Json]()
 
     def rank(place: Json) -> tuple[int, float]:
@@ -88,7 +88,7 @@ def drawn_map(places: Sequence[Json], best: Json, nominal: Json | None) -> str:
     Args:
         places: places of the map.
         best: best place.
-        nominal: nominal place; None where its cycles cannot be run.
+        nominal: nominal place; None if its cycles are infeasible.
     """
     columns = columns_of(places)
     points = [at_floor(each) for each in columns]
@@ -140,7 +140,7 @@ def _tiles(
 
 
 def _colour(energy: float, energies: Sequence[float]) -> str:
-    """The colour of an energy, between those of the least and the greatest."""
+    """The colour of an energy on the ramp from the least to the greatest energy."""
     least, most = min(energies), max(energies)
     share = (len(MAP.ramp) - 1) * ((energy - least) / (most - least) if most > least else 0.0)
     k = min(int(share), len(MAP.ramp) - 2)
@@ -177,7 +177,7 @@ def _ruler(left: float, y: float, wide: float, metres: float) -> Iterator[str]:
 
 
 class _Legend:
-    """What colours and marks mean, in rows from the height `y` [px] on."""
+    """Legend of colours and marks, in rows from the height `y` [px] on."""
 
     def __init__(self, y: float) -> None:
         self.x, self.y = MAP.left, y
@@ -185,7 +185,7 @@ class _Legend:
     def drawn(
         self, columns: Sequence[Json], energies: Sequence[float], named: Mapping[str, Json]
     ) -> Iterator[str]:
-        """The scale of energies, then the marks that are seen."""
+        """The scale of energies, then the marks present in the map."""
         if energies:
             yield from self._scale(min(energies), max(energies))
         failed = {each["reason"] for each in columns if each["energy"] is None}

@@ -1,4 +1,4 @@
-"""What `GET /robots` and `GET /robots/{name}` answer."""
+"""Responses of `GET /robots` and `GET /robots/{name}`."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FrictionLaw(Response):
 
 
 class Friction(Response):
-    """Joint friction: measurements, and the models fitted to them."""
+    """Joint friction: measurements and fitted models."""
 
     table: Parameters = part("Measured friction torques and their joint velocities.")
     laws: list[FrictionLaw] = part("Friction models, the default one first.")
@@ -90,7 +90,7 @@ class FormBody(Response):
 
 
 class RobotDetail(RobotSummary):
-    """The parameters of a robot, each with its source and trust letter."""
+    """The parameters of a robot, with their sources and trust letters."""
 
     trust: dict[str, str] = described(
         "Meaning of the trust letters.", None, {"A": "maker's own file or data packet"}

@@ -1,4 +1,4 @@
-"""Parameters and headers that several routes share."""
+"""Common parameters and headers of several routes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from joulepath.app.schemas.studies import IdempotencyKey
 
 
 class WithDeadline(Protocol):
-    """A request with a deadline [s] that has a default."""
+    """A request with an optional deadline [s]."""
 
     @property
     def deadline(self) -> float:
@@ -24,7 +24,7 @@ class WithDeadline(Protocol):
 
     @property
     def model_fields_set(self) -> set[str]:
-        """Fields that it gives."""
+        """Names of the given fields."""
 
 
 def deadline_of(body: WithDeadline, longest: float) -> float:
@@ -38,8 +38,20 @@ def deadline_of(body: WithDeadline, longest: float) -> float:
 def allowed_deadline(
     given: float | None, default: float, longest: float, where: str = "body"
 ) -> float:
-    """`given` [s], or if it is None, the default, but at most `longest`. Raises InvalidRequest
-    above it, with the part `where` of the request."""
+    """Apply the default and the limit of a deadline.
+
+    Args:
+        given: deadline of the request [s]; None for the default.
+        default: default deadline [s], reduced to `longest` if it is longer.
+        longest: longest admissible deadline [s].
+        where: part of the request, for the error.
+
+    Returns:
+        The deadline [s].
+
+    Raises:
+        InvalidRequest: `given` exceeds `longest`.
+    """
     if given is None:
         return min(default, longest)
     if given > longest:

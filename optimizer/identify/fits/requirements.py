@@ -22,11 +22,11 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 def check_logs(
     robot: Robot, rows: Rows, logs: Sequence[Log], options: IdentificationOptions
 ) -> None:
-    """Check that the logs contain the channels and motions of the requested figures.
+    """Check the channels and motions of the logs against the requested figures.
 
     Raises:
         EffortNotUsable: the efforts of a log exclude gravity.
-        InvalidProblem: the requested figures exclude each other or need other channels or links.
+        InvalidProblem: requested figures exclude one another or need other channels or links.
         PayloadUnknown: torque constants are requested, and the payload is not known.
         NoPowerChannel: power is requested, and no log has it.
         NotExcited: the logs have no motion, or neither torques nor power.
@@ -77,10 +77,10 @@ def check_logs(
 def check_identified(
     parameters: Sequence[IdentifiedParameter], logs: Sequence[Log], options: IdentificationOptions
 ) -> None:
-    """Check that at least one requested figure is identified.
+    """Check the result for at least one identified figure among the requested ones.
 
     Raises:
-        NotExcited: the logs identify none of them.
+        NotExcited: the logs identify no requested figure.
     """
     requested = [
         each
@@ -94,7 +94,7 @@ def check_identified(
 def not_excited(
     parameters: Sequence[str], logs: Sequence[Log], options: IdentificationOptions
 ) -> NotExcited:
-    """The error, with a request for an excitation that identifies the parameters.
+    """Build the error, with a request for an excitation to identify the parameters.
 
     Friction is always excited, and links if their torques are needed.
     """

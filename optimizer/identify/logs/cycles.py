@@ -1,4 +1,4 @@
-"""Cycles of a log that repeats one motion.
+"""Cycles of a log with a repeated motion.
 
 Rests, clocks and speed overrides change the duration of a cycle, but not its path. The path is
 therefore compared with itself over its own length: a log repeats with a period if its path, shifted
@@ -44,15 +44,18 @@ CYCLES = CycleSettings()
 
 
 def cycle_edges(q: Array, v: Array, rest: Mask, rate: float, segments: list[int]) -> Indices:
-    """Rows at which the cycles begin, and the row at which the last one ends; empty without cycles.
+    """Find the cycles of a log.
 
     Args:
         q: positions (n, nq) [rad].
         v: velocities (n, nq) [rad/s].
         rest: whether the arm rests (n,).
         rate: rate of the rows [Hz].
-        segments: rows at which a move or a rest begins, and the last row. Cycles begin at these
-            rows, if the arm rests between the cycles.
+        segments: first rows of moves and rests, and the last row. Cycles begin at these rows if
+            the arm rests between the cycles.
+
+    Returns:
+        First row of every cycle, and the end of the last cycle; empty without cycles.
     """
     speed = np.sqrt(np.einsum("ij,ij->i", v, v, dtype=float))
     moving = ~rest & (speed > CYCLES.least_speed * np.percentile(speed, 95))
@@ -78,7 +81,7 @@ def cycle_edges(q: Array, v: Array, rest: Mask, rate: float, segments: list[int]
 
 
 def _slack(period: int) -> int:
-    """Points by which a state may come earlier or later than a period after itself."""
+    """Tolerance of a recurrence in points, for a period in points."""
     return 2 + int(np.ceil(CYCLES.slack * period))
 
 
@@ -108,8 +111,16 @@ def _possible_periods(path: Array) -> Iterator[int]:
 
 
 def _repeating_part(path: Array, period: int) -> tuple[int, int] | None:
-    """First and last point of the part around the middle of the path that repeats with a period;
-    None if it is shorter than two periods or too small a share of the path."""
+    """Find the part around the middle of the path with a given period.
+
+    Args:
+        path: path, shape (n, nq) [rad].
+        period: period in points.
+
+    Returns:
+        First and last point; None if the part is shorter than two periods or too small a share of
+        the path.
+    """
     count, slack = len(path) - period, _slack(period)
     stride = max(1, count // CYCLES.compared_points)
     points = np.arange(0, count, stride)
@@ -131,8 +142,14 @@ def _repeating_part(path: Array, period: int) -> tuple[int, int] | None:
 
 
 def _recurrences(path: Array, anchor: int, period: int, last: int) -> list[int]:
-    """Points at which the path comes back to an anchor, each about a period after the previous
-    one."""
+    """Recurrences of the path at an anchor, about one period apart.
+
+    Args:
+        path: path, shape (n, nq) [rad].
+        anchor: point to return to.
+        period: period in points.
+        last: last point of the repeating part.
+    """
     found, slack = [anchor], _slack(period)
     while found[-1] + period <= last + slack:
         near = np.arange(found[-1] + period - slack, found[-1] + period + slack + 1)
@@ -148,14 +165,17 @@ def _recurrences(path: Array, anchor: int, period: int, last: int) -> list[int]:
 def _at_segments(
     edges: Indices, row: Indices, place: Array, rest: Mask, segments: Indices
 ) -> Indices:
-    """Rows of the edges: of the motion that begins there, or else of the rest, or else themselves.
+    """Move the edges of cycles to the starts of motions or else of rests close to them.
 
     Args:
         edges: points of the path.
-        row: row of each point.
-        place: place of each row (n,) on the path, in points.
+        row: rows of the points.
+        place: position of the rows (n,) on the path, in points.
         rest: whether the arm rests (n,).
-        segments: rows at which a move or a rest begins, and the last row.
+        segments: first rows of moves and rests, and the last row.
+
+    Returns:
+        Rows of the edges, ascending and distinct.
     """
     found, slack = list[int](), CYCLES.position_tolerance / CYCLES.spacing
     for edge in edges.tolist():

@@ -33,7 +33,7 @@ def figures_of(
     parameters: Sequence[IdentifiedParameter],
     logs: tuple[str, ...],
 ) -> IdentifiedFigures:
-    """Figures of a fit, without those that stay the robot's own for all joints.
+    """Build the figures of a fit, without figures unchanged from the robot's own for all joints.
 
     Args:
         robot: the robot with its own figures.
@@ -85,8 +85,10 @@ def _told_rows(
     parameters: Sequence[IdentifiedParameter],
     values: Mapping[str, Array],
 ) -> dict[Name, Array]:
-    """Rows from the covariance of the fit to that of its figures, without those that stay the
-    robot's own. Figures that the logs determine only together with others are among them, too.
+    """Rows of the map from the errors of the estimate to the errors of the figures.
+
+    Figures kept at the robot's own values have no row. Figures determined only in combination with
+    others do have one.
     """
     kept = {
         (each.figure, each.joint)
@@ -145,13 +147,13 @@ def _powers(robot: Robot, arm: FittedArm) -> dict[str, Array]:
 
 
 def _identified(nq: int, name: str, told: AbstractSet[Name], replaced: Mask | bool) -> Mask:
-    """Whether the logs identify a figure of each joint (nq,), or of the whole arm ().
+    """Whether the logs identify a figure, by joint (nq,) or for the whole arm ().
 
     Args:
         nq: number of joints.
         name: name of the figure.
         told: names of the identified parameters.
-        replaced: whether the figure was no part of the fitted law, and so is 0 with it.
+        replaced: whether the fitted friction law lacks the figure and thus replaces it by 0.
     """
     if name == "idle_power":
         return np.array((name, None) in told)
@@ -164,7 +166,7 @@ def _identified(nq: int, name: str, told: AbstractSet[Name], replaced: Mask | bo
 
 
 def _covariance_rows(robot: Robot, fitted: FitResult) -> Iterator[tuple[Name, Array]]:
-    """Names of the figures, each with its row (p,) of derivatives by the estimate (p,)."""
+    """Names of the figures, with their derivatives by the estimate, shape (p,)."""
     names = fitted.estimate.names
     for name, row in zip(names, np.eye(len(names)), strict=True):
         if name[0] != LINK_MASS_SCALE:

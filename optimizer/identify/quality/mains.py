@@ -1,10 +1,10 @@
-"""What the control box draws from the mains, from readings of a wattmeter in its cable.
+"""Power of the control box from the mains, by readings of a wattmeter in its cable.
 
     mains = factor · bus + constant [W]
 
-`factor` is that of the power supply, `constant` the power of computer, teach pendant and fans. The
-mean power that the meter shows during a log is one equation. Readings at rest and in motion
-determine both figures; a single reading leaves the factor to its range before any reading.
+`factor` describes the loss of the power supply, `constant` the power of computer, teach pendant and
+fans. The mean reading during a log gives one equation. Readings at rest and in motion determine
+both figures; with a single reading, the factor keeps its prior.
 """
 
 from __future__ import annotations
@@ -73,15 +73,18 @@ class IdentifiedMains:
 def fit_mains(
     energies: AnsweredEnergies, rows: Rows, readings: Sequence[float | None]
 ) -> IdentifiedMains | None:
-    """Figures of the control box; None without a reading.
+    """Fit the figures of the control box by weighted least squares with a prior on the factor.
 
     Args:
-        energies: energies of the fitted arm, which count where no power was logged.
+        energies: energies of the fitted arm, used for logs without power.
         rows: rows of all logs.
-        readings: mean power [W] of the meter during each log; None for a log without a reading.
+        readings: mean power of the meter by log [W]; None for a log without a reading.
+
+    Returns:
+        The figures; None without a reading.
 
     Raises:
-        InvalidProblem: a reading is below the power that the arm drew from its bus.
+        InvalidProblem: a reading is below the power drawn from the bus.
     """
     if not any(readings):
         return None

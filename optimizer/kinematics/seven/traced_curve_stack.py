@@ -41,16 +41,18 @@ Rows = NDArray[np.intp]
 class TracedCurveStack:
     """Traced curves of one pose, one after the other.
 
-    `nodes` (n, nq) [rad] are points along the curves, `tangents` (n, nq) the unit tangents there.
-    `first` (m,) is the row of the first point of each curve. `half` (m,) is half the range of its
-    parameter, which is proportional to the arc length: π for a closed curve, `open_half` for an
-    open one, 0 for a single point.
+    The parameter of a curve is proportional to its arc length.
     """
 
     nodes: Array
+    """Points along the curves, shape (n, nq) [rad]."""
     tangents: Array
+    """Unit tangents at the points, shape (n, nq)."""
     first: Rows
+    """Row of the first point by curve, shape (m,)."""
     half: Array
+    """Half the range of the parameter by curve, shape (m,): π for a closed curve, `open_half` for
+    an open curve, 0 for a single point."""
 
     @classmethod
     def of(cls, paths: Sequence[TracedPath]) -> TracedCurveStack:
@@ -66,13 +68,13 @@ class TracedCurveStack:
 
     @cached_property
     def last(self) -> Rows:
-        """Row (m,) of the last point of each curve."""
+        """Row of the last point by curve, shape (m,)."""
         return np.append(self.first[1:], len(self.nodes)) - 1
 
     @cached_property
     def segment_lengths(self) -> Array:
-        """Lengths (n,) [rad] of the segments from each point to the next of its curve; 0 at the
-        last point.
+        """Lengths of the segments from the points to their successors, shape (n,) [rad]; 0 at the
+        last point of a curve.
         """
         lengths = np.zeros(len(self.nodes))
         lengths[:-1] = np.linalg.norm(self.nodes[1:] - self.nodes[:-1], axis=1)
@@ -96,11 +98,14 @@ class TracedCurveStack:
         return np.asarray(scale * along - np.repeat(self.half, counts))
 
     def locate(self, u: Array, curves: Rows) -> tuple[Rows, Array]:
-        """Segments at parameters u (n,) of the curves in rows (n,).
+        """Find the segments at given parameters.
+
+        Args:
+            u: parameters, shape (n,).
+            curves: numbers of the curves, shape (n,).
 
         Returns:
-            The rows (n,) of the points that begin the segments, and the shares (n,) of the
-            segments.
+            Rows of the first points of the segments, and shares of the segments, both (n,).
         """
         wide = 4 * SETTINGS.open_half
         turn = 2 * np.pi * np.round(u / (2 * np.pi))
@@ -121,7 +126,7 @@ class TracedCurveStack:
         return np.asarray(k + (self.segment_lengths[k] > 0))
 
     def at(self, k: Rows, share: Array) -> Array:
-        """Points (n, nq) [rad] at shares (n,) of the segments that begin at points k (n,)."""
+        """Points (n, nq) [rad] at shares (n,) of the segments with first points k (n,)."""
         after, length = self._after(k), self.segment_lengths[k][:, None]
         return hermite(
             share,
@@ -132,10 +137,10 @@ class TracedCurveStack:
         )
 
     def at_each(self, k: Rows, weights: Array, joints: Rows) -> Array:
-        """Angles (n, m, j) [rad] of joints (j,) at m shares of each segment.
+        """Angles (n, m, j) [rad] of joints (j,) at m common shares of the segments.
 
         Args:
-            k: points that begin the segments, shape (n,).
+            k: first points of the segments, shape (n,).
             weights: `hermite_weights` of the shares, shape (4, m).
             joints: indices of the joints, shape (j,).
         """
@@ -146,16 +151,23 @@ class TracedCurveStack:
         return np.asarray(weights.T @ ends[:, :, joints])
 
     def along(self, k: Rows, share: Array) -> Array:
-        """Approximate directions (n, nq) of the curves there, across which members are sought."""
+        """Approximate directions of the curves at shares of segments, shape (n, nq)."""
         before = self.tangents[k]
         return before + share[:, None] * (self.tangents[self._after(k)] - before)
 
     def shares_across(self, k: Rows, share: Array, q: Array) -> Array:
-        """Shares (n,) at which configurations q (n, nq) [rad] are across from the curves, next to
-        given shares.
+        """Project configurations on the curves, near given shares.
 
-        A configuration is across from a point if their difference is perpendicular to the direction
-        `along` there. Shares of segments of length zero do not change.
+        At the projection, the difference between the configuration and the point of the curve is
+        perpendicular to the direction `along`. Shares of segments of length zero do not change.
+
+        Args:
+            k: first points of the segments, shape (n,).
+            share: shares of the segments to begin with, shape (n,).
+            q: configurations, shape (n, nq) [rad].
+
+        Returns:
+            Shares of the projections, shape (n,).
         """
         length = self.segment_lengths[k]
         moving, scale = length > 0, np.maximum(length, SETTINGS.least_length)
@@ -168,16 +180,16 @@ class TracedCurveStack:
         return share
 
     def order_and_neighbours(self) -> tuple[Array, Mask]:
-        """Numbers that order the curves, and the curves near the first point of each.
+        """Order the curves, and find the curves near their first points.
 
-        The number is the mean of a sum of sines along the curve. It depends neither on full turns
-        nor on the starting point of a closed curve.
+        The key of the order is the mean of a sum of sines along a curve. It is invariant under full
+        turns and under the choice of the first point of a closed curve.
 
         Returns:
-            The numbers (m,), and a mask (m, m) of the curves that may pass the first point of each
-            curve.
+            Keys (m,), and a mask (m, m): entry (i, j) is true if curve j may pass the first point
+            of curve i.
         """
-        # One phase per joint, so that mirrored curves differ.
+        # a phase per joint distinguishes mirrored curves
         m, nq = self.nodes.shape
         phases, cosines_and_sines = self.nodes + np.arange(1.0, nq + 1), np.empty((m, 2 * nq))
         c = np.cos(phases, out=cosines_and_sines[:, :nq])

@@ -123,8 +123,10 @@ async def _step(
     engine: ArmEngine,
     settings: ServiceSettings,
 ) -> StudyStep:
-    """The request with the study's robot, figures and objective. Raises InvalidProblem if it names
-    others.
+    """Complete the request by the robot, figures and objective of the study.
+
+    Raises:
+        InvalidProblem: the request names another robot, other figures or another objective.
     """
     if not isinstance(body, HeldBody):
         return study_step(body, study.robot, study.figures, study.objective)
@@ -133,8 +135,11 @@ async def _step(
 
 
 async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
-    """What `work` returns. Raises what it raises; errors about a field with its path in this
-    request.
+    """Await `work`, and prefix the fields in its errors with their path in this request.
+
+    Args:
+        kind: name of the inner request, `optimize` or `evaluate`.
+        work: the work on the inner request.
     """
     try:
         return await work
@@ -151,9 +156,7 @@ async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
 async def _made(
     step: StudyStep, request_id: str, engine: ArmEngine, max_deadline: float, cache: AnswerCache
 ) -> studies.Step:
-    """The iteration, with the answer of the endpoint that the request is for, or to an equal
-    request.
-    """
+    """Compute the iteration by its endpoint, or copy the stored answer of an equal request."""
     if step.optimize is None:
         with upload() as (file, path):
             file.write(step.evaluate)
@@ -187,7 +190,7 @@ async def show(
 
 
 def _iteration(step: StudyStep, result: TaskResult, asked: Asked | None = None) -> studies.Step:
-    """The iteration with this answer, which answers what was `asked`, too."""
+    """The iteration with a computed answer; `asked` is the key for later equal requests."""
     result = result if result.kept_as is not None else result.kept()
     assert result.kept_as is not None
     answer = orjson.loads(result.document)

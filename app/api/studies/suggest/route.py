@@ -55,9 +55,9 @@ async def suggest(
     engine: ServiceArmEngine,
     store: ServiceStore,
 ) -> Response:
-    """Suggestions for the next iteration: each differs from the best iteration (or the last) in one
-    respect. The optimiser computes every suggestion. They are in order of the energy that they
-    save, each with its body for `POST /studies/{id}/iterations`."""
+    """Suggestions for the next iteration: changes of the best iteration (or the last) in one
+    respect. The optimiser computes every suggestion. They are in order of the saved energy, with
+    their bodies for `POST /studies/{id}/iterations`."""
     deadline = allowed_deadline(
         query.deadline, SuggestQuery.DEFAULT_DEADLINE, settings.max_deadline, "query"
     )
@@ -113,7 +113,7 @@ class _Computing:
     end: float
 
     async def outcomes(self, found: list[Proposal], objective: str) -> list[Outcome]:
-        """The outcome of each proposal. Raises ShuttingDown."""
+        """Compute the outcomes of all proposals. Raises ShuttingDown."""
         try:
             async with asyncio.TaskGroup() as group:
                 running = [
