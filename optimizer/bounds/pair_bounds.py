@@ -17,14 +17,14 @@ GRID_JOINTS = 2
 
 @dataclass(frozen=True)
 class Effort:
-    """How finely a pair is bounded."""
+    """Effort on the dual bound of a pair."""
 
     steps: int
     """Number of steps of the path."""
     cell_ratio: float
     """Ratio of the longest to the shortest duration of a cell."""
     cells_per_group: int
-    """Number of cells of durations that share their boxes."""
+    """Number of cells of durations per group; a group has common boxes."""
     spacing: Spacing
     """Spacing of the grid around the path."""
     loaded_joints: tuple[int, ...]
@@ -32,10 +32,10 @@ class Effort:
     weight_rounds: int
     """Number of rounds of the search for weights."""
     time: float
-    """Longest time [s] for a group of an arm with six joints on an idle machine."""
+    """Longest time for a group of cells of an arm with six joints on an idle machine [s]."""
 
     def time_for(self, joints: int) -> float:
-        """Least remaining time [s] to begin the bounds of a group of pairs.
+        """Least remaining time before the deadline to begin a group of cells [s].
 
         It grows with joints⁵, the number of bounds on third derivatives of the inertia.
         """

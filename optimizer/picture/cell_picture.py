@@ -36,12 +36,12 @@ class _Drawn:
 def cell_picture(program: Program, settings: PictureSettings | None = None) -> str:
     """Draw the arm at the start and at the first stop, its cell, and the way of its TCP.
 
-    The bodies are those of the collision model, so that the picture shows what was checked. The way
-    is drawn in full where the arm carries something, and dashed where it does not. Stops have
-    numbers, filled where a part is taken up.
+    The bodies are taken from the collision model, so the picture shows the checked geometry. The
+    way is solid with a payload and dashed without. Stops have numbers; the discs of pick-ups are
+    filled.
 
     Args:
-        program: moves and rests, as exports take them.
+        program: moves and rests, as for exports.
         settings: size, view and colours.
 
     Returns:
@@ -87,7 +87,7 @@ def cell_picture(program: Program, settings: PictureSettings | None = None) -> s
 
 
 def _shown(program: Program) -> Move:
-    """The move at whose end the arm is drawn: the first that ends with something in hand."""
+    """The move with the drawn end: the first one with a payload, or else the first move."""
     loaded = (move for move in program.moves if move.arm.payload.mass > 0)
     return next(loaded, program.moves[0])
 
@@ -128,7 +128,7 @@ def _has_ground(arm: Arm) -> bool:
 
 
 def _best_view(way: Array, asked: PictureSettings) -> View:
-    """The view in which the way covers the largest area."""
+    """The view with the largest projected area of the way."""
     turns = np.linspace(0.0, 2 * np.pi, asked.directions, endpoint=False) + 0.3
     views = [View.at(turn, asked.elevation) for turn in turns]
     return max(views, key=lambda view: float(np.prod(np.ptp(way @ view.axes.T, axis=0) + 1e-6)))
@@ -188,7 +188,7 @@ def _line(view: View, way: Array, loaded: bool, asked: PictureSettings) -> str:
 
 
 def _marks(view: View, program: Program, asked: PictureSettings) -> Iterator[str]:
-    """The start, and the numbers of the stops at which the arm rests, or the goal of one move."""
+    """Marks of the start and of the numbered stops with a rest, or of the goal of a single move."""
     at = tcp_pose(program.moves[0].arm, program.start)[:3, 3]
     yield _label(view.flat(at[None])[0], "Start", asked)
     if len(program.moves) == 1:

@@ -59,16 +59,16 @@ REASONS: tuple[tuple[type[JoulepathError], Reason], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """What was found at a place.
+    """Result of the search at a place.
 
     Attributes:
         place: the place.
         energy: objective of all cycles times their weights [J]; None without certified cycles.
-        solutions: the cycles; empty without them.
-        reason: why there are none; None if there are some, or if there was no time to look.
+        solutions: the certified cycles; may be empty.
+        reason: why there are no cycles; None with cycles, or if there was no time to search.
         error: the error of the first cycle without a solution.
-        bound: lower bound of the objective at this place [J], where one is known.
-        visited: configurations of the cycles; empty without them.
+        bound: lower bound of the objective at this place [J]; None if unknown.
+        visited: configurations of the cycles; empty without cycles.
     """
 
     place: Place
@@ -81,7 +81,7 @@ class Round:
 
     @property
     def summary(self) -> Round:
-        """The round without its solutions and its error, which take memory."""
+        """The round without its solutions and its error, to save memory."""
         return replace(self, solutions=(), error=None)
 
     @property
@@ -91,7 +91,7 @@ class Round:
 
 
 def reason_of(error: JoulepathError) -> Reason | None:
-    """Why there is no cycle; None for an error that has nothing to do with the place."""
+    """Why there is no cycle; None for an error independent of the place."""
     if isinstance(error, PathInfeasible) and any(
         each.reason == "in_collision" for each in error.attempts
     ):
@@ -104,7 +104,7 @@ class Rounds:
 
     Args:
         space: the places.
-        clock: function that returns the time [s].
+        clock: returns the current time [s].
     """
 
     def __init__(self, space: Space, clock: Clock) -> None:
@@ -120,7 +120,7 @@ class Rounds:
             end: deadline.
 
         Returns:
-            A round with a reason, or with a bound alone. The bound is None where none is known for
+            A round with a reason, or with a bound alone. The bound is None if none is known for
             all configurations.
         """
         total: float | None = 0.0
@@ -135,7 +135,7 @@ class Rounds:
         return Round(place, bound=total)
 
     def _bound(self, cycle: Cycle) -> float | None:
-        """Lower bound [J] of a cycle at its place; None where it costs as much as the cycle."""
+        """Lower bound [J] of a cycle at its place; None if it takes as long as the cycle itself."""
         if (
             cycle.order is not None
             or cycle.has_passes
@@ -164,11 +164,11 @@ class Rounds:
 
         Args:
             place: the place.
-            end: deadline; what is certified until then counts.
-            known: memo of motions, which gets those found.
+            end: deadline; motions certified before it count.
+            known: memo of motions; new motions are added.
             compared: whether to search in full, and for baselines; else the configurations are
                 only likely the best.
-            cycles: the cycles to be solved; None for those of the place.
+            cycles: the cycles to solve; None for the cycles of the place.
 
         Returns:
             The round; without energy and reason if there was no time for all cycles.
@@ -221,7 +221,7 @@ class Rounds:
         and is greater by 0.5 to 1.5 %, nearly the same at neighbouring places.
 
         Args:
-            cycles: the cycles, for which `can_estimate` holds.
+            cycles: the cycles, all with `can_estimate`.
             end: deadline.
 
         Returns:
@@ -246,7 +246,7 @@ class Rounds:
         return energy
 
     def nearby(self, place: Place, near: Sequence[Visited]) -> list[Cycle] | None:
-        """The cycles at a place through configurations near those of another place.
+        """The cycles at a place through configurations near the ones of another place.
 
         Args:
             place: the place.

@@ -1,9 +1,10 @@
-"""Baselines along a planned path, where the usual ones collide or break other limits.
+"""Baselines along a planned path, for problems with collisions of the usual baselines.
 
-- `waypoints`: from waypoint to waypoint of a planned path, straight in joints, with a rest at each
-- `blended`: along the same path without a rest, its corners rounded
+- `waypoints`: straight in joint space between the waypoints of a planned path, with a rest at every
+  waypoint
+- `blended`: along the same path without rests, with rounded corners
 
-A plain program of a robot takes either way around an obstacle. Both are as fast as speed,
+Simple robot programs avoid an obstacle in these two ways. Both baselines are as fast as speed,
 acceleration and jerk of the joints and the speeds of TCP and elbow allow, but not faster than our
 motion.
 """
@@ -64,15 +65,18 @@ WAYPOINTS = WaypointSettings()
 def waypoint_baselines(
     state: SearchState, best: Candidate, table: Sequence[Baseline]
 ) -> list[Baseline]:
-    """The baselines along a planned path, if they are sought and too few others keep every limit.
+    """Compute the baselines along a planned path, if too few other baselines keep every limit.
 
-    Those whose duration the problem does not allow are left out, and so is `waypoints` without a
-    waypoint between the ends, which is `straight`.
+    Baselines with an inadmissible duration are left out. So is `waypoints` without an intermediate
+    waypoint, because it equals `straight`.
 
     Args:
         state: state of the search.
-        best: solved candidate, between whose ends the path is planned.
+        best: solved candidate; the path connects its ends.
         table: its other baselines.
+
+    Returns:
+        The baselines; empty if none are requested, or after the deadline.
     """
     held = {each.name for each in table if each.within_limits}
     through = state.problem.tool_path is not None or state.problem.passes
@@ -91,7 +95,7 @@ def waypoint_baselines(
 
 
 def _is_among(each: Baseline, table: Sequence[Baseline]) -> bool:
-    """Whether a baseline is another one by another name."""
+    """Whether a table has the same baseline by another name."""
     own = each.duration, each.electrical
     others = np.array([(other.duration, other.electrical) for other in table]).reshape(-1, 2)
     return bool(np.isclose(others, own, rtol=WAYPOINTS.same, atol=0.0).all(axis=1).any())
@@ -105,17 +109,18 @@ def along_waypoints(
     ours: float,
     deadline: Deadline,
 ) -> list[Baseline]:
-    """The baselines along a planned path between two configurations.
-
-    There are none without a path, and none of an arm that stands still.
+    """Compute the baselines along a planned path between two configurations.
 
     Args:
         prepared: the problem.
         q_start: start, shape (nq,) [rad].
         q_goal: goal, shape (nq,) [rad].
-        least: duration of our motion, below which theirs are slowed down [s].
+        least: duration of our motion [s]; faster baselines are slowed down to it.
         ours: objective of our motion [J].
-        deadline: time at which the planning ends at the latest.
+        deadline: end of the planning at the latest.
+
+    Returns:
+        The baselines; empty without a planned path, or without a displacement.
 
     Raises:
         DeadlinePassed: the watched deadline passed.
@@ -150,7 +155,7 @@ def along_waypoints(
 
 
 def in_a_row(legs: Sequence[SampledMotion]) -> SampledMotion:
-    """One motion of several in a row; each begins at the end of the motion before."""
+    """Join motions in a row; every motion begins at the end of the one before."""
     begins = np.cumsum([0.0, *(leg.duration for leg in legs)])
     joined = {
         name: np.concatenate([getattr(leg, name) for leg in legs])
@@ -165,10 +170,10 @@ def in_a_row(legs: Sequence[SampledMotion]) -> SampledMotion:
 
 
 def without_rest(points: Array, rates: Array) -> Spline:
-    """A motion from rest to rest along control points, fast in every knot span.
+    """Time a motion from rest to rest along control points, fast in every knot span.
 
-    Each span is stretched or shortened until some rate within it is at its limit. The curve stays
-    within the convex hulls of successive control points, whatever its knots are.
+    The knot spans are stretched or shortened until a rate reaches its limit in every span. The
+    curve stays within the convex hulls of successive control points for any knots.
 
     Args:
         points: control points, shape (n, nq) [rad].

@@ -44,8 +44,8 @@ class TableLengths:
 def drawn_lengths(axes: JointAxes) -> TableLengths | None:
     """Lengths of the table for the axes of an arm; None for an arm of another form.
 
-    The sense of each axis is chosen so that the first points upwards and d4, d5 and d6 are not
-    negative; the zero positions so that a2 and a3 are negative.
+    The senses of the axes are chosen such that the first axis points upwards and d4, d5 and d6 are
+    not negative, and the zero positions such that a2 and a3 are negative.
     """
     z, p = axes.directions, axes.points
     if not _is_of_form(z):
@@ -99,7 +99,7 @@ def drawn_lengths(axes: JointAxes) -> TableLengths | None:
 
 
 def _is_of_form(z: Array) -> bool:
-    """Whether directions (6, 3) of axes are parallel and at right angles as those of the table."""
+    """Whether directions (6, 3) of axes are parallel and perpendicular as in the table."""
     right = max(abs(z[i] @ z[i + 1]) for i in (0, 3, 4))
     parallel = max(float(np.linalg.norm(np.cross(z[1], z[k]))) for k in (2, 3))
     return bool(max(right, parallel) < RIGHT_ANGLE)

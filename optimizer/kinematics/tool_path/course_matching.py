@@ -1,11 +1,10 @@
-"""Comparison of a motion with a course: the course point for each point of the motion, in the order
-of both.
+"""Comparison of a motion with a course: order-preserving match of their points.
 
-Each point of the motion is matched with the course point of least deviation, including the part of
-the course omitted since the previous match: so each match depends on the one before. All points are
-matched at once, from a guess of their predecessors, and again from the result until nothing
-changes. A fixed point equals the matching point by point, by induction: the first match depends on
-nothing, and every other one on a match that did not change.
+A point of the motion is matched with the course point of least deviation. The deviation includes
+the part of the course omitted since the previous match, so a match depends on its predecessor. All
+points are matched at once from a guess of their predecessors, and again from the result until it no
+longer changes. By induction, a fixed point equals the sequential matching: the first match depends
+on no other match, and every other match depends on an unchanged one.
 """
 
 from __future__ import annotations
@@ -64,8 +63,8 @@ class _Places:
 
 
 class _Course:
-    """Course through points (m, d), whose distances are lengths [m]; `reach` [m] is the length of
-    the tolerances.
+    """Course through points (m, d) with distances in metres; `reach` is the length of the
+    tolerances [m].
     """
 
     def __init__(self, known: Array, reach: float) -> None:
@@ -75,8 +74,13 @@ class _Course:
         self.lengths = np.concatenate([[0.0], np.cumsum(np.sqrt(self.squares))])
 
     def guess(self, moved: Array) -> _Places:
-        """Places (k,) proportional to the length of a motion, which moves by `moved` (k,) [m] up to
-        each of its points.
+        """Guess the places in proportion to the length of a motion.
+
+        Args:
+            moved: lengths of the motion between successive points, shape (k,) [m].
+
+        Returns:
+            Places on the course, shape (k,).
         """
         distance = np.cumsum(moved)
         length = distance * (self.lengths[-1] / max(distance[-1], SETTINGS.least_square))

@@ -1,7 +1,7 @@
-"""Energy of holding the arm at a goal that is a decision variable of an NLP.
+"""Energy of holding the arm at the goal, with the goal as a decision variable of an NLP.
 
-The arm waits at the goal until its dwell ends. The motors hold it for a time that is linear in the
-duration of the motion. The constant and the weight of time of the NLP count the energy at the given
+The arm waits at the goal until the end of its dwell. The holding time of the motors is linear in
+the duration of the motion. The constant and the time weight of the NLP contain the energy at the given
 goal; this module adds the difference at another goal.
 """
 
@@ -17,7 +17,7 @@ from joulepath.models.robot import Array
 
 @dataclass(frozen=True)
 class GoalHolding:
-    """Energy of holding, relative to that at the given goal."""
+    """Energy of holding, relative to the energy at the given goal."""
 
     power: Callable[[Array], Array]
     """Holding powers (n,) [W] of configurations (n, nq) [rad]."""
@@ -36,7 +36,15 @@ class GoalHolding:
     [rad]."""
 
     def value(self, q: Array, T: float) -> float:
-        """Energy [J] at a goal q (nq,) [rad], relative to that at the given goal."""
+        """Energy of holding at a goal, relative to the given goal.
+
+        Args:
+            q: goal, shape (nq,) [rad].
+            T: duration of the motion [s].
+
+        Returns:
+            The difference [J].
+        """
         return self._wait(T) * (float(self.power(q[None])[0]) - self.given)
 
     def derivatives(self, q: Array, T: float) -> tuple[float, Array, Array]:
