@@ -59,9 +59,9 @@ class StepsDone:
     """Steps of a computation without a search.
 
     Attributes:
-        done: number of steps that are done; for a motion in time, its part that is done [s].
+        done: number of completed steps; for a simulated motion, the completed time [s].
         total: number of all steps; None if unknown.
-        name: what a step is, in the plural.
+        name: name of the steps, in the plural.
     """
 
     done: float
@@ -80,10 +80,10 @@ def no_listener(event: Told) -> None:
 
 
 class Steps:
-    """Counts the steps of a computation, and tells of each.
+    """Counts the steps of a computation, and reports every step.
 
     Args:
-        name: what a step is, in the plural.
+        name: name of the steps, in the plural.
         total: number of all steps; None if unknown.
         tell: listener.
     """
@@ -99,7 +99,7 @@ class Steps:
         self._tell(StepsDone(self._done, self._total, self._name))
 
     def each(self, items: Iterable[T]) -> Iterator[T]:
-        """Yield items, each of which is a step; it is done when the next one is asked for."""
+        """Yield items as steps. A step is complete when the next item is requested."""
         for item in items:
             yield item
             self.add()
@@ -135,14 +135,14 @@ class NewsFilter:
 
 
 def only_news(tell: Tell) -> Tell:
-    """Listener that passes on to `tell` only events with news."""
+    """Listener to pass on only events with news to `tell`."""
     return tell if tell is no_listener else NewsFilter(tell)
 
 
 def only_improved(tell: Tell) -> Tell:
-    """Listener that passes on to `tell` only the best answers, without bounds.
+    """Listener to pass on only the best answers to `tell`, without bounds.
 
-    For a search whose bound does not hold for all answers.
+    Used for a search with a bound on a part of the answers only.
     """
 
     def passed(event: Event) -> None:

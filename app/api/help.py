@@ -1,4 +1,4 @@
-"""GET /help: the pages of `docs/` as a site, which `scripts/build_docs.py` builds."""
+"""GET /help: the pages of `docs/` as a site, built by `scripts/build_docs.py`."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ async def root() -> RedirectResponse:
 
 @router.get("/help/{path:path}")
 async def page(request: Request, path: str) -> Response:
-    """A page, whose path ends with a slash, or a file of the site.
+    """A page, with a slash at the end of its path, or a file of the site.
 
-    The path of a page without the slash leads to the page: the links of a page are relative to its
-    folder. The target is the last part of the path only, so that it names no other host.
+    The path of a page without the slash redirects to the page, because the links of a page are
+    relative to its folder. The target of the redirect is only the last part of the path and cannot
+    name another host.
     """
     if path.endswith("/") or not path:
         return answer(request, FOLDER, f"{path}{INDEX}")

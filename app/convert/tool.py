@@ -1,4 +1,4 @@
-"""From the tool in a request, given by its name or its shape, to that of the library."""
+"""Conversion of the tool of a request, given by name or by shape, to the library's tool."""
 
 from __future__ import annotations
 
@@ -27,10 +27,17 @@ def to_tool(tool: str | asked.Tool) -> tuple[Attachment, ...]:
 
 
 def to_tcp(tcp: Pose | None, tool: str | asked.Tool | None = None) -> Array:
-    """Pose (4, 4) of the TCP in the flange frame: the given one, that of a tool with a name, or the
-    flange.
+    """Pose of the TCP in the flange frame.
 
-    Raises UnknownTool.
+    Args:
+        tcp: the given pose; None for the pose of a named tool, or else of the flange.
+        tool: name or shape of the tool.
+
+    Returns:
+        The pose, shape (4, 4).
+
+    Raises:
+        UnknownTool: no tool has this name.
     """
     if tcp is not None:
         return to_matrix(tcp)
@@ -38,7 +45,7 @@ def to_tcp(tcp: Pose | None, tool: str | asked.Tool | None = None) -> Array:
 
 
 def with_tool(tool: str | asked.Tool, part: Payload) -> Payload:
-    """What the flange carries: the part, and the mass of a tool with a name. Raises UnknownTool."""
+    """Payload of the flange: the part and the body of a named tool. Raises UnknownTool."""
     if not isinstance(tool, str):
         return part
     named, share = load_tool(tool), _SHARE.get()

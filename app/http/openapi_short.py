@@ -1,6 +1,6 @@
-"""The short OpenAPI document, which the page `/docs` opens: what a person reads of an operation.
+"""The short OpenAPI document of the page `/docs`: the readable part of every operation.
 
-Each operation has its first two examples, its fields as a table, an answer, and one line with its
+An operation has its first two examples, its fields as a table, an answer, and one line with its
 problems. The version is OpenAPI 3.0, because Swagger UI takes four times as long for a document of
 3.1.
 """
@@ -103,7 +103,7 @@ def _responses(responses: Json, schemas: Json) -> Json:
 
 
 def _content(content: Json, schemas: Json) -> Json:
-    """A body: its fields as a table, and its examples as a person writes them."""
+    """A body: its fields as a table, and its examples."""
     schema = content.get("schema", {})
     name = schema.get("$ref", "").rpartition("/")[2]
     if name not in schemas:

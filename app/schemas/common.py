@@ -1,4 +1,4 @@
-"""Base models, field helpers, vectors and poses that several schemas share."""
+"""Common base models, field helpers, vectors and poses of the schemas."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def described(description: str, unit: str | None, example: Any, **constraints: A
 
 
 def part(description: str) -> Any:
-    """A field of an answer whose value is a model, or a list or dict of models: their fields have
-    the examples.
+    """A field of an answer with a model, or a list or dict of models, as its value; the examples
+    are in the fields of the models.
     """
     return Field(description=description)
 
@@ -63,8 +63,7 @@ class Request(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_fields(cls, data: Any) -> Any:
-        # before `extra="forbid"`, whose error repeats the unknown name: no answer echoes the
-        # caller's input
+        # before `extra="forbid"`: its error would echo the unknown name from the caller's input
         fields = [field.alias or name for name, field in cls.model_fields.items()]
         if isinstance(data, dict) and not data.keys() <= set(fields):
             # a body can have thousands, each of which would take time

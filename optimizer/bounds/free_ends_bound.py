@@ -1,12 +1,12 @@
-"""Lower bound on motions between two poses of which the start, or both, are free about an axis.
+"""Lower bound on motions between two poses with a free rotation of the start, or of both ends.
 
 The bound of a motion rises with the displacement of its joints and with its gain of potential
 energy; it does not depend on the direction. So a motion from a free start has the bound of its
 reverse under inverted gravity, a motion to a free goal (`free_goal_bound`).
 
-If both ends are free, the boxes of joint positions of each end are halved until a pair of boxes,
-one of each end, has a useful bound. Then pairs of least bound are halved, at the end whose box
-moves the TCP more.
+If both ends are free, the boxes of joint positions at both ends are halved until a pair of boxes
+has a useful bound. Then the pairs of least bound are halved, at the end with the larger motion of
+the TCP over its box.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ def bound_between_free_ends(
         prepared: problem of the motions.
         start: pose at the start.
         goal: pose at the goal.
-        deadline: deadline of the search, which then returns its bound so far.
-        enough: sufficient bound, at which the search ends [J].
+        deadline: end of the search at the latest; the bound so far is returned.
+        enough: sufficient bound; the search ends there [J].
     """
     arm = prepared.arm
     problem = prepared.problem
@@ -93,13 +93,13 @@ def bound_between_boxes(
     boxes: Sequence[EndBoxes],
     limits: SearchLimits,
 ) -> float:
-    """Lower bound on motions from the configurations of one family to those of another [J].
+    """Lower bound on motions from the configurations of one family to another family [J].
 
     Args:
         prepared: problem of the motions.
-        families: configurations at start and goal; those at the start have the potential of
-            inverted gravity, whose least value is minus the greatest one.
-        boxes: boxes of both ends that hold all these configurations.
+        families: configurations at start and goal. The family at the start uses inverted gravity:
+            its least potential is minus the greatest one.
+        boxes: cover of these configurations by boxes, for both ends.
         limits: limits on the effort; less effort gives a weaker bound.
     """
     return _BoxPairs(prepared, families, boxes, limits).least_bound()
@@ -131,7 +131,7 @@ class _BoxPairs(BoxSubdivision[Boxes]):
         return Boxes(self._bounds(centre, half), centre, half)
 
     def divided(self, parts: Boxes, rows: Indices) -> Boxes:
-        """Both halves of pairs, split along the side of a box that moves the TCP most."""
+        """Both halves of pairs, split along the side with the largest motion of the TCP."""
         pairs = parts[rows]
         sizes = np.stack(
             [family.sizes(pairs.half[:, k]) for k, family in enumerate(self.families)], axis=1
@@ -162,7 +162,7 @@ class _BoxPairs(BoxSubdivision[Boxes]):
 
 
 def _paired_boxes(families: Sequence[PoseFamily]) -> Sequence[EndBoxes]:
-    """The smallest boxes of both ends whose pairs are not too many."""
+    """The smallest boxes of both ends with an acceptable number of pairs."""
     sides = [
         _reaching(family, *one_turn_boxes(family.prepared.arm.robot.nq, PAIRING.boxes_per_joint))
         for family in families
@@ -182,6 +182,6 @@ def _paired_boxes(families: Sequence[PoseFamily]) -> Sequence[EndBoxes]:
 
 
 def _reaching(family: PoseFamily, centre: Array, half: Array) -> tuple[Array, Array]:
-    """The narrowed boxes (b, nq) [rad] that may hold configurations of a family."""
+    """Narrow boxes (b, nq) [rad], and drop boxes without configurations of a family."""
     centre, half, reached = family.narrowed(centre, half)
     return centre[reached], half[reached]

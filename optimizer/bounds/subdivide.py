@@ -1,8 +1,8 @@
 """Best-first subdivision of boxes, the driver of the branch-and-bound searches for lower bounds.
 
-Boxes cover a set, for instance all joint positions that reach a pose. Each box has a lower bound on
-its motions. The boxes of least bound are split again and again. The least bound of all boxes bounds
-the whole set at any time, and it never falls.
+Boxes cover a set, for instance all joint positions at a pose. Every box has a lower bound on its
+motions. The boxes of least bound are split repeatedly. The least bound over all boxes is a bound of
+the whole set at any time, and it never decreases.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class SearchLimits:
     def of(
         prepared: PreparedProblem, deadline: Deadline, enough: float, searches: int = 1
     ) -> SearchLimits:
-        """Limits of each of several `searches` for a problem, which share the rounds."""
+        """Limits of one of several `searches` for a problem, with an equal share of the rounds."""
         if prepared.problem.bound == "tight":
             return SearchLimits(SUBDIVISION.tight_rounds // searches, deadline, enough)
         return SearchLimits(SUBDIVISION.rounds // searches, deadline, enough, SUBDIVISION.tolerance)
@@ -78,7 +78,7 @@ class Rows:
         return type(self)(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def joined(self, other: Self) -> Self:
-        """The rows of this table, then those of the other."""
+        """The rows of this table, followed by the rows of the other."""
         return type(self)(
             *(
                 _joined(getattr(self, field.name), getattr(other, field.name))
@@ -116,11 +116,11 @@ B = TypeVar("B", bound=Bounded)
 
 
 class Subdivision(ABC, Generic[B]):
-    """A set that is split into parts with lower bounds."""
+    """Subdivision of a set into parts with lower bounds."""
 
     @abstractmethod
     def first(self) -> B:
-        """Parts that cover the whole set."""
+        """Initial cover of the whole set."""
 
     @abstractmethod
     def chosen(self, parts: B, number: int) -> Indices:
@@ -133,10 +133,10 @@ class Subdivision(ABC, Generic[B]):
 
     @abstractmethod
     def divided(self, parts: B, rows: Indices) -> B:
-        """Parts of the given rows, with bounds no lower than those of the rows."""
+        """Split parts; the bounds of the results are no lower than the bounds of the given rows."""
 
     def run(self, limits: SearchLimits) -> B:
-        """Parts that cover the set after best-first subdivision within limits."""
+        """Cover of the set after best-first subdivision within limits."""
         parts = self.first()
         for number in range(limits.rounds):
             ascending = np.argsort(parts.value, kind="stable")

@@ -10,15 +10,15 @@ from joulepath.models.robot import Array
 
 
 class LeastChain:
-    """Least chain through legs with costs that rise from one call of `find` to the next.
+    """Least chain through legs with non-decreasing costs between calls of `find`.
 
-    A cost that falls is announced by `lower`. A closed chain ends in its first node, and every
-    first node has a least chain of its own. These chains are computed again only while the value
-    known for them is the least.
+    A decrease of a cost must be announced by `lower`. A closed chain ends in its first node, and
+    every first node has a least chain of its own. These chains are computed again only while their
+    known value is the least.
 
     Args:
         costs: cost matrix of every leg, shape (n_k, n_k+1) [J].
-        closed: whether the chain ends in the node in which it starts.
+        closed: whether the last node of the chain equals the first.
     """
 
     def __init__(self, costs: Sequence[Array], closed: bool) -> None:
@@ -44,7 +44,7 @@ class LeastChain:
     def lower(self, by: float) -> None:
         """Announce the fall of one cost `by` an amount [J]; costs may fall in no other way.
 
-        A cost that falls from infinity may connect nodes that no chain passed before.
+        A decrease from infinity may connect nodes unreachable before.
         """
         if self._known is not None:
             self._known = self._known - by if np.isfinite(by) else None

@@ -1,8 +1,9 @@
 """Identified figures in the form of a robot's `figures.yaml`.
 
-A figure has a value, unit, source, trust letter and standard deviation. What the logs did not
-identify keeps the robot's own value, source and letter; of the figures of a power, which are known
-only together, it keeps the letter. A figure of some joints has the worst letter of its joints.
+A figure has a value, unit, source, trust letter and standard deviation. Unidentified figures keep
+the robot's own value, source and letter. Some figures of the power are determined only in
+combination: they take their fitted values but keep the robot's own letter. A figure of several
+joints has the worst letter of its joints.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def document_of(
     drives = section(_DRIVES, own["drives"])
     electronics = section({"idle_power": "W"}, own["electronics"])
     inertials = section(_INERTIALS, own["inertials"])
-    # figures that a robot has from earlier logs are not those that it comes with
+    # figures from earlier logs differ from the figures of the bundled robot
     earlier = own if own.keys() & TOP else {}
     document: dict[str, Any] = {"robot": figures.robot}
     document |= {name: earlier[name] for name in ("inertials", "mains") if name in earlier}
@@ -105,7 +106,7 @@ def document_of(
 def _kept(
     own: Mapping[str, Any], law: str, document: Mapping[str, Any], found: Collection[str]
 ) -> tuple[list[str], Array]:
-    """Paths and covariance of figures from earlier logs that a document keeps.
+    """Paths and covariance of the figures kept from earlier logs.
 
     Args:
         own: the robot's own figures by section.
@@ -131,7 +132,7 @@ def _kept(
 
 
 def _entry(figures: Mapping[str, Any], path: str) -> Any:
-    """The value at a path; the section of the links as a whole, which its parameters depend on."""
+    """The value at a path; for links the whole section, as its parameters are interdependent."""
     section, *parts = path.split(".")
     node: Any = figures.get(section, {})
     if section == "inertials":
@@ -178,8 +179,9 @@ def _figure(
 def _deviations(
     figures: IdentifiedFigures, name: str, value: Array, own: Mapping[str, Any]
 ) -> Array | None:
-    """Standard deviations in the shape of a figure: of joints with the robot's own value the own
-    ones, which only figures of earlier logs have, otherwise 0; None if all are 0.
+    """Standard deviations in the shape of a figure; None if all are 0.
+
+    A joint with the robot's own value keeps its standard deviation from earlier logs, otherwise 0.
     """
     found = np.zeros(value.shape)
     if "sd" in own:

@@ -1,4 +1,4 @@
-"""Where a robot base, or a group of stops and obstacles, may be placed. Validated on
+"""Admissible places of a robot base, or of a group of stops and obstacles; validated on
 construction.
 """
 
@@ -39,15 +39,15 @@ REGION_RANGES = RegionRanges()
 class Region:
     """Ranges of a place in the world.
 
-    Of the robot base, the ranges are those of the base frame in the world. Of a group of stops and
-    obstacles, they are offsets from the given poses. None keeps the nominal value.
+    For the robot base, the ranges apply to the pose of the base frame in the world. For a group of
+    stops and obstacles, they apply to offsets from the given poses. None keeps the nominal value.
 
     Attributes:
         x: least and greatest x [m].
         y: least and greatest y [m].
         z: least and greatest z [m].
-        yaw: least and greatest angle about the world's z axis [rad]; of a base on the floor or
-            the ceiling that of its x axis, of a base on a wall that of its z axis.
+        yaw: least and greatest angle about the world's z axis [rad]: the angle of the x axis of a
+            base on the floor or the ceiling, or of the z axis of a base on a wall.
         mounts: allowed orientations of the base: on the "floor" with its z axis up, on a "wall"
             with its z axis horizontal along yaw and its x axis down, on the "ceiling" with its z
             axis down and its y axis at a right angle to yaw. None keeps the nominal orientation,
@@ -114,11 +114,11 @@ class Places:
 
 @dataclass(frozen=True)
 class Group:
-    """Stops and obstacles that move together as one body, such as a fixture or a pallet.
+    """Stops and obstacles moved together as one rigid body, such as a fixture or a pallet.
 
     Attributes:
-        stops: names of stops, in every cycle that has them; `start` is the start of a cycle.
-        obstacles: names of obstacles, in the scene of every cycle that has them.
+        stops: names of stops, in all cycles with such stops; `start` is the start of a cycle.
+        obstacles: names of obstacles, in the scenes of all cycles with such obstacles.
 
     Raises:
         InvalidProblem: the group is empty, or names a stop or an obstacle twice.
@@ -143,7 +143,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Moved:
-    """What moves, and where to.
+    """A movable body and its admissible places.
 
     Attributes:
         region: allowed places.

@@ -1,15 +1,15 @@
-"""Families of candidates for mechanical work, which differ by full turns of outer joints.
+"""Families of candidates for mechanical work, equal up to full turns of the outer joints.
 
-The bound on mechanical work rules out little: tens to hundreds of candidates are left, and most of
-them need far more energy than the best. Candidates between the same branches that differ only by
-full turns of the outer half of the joints move the heavy links in the same way, with similar
-energies. They are a family. At first, the member of least possible duration is solved for the whole
-family. Then members of the best families are solved.
+The bound on mechanical work rules out few candidates: tens to hundreds are left, most with far more
+energy than the best. Candidates between the same branches, equal up to full turns of the outer half
+of the joints, move the heavy links in the same way and have similar energies. They form a family.
+At first, the member of least possible duration is solved for the whole family, then further members
+of the best families.
 
 This is a heuristic. On 96 random moves from joint positions to a pose, the family of the answer was
-among the three families whose first members need the least, at most 1.42 times as much as the best
-of them; the answer was at most the fifth member. Of 102 other moves, two need 12 and 1 % less than
-if all candidates are solved, and one needs 2 % more.
+among the three families with the least energies of their first members, at most 1.42 times the
+least one, and the answer was at most the fifth member. Of 102 other moves, two need 12 and 1 % less
+than with all candidates solved, and one needs 2 % more.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ FAMILIES = FamilySettings()
 
 
 def explore_families(state: SearchState, explore: Callable[[], object]) -> None:
-    """Solve one member of each family, then members of the best families.
+    """Solve one member per family, then members of the best families.
 
-    Candidates without a solve or a bound that rules them out are left unvisited.
+    Candidates are left unvisited if they are neither solved nor excluded by their bounds.
 
     Args:
         state: state of the search.
@@ -76,7 +76,7 @@ def families_of(state: SearchState) -> list[list[Candidate]]:
     """The open and the solved candidates in families, the member of least possible duration first.
 
     There are none for the electrical objective, with its tighter bounds, for other methods, and for
-    a tight bound, which requires every candidate to be solved.
+    a tight bound: it requires a solve of every candidate.
     """
     asked = state.problem
     if (asked.objective, asked.method) != ("mechanical", "bspline") or asked.bound == "tight":
@@ -99,7 +99,7 @@ def _energy(family: Sequence[Candidate]) -> float:
 
 
 def _replace_hindered(state: SearchState, families: Sequence[Sequence[Candidate]]) -> bool:
-    """Release another member of each family with collisions only; whether there is any.
+    """Release another member of the families with collisions only; whether there is any.
 
     Another turn of the wrist may be clear. A slower member cannot help against other limits.
     """
@@ -133,12 +133,12 @@ def _release(candidates: Sequence[Candidate]) -> None:
 def settle_waiting(
     state: SearchState, waiting: Sequence[Candidate], reason: Reason = Reason.FAMILY
 ) -> None:
-    """Settle candidates that are still deferred, unless the deadline ended the search.
+    """Settle the candidates still deferred, unless the deadline ended the search.
 
     Args:
         state: state of the search.
         waiting: candidates.
-        reason: reason for a candidate that its bound does not rule out.
+        reason: reason for candidates with a bound below the incumbent.
     """
     left = [each for each in waiting if each.deferred]
     _release(left)

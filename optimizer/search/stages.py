@@ -1,4 +1,4 @@
-"""Stages of a search, each a function that changes the state; `METHOD` lists them in order."""
+"""Stages of a search: functions on the search state, listed in order by `METHOD`."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def find_candidates(state: SearchState) -> None:
 
 
 def bound_candidates(state: SearchState) -> None:
-    """Rule out candidates with infeasible ends, and give each candidate its lower bound."""
+    """Rule out candidates with infeasible ends, and compute the lower bounds of the others."""
     problem = state.problem
     state.candidates = bounded(state.prepared, state.candidates)
     checkpoint()
@@ -83,7 +83,7 @@ def solve_without_storage(state: SearchState) -> None:
 def explore_candidates(state: SearchState) -> None:
     """Solve candidates by their bounds; take the fastest motion if no motion is short enough."""
     problem = state.problem
-    # rest does no work: any motion may rest for the time that is left
+    # rest does no work: any motion may rest for the remaining time
     state.may_rest = problem.objective == "mechanical" and not problem.has_fixed_duration
     explore_or_find_fastest(state, lambda: explore(state), state.known, state.without_storage)
 
@@ -97,7 +97,7 @@ def refine_sampled_ends(state: SearchState) -> None:
 
 
 def refine_best(state: SearchState) -> None:
-    """Refine the best motion, and motions of candidates that may come below it."""
+    """Refine the incumbent, and the motions of candidates with a prospect of less energy."""
     best = state.best()
     if best is None or best.refused:
         return
@@ -129,7 +129,7 @@ def compare_best_with_baselines(state: SearchState) -> None:
     table = compare_with_baselines(state, best)
     best = state.best() or best
     state.baselines = [*table, *waypoint_baselines(state, best, table)]
-    # a coarse motion that was not refined is no optimum
+    # a coarse motion without refinement is no optimum
     state.cut_short |= state.deadline.passed
 
 
@@ -144,7 +144,7 @@ def confirm_best(state: SearchState) -> None:
 
 
 def until_confirmed(*stages: Stage) -> Stage:
-    """A stage that repeats stages until there is an answer, or no motion is left."""
+    """A stage to repeat stages until there is an answer, or no motion is left."""
 
     def repeat(state: SearchState) -> None:
         while state.answer is None and state.best() is not None:
@@ -193,7 +193,7 @@ def prepare(state: SearchState) -> None:
 
     Raises:
         DeadlineExceeded: the deadline passed.
-        JoulepathError: the errors of `optimize` that need no search.
+        JoulepathError: errors of `optimize` before the search.
     """
     try:
         with watch(state.end):
@@ -215,8 +215,7 @@ def search(state: SearchState) -> Solution:
 
 
 def solve_related(state: SearchState, problem: Problem, share: float = 1.0) -> FoundMotion | None:
-    """The answer to a related problem, whose motions are allowed in the own problem at no more
-    energy.
+    """Solve a related problem; its motions must be feasible in the own problem at no more energy.
 
     Args:
         state: state of the search.

@@ -40,8 +40,8 @@ class Sourced(Request):
 
 
 class Costs(Request):
-    """Numbers for the conversion of joules into costs. The report counts and names given ones
-    only."""
+    """Numbers for the conversion of joules into costs. The report uses and names only the given
+    numbers."""
 
     cycles_per_shift: Sourced | None = described(
         "Motions or cycles per shift. Null: one each `period` or directly after the other, for 8 "
@@ -128,7 +128,7 @@ class ReportRequest(AnsweredRequest):
 
     @property
     def kind(self) -> Kind:
-        """What the report is on."""
+        """Kind of the subject of the report."""
         return next(kind for kind in get_args(Kind) if getattr(self, kind) is not None)
 
     @property
@@ -151,7 +151,7 @@ class ReportRequest(AnsweredRequest):
 
     @property
     def with_advice(self) -> float:
-        """Wall time of the request with that of all changes [s]."""
+        """Wall time of the request and of all its changes [s]."""
         changes = len(get_args(AdviceName)) if self.advice and self.task is not None else 0
         return (1 + changes) * self.deadline
 

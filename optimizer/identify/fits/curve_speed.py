@@ -1,6 +1,6 @@
-"""Speeds at which the curved term of friction bends.
+"""Speed scales of the curved term of friction.
 
-The torque is not linear in this speed, so the best of some candidates is taken for each joint.
+The torque is not linear in this scale, so the best of several candidates is chosen per joint.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def _squared_error(block: JointBlock, clusters: Clusters, options: Identificatio
 
 
 def coupled_joints(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
-    """Sets of joints that couplings tie together; single joints otherwise."""
+    """Connected sets of coupled joints; an uncoupled joint is a set of its own."""
     graph = np.eye(nq)
     for coupling in couplings:
         graph[np.ix_(coupling.joints, coupling.joints)] = 1
@@ -86,7 +86,7 @@ def with_speeds(
 ) -> Estimate:
     """Fit with the speeds of the curved terms as further figures.
 
-    A curved term that is kept at the robot's own value bends at the robot's own speed.
+    A curved term kept at the robot's own value also keeps the robot's own speed scale.
 
     Args:
         robot: the robot with its own figures.
@@ -112,7 +112,7 @@ def with_speeds(
 
 
 def _speeds_of(joints: list[int], speeds: Array, clusters: int) -> Estimate:
-    """Speeds [rad/s] of some joints, whose errors are part of those of the curved terms."""
+    """Speed scales [rad/s] of some joints; their errors are part of the errors of the terms."""
     names: tuple[Name, ...] = tuple(("speed", joint) for joint in joints)
     value = speeds[joints]
     none = np.zeros((len(value),) * 2)

@@ -1,8 +1,8 @@
 """Interval of a predicted energy: errors of the figures, of the move and of the day.
 
-The covariance of the figures alone is far too narrow. Every move has an error that no figures of
-the model can express, and friction differs from day to day. Both errors are measured: the first
-with moves left out of the fit, the second with logs of different days.
+The covariance of the figures alone is far too narrow. Every move has an error beyond the figures of
+the model, and friction differs from day to day. Both errors are measured: the first with moves left
+out of the fit, the second with logs of different days.
 """
 
 from __future__ import annotations
@@ -43,20 +43,28 @@ INTERVAL = IntervalSettings()
 
 @dataclass(frozen=True)
 class Spread:
-    """Errors that the figures of the model do not express."""
+    """Errors beyond the figures of the model."""
 
     move_sd: float
     """Standard deviation of the mean power of a move [W]."""
     session_sd: Array
-    """Relative standard deviations of the friction of each joint (nq,) between days [1], which are
-    independent."""
+    """Relative standard deviations of the friction between days, by joint (nq,) [1]. The deviations
+    of different joints are independent."""
 
 
 def energy_sd(fitted: FitResult, spread: Spread, rows: Rows) -> tuple[float, float]:
-    """Predicted energy of rows and its standard deviation [J].
+    """Predict the energy of rows with its standard deviation.
 
-    Moves along one motion share the error that the figures do not express; it is independent of
-    that of other motions.
+    The error beyond the figures is common to all moves along one motion and independent between
+    motions.
+
+    Args:
+        fitted: the fit.
+        spread: errors of moves and days.
+        rows: rows of the motions.
+
+    Returns:
+        Energy and standard deviation [J].
     """
     energy = fitted.arm.energy(rows)
     time = np.bincount(rows.group, rows.weight)
@@ -69,7 +77,7 @@ def energy_sd(fitted: FitResult, spread: Spread, rows: Rows) -> tuple[float, flo
 
 
 def with_friction(arm: FittedArm, factor: Array) -> FittedArm:
-    """The arm with so many times the friction of each joint (nq,)."""
+    """The arm with its friction multiplied by a factor per joint (nq,) [1]."""
     parts = {name: getattr(arm, name) * factor for name in ("coulomb", "viscous", "load", "curved")}
     return replace(arm, **parts)
 
@@ -80,8 +88,8 @@ def figures_variance(fitted: FitResult, rows: Rows) -> float:
     by_rows = np.array([[arm.energy(rows)] for arm in fitted.row_error_arms])
     power, slope = fitted.arm.power(rows)
     gradient = rows.weight @ slope
-    # the power parameters compensate an error of held friction in any motion, but not an error of
-    # the links, which load other motions differently
+    # the power parameters compensate an error of held friction in any motion, but no error of the
+    # links, because its torque differs between motions
     arms = fitted.prior_error_arms if fitted.arm.link_change is not None else ()
     by_links = sum((arm.energy(rows) - float(rows.weight @ power)) ** 2 for arm in arms)
     return float(
@@ -95,7 +103,7 @@ def spread_of(fitted: FitResult, rows: Rows, threshold: float) -> Spread:
     Args:
         fitted: the fit.
         rows: rows of the fit.
-        threshold: speed above which a joint tells its friction [rad/s].
+        threshold: speed above which friction is measured [rad/s].
     """
     friction = MeasuredFriction.of(fitted.arm, rows, threshold)
     factors = np.array([friction.factor(rows.log == log) for log in np.unique(rows.log)])
@@ -105,8 +113,9 @@ def spread_of(fitted: FitResult, rows: Rows, threshold: float) -> Spread:
 def _move_sd(fitted: FitResult, rows: Rows, friction: MeasuredFriction) -> float:
     """Standard deviation [W] of the mean error of a move beyond the errors of figures and days.
 
-    Each move is predicted by the arm fitted without its cluster. Of several logs, it has the
-    friction of the rest of its own log: that of another day is no error of the move.
+    A move is predicted by the arm fitted without the cluster of the move. With several logs, the
+    friction is scaled to the other rows of the same log, because a difference between days is no
+    error of the move.
     """
     measured = measured_power(fitted.arm, rows)
     use = np.isfinite(measured) & ~rows.rest
@@ -129,7 +138,7 @@ def _move_sd(fitted: FitResult, rows: Rows, friction: MeasuredFriction) -> float
     if not squares:
         return 0.0
     own = own_variance(np.array(squares), np.maximum(explained, 0.0))
-    # few moves are a small sample: the interval is as wide as that of Student's distribution
+    # few moves are a small sample: widened to the interval of Student's distribution
     return float(np.sqrt(own) * stdtrit(len(squares), 0.95) / P95)
 
 
@@ -154,13 +163,17 @@ def own_variance(squares: Array, explained: Array) -> float:
 
 
 def session_sd(factors: Array) -> Array:
-    """Relative standard deviations (nq,) of the friction of a day against that of some logs.
+    """Standard deviations of the friction of a day relative to the mean of the fitted logs.
 
     The mean of n logs has an error of its own, 1/n of the variance of a day. Few logs are a small
-    sample: the deviation is widened to that of Student's distribution.
+    sample, so the deviations are widened by Student's distribution.
 
     Args:
-        factors: friction of each log and joint (logs, nq), NaN where it was not measured.
+        factors: measured over fitted friction by log and joint, shape (logs, nq); NaN without a
+            measurement.
+
+    Returns:
+        Relative standard deviations, shape (nq,) [1].
     """
     known = np.isfinite(factors)
     logs = known.sum(axis=0)

@@ -1,13 +1,13 @@
 """Least duration of motions along a tool path with a bound on the TCP speed.
 
-A motion along a course passes each of its points, in order: for each point there is a time at which
-the TCP is within 2 ε, twice the position tolerance, of it. (One ε is the tolerance of the motion
-from the course, the other one the part of the course that the certificate lets the motion omit,
-which lies within the tolerance of the followed part.) At both ends the TCP is exactly at the point.
-So between the times of two points at a distance c, the TCP moves by at least c - 4 ε, by c - 2 ε if
-one of them is an end, and by c from end to end. The sum over any sequence of course points is a
-lower bound of the distance: few points suffice for a straight line, more are better at bends. The
-bound over the largest speed is the least duration.
+A motion along a course passes all of its points in order: at some time, the TCP is within 2 ε of a
+given point, twice the position tolerance. One ε is the tolerance of the motion from the course. The
+other ε accounts for parts of the course omitted by the motion; the certificate admits them within
+the tolerance of the followed part. At both ends the TCP is exactly at the point. Between two points
+at a distance c, the TCP therefore moves by at least c - 4 ε, by c - 2 ε if one point is an end, and
+by c from end to end. The sum over any sequence of course points is a lower bound of the distance:
+few points suffice for a straight line, more are better at bends. The ratio of the bound to the
+largest speed is the least duration.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ DIVISIONS = (1, 2, 4, 8, 16, 32)
 
 
 def least_tcp_distance(course: ToolCourse) -> float:
-    """Lower bound of the distance [m] that the TCP moves on motions along a course within its
-    tolerance.
+    """Lower bound [m] of the distance covered by the TCP on motions within the tolerance of a
+    course.
     """
     ends = np.linalg.norm(np.diff(course.poses(np.array([0.0, 1.0]))[:, :3, 3], axis=0))
     best = float(ends)

@@ -41,7 +41,7 @@ SQP_STAGES = SqpStageSettings()
 
 @dataclass(frozen=True)
 class Stage:
-    """One of successive solves: the NLP, and where the SQP starts."""
+    """One of successive solves: the NLP, and the start of the SQP."""
 
     program: NonlinearProgram
 
@@ -58,7 +58,7 @@ class Stage:
     """Duration [s]."""
 
     multiplier: Array | None = None
-    """Multipliers where the SQP ended before; None in the first solve."""
+    """Multipliers at the end of the previous SQP; None in the first solve."""
 
 
 class StagedMethod(Method):
@@ -76,13 +76,13 @@ class StagedMethod(Method):
 
     @property
     def passes(self) -> Array:
-        """Configurations (k, nq) [rad] that the motion passes through, in order."""
+        """Configurations on the way of the motion, in order, shape (k, nq) [rad]."""
         return np.zeros((0, len(self.q_start)))
 
     def overshoot(self, spline: Spline) -> tuple[Array, Array]:
         """Excess (nq,) [rad] of a motion below and above the position limits.
 
-        Zero for a B-spline, which stays within the convex hull of its control points.
+        Zero for a B-spline, by the convex hull property of its control points.
         """
         none = np.zeros(len(self.q_start))
         return none, none
@@ -124,7 +124,7 @@ class StagedMethod(Method):
         return Stage(program, limits, pairs, free, duration)
 
     def _first_duration(self, program: NonlinearProgram, free: Array, least: float) -> float:
-        """Duration [s] of least cost among a few at which the guess keeps its limits on rates."""
+        """Duration [s] of least cost among a few with the guess within its rate limits."""
         peaks = np.abs(program.kinematics(free)).max(axis=2)
         shortest = max(time_scale(peaks / program.limits.rates), least, program.t_min)
         if shortest >= program.t_max:
@@ -158,7 +158,7 @@ class StagedMethod(Method):
         )
 
     def repaired(self, stage: Stage, result: SqpResult, check: LimitCheck) -> Stage:
-        """The next solve, with limits tightened by their excess, from where the SQP ended."""
+        """The next solve: limits tightened by their excess, start at the end of the last SQP."""
         program, limits, pairs = stage.program, stage.limits, stage.pairs
         if check.factors is not None:
             limits = tightened(limits, check.factors)
@@ -170,11 +170,11 @@ class StagedMethod(Method):
             else np.union1d(pairs, self.prepared.surroundings.active_pairs(check.spline))
         )
         program = with_repaired_path(self.prepared, program, pairs, nearby, check)
-        # positions are bounds of the SQP, which takes no step for them alone
+        # the SQP has positions as bounds only, and takes no step to restore them
         free = np.clip(result.free, program.limits.q_min, program.limits.q_max)
         return Stage(program, limits, nearby, free, result.duration, result.multiplier)
 
 
 def spline_where(program: NonlinearProgram, result: SqpResult) -> Spline:
-    """The motion where an NLP ended."""
+    """The motion at the end of an NLP."""
     return spline_of(program.basis, program.joint_points(result.free), result.duration)

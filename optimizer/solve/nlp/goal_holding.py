@@ -1,8 +1,8 @@
 """Energy of holding the arm at the goal, with the goal as a decision variable of an NLP.
 
 The arm waits at the goal until the end of its dwell. The holding time of the motors is linear in
-the duration of the motion. The constant and the time weight of the NLP contain the energy at the given
-goal; this module adds the difference at another goal.
+the duration of the motion. The constant and the time weight of the NLP contain the energy at the
+given goal; this module adds the difference at another goal.
 """
 
 from __future__ import annotations
