@@ -39,7 +39,7 @@ def check_samples(arm: Arm, spline: Spline, t: Array, samples: Sequence[Array]) 
             of shape (k, nq).
 
     Raises:
-        NotCertified: the samples differ by more than rounding errors.
+        NotCertified: samples and spline differ by more than rounding errors.
     """
     limits, duration = arm.active_limits, spline.duration
     if len(t) and not (

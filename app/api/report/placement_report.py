@@ -41,8 +41,8 @@ def placement_report(bundle: Bundle) -> Report:
     """Build the report of an answer of `POST /placement`.
 
     Raises:
-        NotCertified: an answer has no certificate.
-        InvalidProblem: the request does not describe a valid problem.
+        NotCertified: a motion fails its certificate, or its samples differ from its spline.
+        InvalidProblem: a part of the request is invalid.
     """
     best = rows_at(bundle, "best")
     programs = [program_of(of_cycle(bundle, row)) for row in best]

@@ -65,8 +65,8 @@ class OwnElectronics(Request):
 
 class OwnCollision(Request):
     """Shape of the links. A link without `capsules` gets one capsule per `<collision>` shape of the
-    URDF; a mesh must be given in `meshes`. A link without shapes gets one capsule from joint to
-    joint."""
+    URDF, and per mesh only if it is given in `meshes`. A link without shapes gets one capsule from
+    joint to joint."""
 
     capsules: dict[Named, Annotated[list[Capsule], Field(max_length=50)]] | None = described(
         "Capsules by the name of a link: [x1, y1, z1, x2, y2, z2, radius], both ends of the axis "
