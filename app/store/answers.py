@@ -7,7 +7,7 @@ from datetime import timedelta
 from typing import Any
 
 import orjson
-from sqlalchemy import Select, and_, func, or_, select
+from sqlalchemy import Select, and_, func, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
@@ -16,8 +16,8 @@ from joulepath.app.access.rules import check_owner
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import AnswerInUse, UnknownAnswer
-from joulepath.app.store.paging import having, position_after, position_of
-from joulepath.app.store.tables import Answer, Iteration, Job, JobRequest, is_id, now
+from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.tables import Answer, Iteration, Job, JobRequest, by_id, now
 
 _WITHOUT_DOCUMENTS = [
     defer(column, raiseload=True) for column in (Answer.body, Answer.request, Answer.typed)
@@ -71,9 +71,7 @@ def _row(kind: str, compressed: StoredAnswer, **whose: str | bool | None) -> Ans
 
 def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
     """A stored answer and its JSON document. Raises UnknownAnswer."""
-    answer = session.get(Answer, answer_id) if is_id(answer_id) else None
-    if answer is None:
-        raise UnknownAnswer
+    answer = by_id(session, Answer, answer_id, UnknownAnswer)
     return answer, unpacked(answer.body)
 
 
@@ -121,16 +119,9 @@ def page(
 ) -> tuple[list[Answer], str | None]:
     """Up to `limit` answers without their documents, newest first, and the `after` of the next
     page; None on the last page."""
-    query = wanted.of(select(Answer))
-    query = query.order_by(Answer.created.desc(), Answer.id.desc()).limit(limit + 1)
-    if after is not None:
-        created, answer_id = position_after(after)
-        query = query.where(
-            or_(Answer.created < created, and_(Answer.created == created, Answer.id < answer_id))
-        )
-    found = list(session.scalars(query.options(*_WITHOUT_DOCUMENTS)))
-    more, found = len(found) > limit, found[:limit]
-    return found, position_of(found[-1]) if more else None
+    query = wanted.of(select(Answer)).options(*_WITHOUT_DOCUMENTS)
+    found = session.scalars(newest_first(query, Answer, limit, after)).all()
+    return list(found[:limit]), following(found, limit)
 
 
 def rename(
@@ -143,11 +134,8 @@ def rename(
     """Gives an answer a name, or none, and the texts of its request's numbers, if there are any.
     Raises UnknownAnswer or NotOwner.
     """
-    documents = (defer(column, raiseload=True) for column in (Answer.body, Answer.request))
-    query = select(Answer).where(Answer.id == answer_id).options(*documents)
-    answer = session.scalar(query) if is_id(answer_id) else None
-    if answer is None:
-        raise UnknownAnswer
+    documents = [defer(column, raiseload=True) for column in (Answer.body, Answer.request)]
+    answer = by_id(session, Answer, answer_id, UnknownAnswer, options=documents)
     check_owner(client, answer.owner)
     answer.name = name
     if typed is not None:
@@ -160,9 +148,7 @@ def delete(session: Session, answer_id: str, client: Client) -> None:
     """Deletes an answer. Raises UnknownAnswer, NotOwner, or AnswerInUse for an answer of a study or
     of a job.
     """
-    answer = session.get(Answer, answer_id) if is_id(answer_id) else None
-    if answer is None:
-        raise UnknownAnswer
+    answer = by_id(session, Answer, answer_id, UnknownAnswer)
     check_owner(client, answer.owner)
     if answer.study_id is not None or answer.job_id is not None:
         raise AnswerInUse

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import NotRequired, TypedDict
 
 from sqlalchemy import select
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from joulepath.app.store.tables import Answer, CachedAnswer
+from joulepath.app.store.tables import Answer, CachedAnswer, insert_new
 
 
 class Meaning(TypedDict):
@@ -73,13 +72,11 @@ def remember(session: Session, answered: Iterable[Answered]) -> None:
         if known.deadline is not None or own.is_optimal:
             known.answer_id, known.deadline = own.answer_id, _longest(own)
     if new:
-        is_postgresql = session.get_bind().dialect.name == "postgresql"
-        insert = postgresql.insert(CachedAnswer) if is_postgresql else sqlite.insert(CachedAnswer)
         values = [
             {"key": key, "answer_id": own.answer_id, "deadline": _longest(own)}
             for key, own in sorted(new.items())
         ]
-        session.execute(insert.on_conflict_do_nothing(), values)
+        insert_new(session, CachedAnswer, values)
 
 
 def _longest(own: Answered) -> float | None:

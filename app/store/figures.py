@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import uuid
+from functools import partial
 from typing import Any
 
 from sqlalchemy import func, select
@@ -12,7 +13,7 @@ from sqlalchemy.orm import Session
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
 from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
-from joulepath.app.store.tables import Figures, Study, is_id, now
+from joulepath.app.store.tables import Figures, Study, by_id, now
 
 _SPACE = uuid.UUID("6d0c5a0e-7b0e-5d5f-9a53-1d1f5b1c4a9e")
 
@@ -49,10 +50,7 @@ def all_of(session: Session) -> list[Figures]:
 
 def get(session: Session, id: str) -> Figures:
     """The figures of this id. Raises UnknownFigures."""
-    found = session.get(Figures, id) if is_id(id) else None
-    if found is None:
-        raise UnknownFigures(id)
-    return found
+    return by_id(session, Figures, id, partial(UnknownFigures, id))
 
 
 def delete(session: Session, id: str, client: Client) -> None:

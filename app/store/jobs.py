@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import TypeVarTuple
 
-from sqlalchemy import ColumnElement, Select, and_, func, insert, or_, select
+from sqlalchemy import ColumnElement, Select, func, insert, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
@@ -25,10 +24,9 @@ from joulepath.app.store.job_events import (
     request_ended,
     set_state,
 )
-from joulepath.app.store.paging import having, position_after, position_of
-from joulepath.app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
+from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.tables import Answer, Job, JobRequest, by_id, new_id, now
 
-Ts = TypeVarTuple("Ts")
 _AT_A_TIME = 50
 """Requests that are read at once with their answers, of up to 1 MB each."""
 
@@ -138,10 +136,9 @@ def page(
     session: Session, limit: int, after: str | None, wanted: Wanted
 ) -> tuple[list[JobView], str | None]:
     """Up to `limit` jobs, newest first, and the `after` of the next page; None on the last page."""
-    jobs = list(session.scalars(_newest_first(wanted.of(select(Job)), limit, after)))
-    more, jobs = len(jobs) > limit, jobs[:limit]
-    counts = counts_of(session, [job.id for job in jobs])
-    return [JobView(job, counts[job.id]) for job in jobs], position_of(jobs[-1]) if more else None
+    jobs = session.scalars(newest_first(wanted.of(select(Job)), Job, limit, after)).all()
+    counts = counts_of(session, [job.id for job in jobs[:limit]])
+    return [JobView(job, counts[job.id]) for job in jobs[:limit]], following(jobs, limit)
 
 
 def page_of_kind(
@@ -160,20 +157,9 @@ def page_of_kind(
     )
     if search is not None:
         query = query.where(having(search, Job.name, Answer.robot))
-    rows = session.execute(_newest_first(query, limit, after))
+    rows = session.execute(newest_first(query, Job, limit, after))
     found = [(job, request, robot) for job, request, robot in rows]
-    more, found = len(found) > limit, found[:limit]
-    return found, position_of(found[-1][0]) if more else None
-
-
-def _newest_first(query: Select[*Ts], limit: int, after: str | None) -> Select[*Ts]:
-    """One more than `limit` jobs of a query, from a position on."""
-    if after is not None:
-        created, job_id = position_after(after)
-        query = query.where(
-            or_(Job.created < created, and_(Job.created == created, Job.id < job_id))
-        )
-    return query.order_by(Job.created.desc(), Job.id.desc()).limit(limit + 1)
+    return found[:limit], following([job for job, _, _ in found], limit)
 
 
 def requests(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:
@@ -308,14 +294,8 @@ def _page(
 
 
 def _job(session: Session, job_id: str, lock: bool = False) -> Job:
-    job = (
-        session.get(Job, job_id, with_for_update={"key_share": True} if lock else None)
-        if is_id(job_id)
-        else None
-    )
-    if job is None:
-        raise UnknownJob
-    return job
+    locking = {"key_share": True} if lock else None
+    return by_id(session, Job, job_id, UnknownJob, with_for_update=locking)
 
 
 def _check_room(session: Session, more: int, most_waiting: int) -> None:

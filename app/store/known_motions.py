@@ -9,10 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sqlalchemy import delete, select
-from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from joulepath.app.store.tables import KnownMotion, now
+from joulepath.app.store.tables import KnownMotion, insert_new, now
 
 
 @dataclass(frozen=True)
@@ -54,13 +53,11 @@ def keep(
         known.used = used
         del left[known.key]
     if left:
-        is_postgresql = session.get_bind().dialect.name == "postgresql"
-        insert = postgresql.insert(KnownMotion) if is_postgresql else sqlite.insert(KnownMotion)
         rows = [
             {"cell": cell, "key": key, "used": used, "body": body}
             for key, body in sorted(left.items())
         ]
-        session.execute(insert.on_conflict_do_nothing(), rows)
+        insert_new(session, KnownMotion, rows)
     oldest = session.scalar(
         select(KnownMotion.used).order_by(KnownMotion.used.desc()).offset(most).limit(1)
     )

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from sqlalchemy import and_, func, or_, select
 from sqlalchemy import delete as delete_from
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
 
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
-from joulepath.app.store.paging import having, position_after, position_of
-from joulepath.app.store.tables import StoredLog, is_id
+from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.tables import StoredLog, by_id
 
 _LIGHT = defer(StoredLog.body, raiseload=True)
 """Leaves out the file of a log."""
@@ -26,12 +26,12 @@ def add(session: Session, log: StoredLog, most: int) -> None:
 
 def get(session: Session, log_id: str) -> StoredLog:
     """A log with its file. Raises UnknownLog."""
-    return _found(session.get(StoredLog, log_id) if is_id(log_id) else None)
+    return by_id(session, StoredLog, log_id, UnknownLog)
 
 
 def about(session: Session, log_id: str) -> StoredLog:
     """A log without its file. Raises UnknownLog."""
-    return _found(session.get(StoredLog, log_id, options=[_LIGHT]) if is_id(log_id) else None)
+    return by_id(session, StoredLog, log_id, UnknownLog, options=[_LIGHT])
 
 
 def page(
@@ -40,25 +40,11 @@ def page(
     """Up to `limit` logs without their files, newest first, and the `after` of the next page; None
     on the last page. With a `search`, those that have this text in their name or robot.
     """
-    query = (
-        select(StoredLog)
-        .options(_LIGHT)
-        .order_by(StoredLog.created.desc(), StoredLog.id.desc())
-        .limit(limit + 1)
-    )
+    query = select(StoredLog).options(_LIGHT)
     if search is not None:
         query = query.where(having(search, StoredLog.name, StoredLog.robot))
-    if after is not None:
-        created, log_id = position_after(after)
-        query = query.where(
-            or_(
-                StoredLog.created < created,
-                and_(StoredLog.created == created, StoredLog.id < log_id),
-            )
-        )
-    found = list(session.scalars(query))
-    more, found = len(found) > limit, found[:limit]
-    return found, position_of(found[-1]) if more else None
+    found = session.scalars(newest_first(query, StoredLog, limit, after)).all()
+    return list(found[:limit]), following(found, limit)
 
 
 def rename(session: Session, log_id: str, name: str | None, client: Client) -> StoredLog:
@@ -74,9 +60,3 @@ def delete(session: Session, log_id: str, client: Client) -> None:
     log = about(session, log_id)
     check_owner(client, log.owner)
     session.execute(delete_from(StoredLog).where(StoredLog.id == log.id))
-
-
-def _found(log: StoredLog | None) -> StoredLog:
-    if log is None:
-        raise UnknownLog
-    return log

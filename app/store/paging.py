@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVarTuple
 
-from sqlalchemy import ColumnElement, or_
+from sqlalchemy import ColumnElement, Select, and_, or_
 from sqlalchemy.orm import InstrumentedAttribute
+
+from joulepath.app.store.tables import Answer, Job, StoredLog, Study
+
+Ts = TypeVarTuple("Ts")
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
@@ -19,15 +24,29 @@ class Listed(Protocol):
     id: str
 
 
-def position_of(row: Listed) -> str:
-    """The `after` of the page following this row."""
-    return f"{(row.created - _EPOCH) // _MICROSECOND}_{row.id}"
+def newest_first(
+    query: Select[*Ts],
+    table: type[Answer | Job | StoredLog | Study],
+    limit: int,
+    after: str | None,
+) -> Select[*Ts]:
+    """One row more than a page of `limit` rows, from the position `after` on; None: from the newest
+    row on.
+    """
+    if after is not None:
+        microseconds, row_id = after.split("_")
+        created = _EPOCH + int(microseconds) * _MICROSECOND
+        older = and_(table.created == created, table.id < row_id)
+        query = query.where(or_(table.created < created, older))
+    return query.order_by(table.created.desc(), table.id.desc()).limit(limit + 1)
 
 
-def position_after(text: str) -> tuple[datetime, str]:
-    """Time and id of the row of a position."""
-    microseconds, row_id = text.split("_")
-    return _EPOCH + int(microseconds) * _MICROSECOND, row_id
+def following(rows: Sequence[Listed], limit: int) -> str | None:
+    """The `after` of the next page, by the rows of `newest_first`; None on the last page."""
+    if len(rows) <= limit:
+        return None
+    last = rows[limit - 1]
+    return f"{(last.created - _EPOCH) // _MICROSECOND}_{last.id}"
 
 
 def having(text: str, *places: InstrumentedAttribute[Any]) -> ColumnElement[bool]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import and_, or_, select
 from sqlalchemy import delete as delete_from
+from sqlalchemy import select
 from sqlalchemy.orm import Session, defer
 
 from joulepath.app.access.client import Client
@@ -15,8 +15,8 @@ from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import KeyReused, UnknownIteration, UnknownStudy
 from joulepath.app.store import answers, cache
 from joulepath.app.store.cache import Answered
-from joulepath.app.store.paging import having, position_after, position_of
-from joulepath.app.store.tables import Iteration, Study, is_id, new_id, now
+from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.tables import Iteration, Study, by_id, new_id, now
 
 _LIGHT = defer(Iteration.request, raiseload=True)
 """Leaves out the request of an iteration."""
@@ -110,17 +110,11 @@ def page(
 ) -> tuple[list[State], str | None]:
     """Up to `limit` studies, newest first, and the `after` of the next page; None on the last
     page. With a `search`, those that have this text in their name or robot."""
-    query = select(Study).order_by(Study.created.desc(), Study.id.desc()).limit(limit + 1)
+    query = select(Study)
     if search is not None:
         query = query.where(having(search, Study.name, Study.robot))
-    if after is not None:
-        created, study_id = position_after(after)
-        query = query.where(
-            or_(Study.created < created, and_(Study.created == created, Study.id < study_id))
-        )
-    studies = list(session.scalars(query))
-    more, studies = len(studies) > limit, studies[:limit]
-    return [_state(session, study) for study in studies], position_of(studies[-1]) if more else None
+    studies = session.scalars(newest_first(query, Study, limit, after)).all()
+    return [_state(session, study) for study in studies[:limit]], following(studies, limit)
 
 
 def rename(session: Session, study_id: str, name: str, client: Client) -> State:
@@ -241,10 +235,7 @@ def new_study(
 
 
 def _study(session: Session, study_id: str) -> Study:
-    study = session.get(Study, study_id) if is_id(study_id) else None
-    if study is None:
-        raise UnknownStudy
-    return study
+    return by_id(session, Study, study_id, UnknownStudy)
 
 
 def _state(session: Session, study: Study) -> State:

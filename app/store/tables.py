@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import uuid
+from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import (
     JSON,
@@ -19,12 +20,14 @@ from sqlalchemy import (
     TypeDecorator,
     false,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 
 from joulepath.app.schemas.lengths import (
     LENGTHS,
 )
 
+T = TypeVar("T", bound="Table")
 # SQLite can alter a constraint only if it has a name
 _NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -44,9 +47,29 @@ def new_id() -> str:
     return str(uuid.uuid4())
 
 
-def is_id(text: str) -> bool:
-    """Whether `text` has the form of an id. PostgreSQL rejects some other texts with an error."""
-    return re.fullmatch(r"[0-9a-f-]{36}", text) is not None
+def by_id(
+    session: Session, table: type[T], id: str, unknown: Callable[[], Exception], **how: Any
+) -> T:
+    """The row with an id. Raises `unknown`.
+
+    Args:
+        session: the session.
+        table: the table, whose key is the id alone.
+        id: the id, or any other text; PostgreSQL rejects some other texts with an error.
+        unknown: makes the error if there is no such row.
+        how: options of `Session.get`.
+    """
+    row = session.get(table, id, **how) if re.fullmatch(r"[0-9a-f-]{36}", id) else None
+    if row is None:
+        raise unknown()
+    return row
+
+
+def insert_new(session: Session, table: type[Table], rows: list[dict[str, Any]]) -> None:
+    """Adds rows; another process may just have added some of them, which stay as they are."""
+    is_postgresql = session.get_bind().dialect.name == "postgresql"
+    insert = postgresql.insert(table) if is_postgresql else sqlite.insert(table)
+    session.execute(insert.on_conflict_do_nothing(), rows)
 
 
 class Instant(TypeDecorator[datetime]):
