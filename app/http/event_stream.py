@@ -45,7 +45,7 @@ class StreamSettings:
 STREAM = StreamSettings()
 
 EVENT_STREAM_HEADERS = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
-_COMMENT = b": working\n\n"
+COMMENT = b": working\n\n"
 
 
 class EventStream(StreamingResponse):
@@ -95,7 +95,7 @@ class EventStream(StreamingResponse):
                 async with asyncio.timeout(STREAM.pause):
                     await bell.wait()
             if not bell.is_set() and self._begun:
-                await send(_body(_COMMENT))
+                await send(_body(COMMENT))
         bell.clear()
 
     async def _conclude(self, working: asyncio.Task[TaskResult], send: Send) -> None:

@@ -202,18 +202,9 @@ class Dispatcher:
                 if not isinstance(error, StoreUnavailable):
                     logger.exception("unforeseen error")
                 pause = min(2 * pause, DISPATCHER.longest_pause)
-            await self._rung(pause)
+            await self.changes.wait(self._bell, pause)
             if len(self._heap) >= self._executor.slots and not self._draining:
                 await asyncio.sleep(DISPATCHER.gather)
-
-    async def _rung(self, longest: float) -> None:
-        """Waits until there is something to do, at most for a time [s]."""
-        try:
-            async with asyncio.timeout(longest):
-                await self._bell.wait()
-        except TimeoutError:
-            pass
-        self._bell.clear()
 
     async def _exchange(self) -> None:
         await self._store_outcomes()

@@ -11,6 +11,7 @@ from functools import partial
 from fastapi.sse import format_sse_event
 from sqlalchemy.orm import Session
 
+from joulepath.app.http.event_stream import COMMENT, STREAM
 from joulepath.app.jobs.dispatcher import Dispatcher
 from joulepath.app.store import job_events
 from joulepath.app.store.store import Store
@@ -26,13 +27,9 @@ class EventSettings:
     """Time [s] between two queries for events of other services."""
     gather: float = 0.2
     """Least time [s] between two reads for one reader; events in between are sent together."""
-    quiet: float = 15.0
-    """Time [s] without an event after which a comment keeps the stream alive in proxies."""
 
 
 EVENTS = EventSettings()
-
-_COMMENT = b": working\n\n"
 
 
 @dataclass(frozen=True)
@@ -65,9 +62,9 @@ async def events_after(
             if batch.text:
                 quiet = 0.0
                 yield batch.text
-            elif quiet >= EVENTS.quiet:
+            elif quiet >= STREAM.pause:
                 quiet = 0.0
-                yield _COMMENT
+                yield COMMENT
             if batch.over or is_last:
                 return
             # An incomplete batch is the last one.

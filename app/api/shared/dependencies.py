@@ -4,7 +4,7 @@ application's state.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Depends, Request
 
@@ -24,28 +24,13 @@ from joulepath.app.tasks.in_flight import InFlight
 # coroutines, because FastAPI would run plain functions in a thread
 
 
-async def _settings(request: Request) -> Settings:
-    settings: Settings = request.app.state.settings
-    return settings
+def _of_app(name: str) -> Any:
+    """The dependency on what the application's state has under a name."""
 
+    async def of_app(request: Request) -> Any:
+        return getattr(request.app.state, name)
 
-async def _engine(request: Request) -> Engine:
-    engine: Engine = request.app.state.engine
-    return engine
-
-
-async def _client_engine(request: Request) -> ClientEngine:
-    return (await _engine(request)).of_client(client_of(request).name)
-
-
-async def _store(request: Request) -> Store:
-    store: Store = request.app.state.store
-    return store
-
-
-async def _metrics(request: Request) -> Metrics:
-    metrics: Metrics = request.app.state.metrics
-    return metrics
+    return Depends(of_app)
 
 
 async def _client(request: Request) -> Client:
@@ -54,35 +39,31 @@ async def _client(request: Request) -> Client:
 
 ServiceClient = Annotated[Client, Depends(_client)]
 """Who sent the request."""
-
-
-async def _jobs(request: Request) -> Jobs:
-    jobs: Jobs = request.app.state.jobs
-    return jobs
-
-
-async def _cluster(request: Request) -> Cluster | None:
-    cluster: Cluster | None = request.app.state.cluster
-    return cluster
-
-
-ServiceCluster = Annotated[Cluster | None, Depends(_cluster)]
+ServiceCluster = Annotated[Cluster | None, _of_app("cluster")]
 """The cluster that works on jobs; None without one."""
-ServiceJobs = Annotated[Jobs, Depends(_jobs)]
-ServiceSettings = Annotated[Settings, Depends(_settings)]
-ServiceMetrics = Annotated[Metrics, Depends(_metrics)]
-ServiceEngine = Annotated[Engine, Depends(_engine)]
+ServiceJobs = Annotated[Jobs, _of_app("jobs")]
+ServiceSettings = Annotated[Settings, _of_app("settings")]
+ServiceMetrics = Annotated[Metrics, _of_app("metrics")]
+ServiceEngine = Annotated[Engine, _of_app("engine")]
+ServiceStore = Annotated[Store, _of_app("store")]
+ServiceInFlight = Annotated[InFlight, _of_app("in_flight")]
+
+
+async def _client_engine(engine: ServiceEngine, client: ServiceClient) -> ClientEngine:
+    return engine.of_client(client.name)
+
+
 ServiceClientEngine = Annotated[ClientEngine, Depends(_client_engine)]
 """The engine for the requests of the client that sent this one."""
-ServiceStore = Annotated[Store, Depends(_store)]
 
 
 async def _arm_engine(engine: ServiceClientEngine, store: ServiceStore) -> ArmEngine:
     return ArmEngine(engine, store)
 
 
-async def _cache(request: Request, store: ServiceStore, client: ServiceClient) -> AnswerCache:
-    in_flight: InFlight = request.app.state.in_flight
+async def _cache(
+    request: Request, store: ServiceStore, client: ServiceClient, in_flight: ServiceInFlight
+) -> AnswerCache:
     return AnswerCache(store, client.owner, is_fresh(request), in_flight)
 
 

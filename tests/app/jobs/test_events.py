@@ -72,7 +72,7 @@ def test_readers_at_the_same_place_share_one_read(tmp_path: Path) -> None:
 
 
 def test_a_quiet_stream_has_comments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, quiet=0.0))
+    monkeypatch.setattr(events, "STREAM", replace(events.STREAM, pause=0.0))
     monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, look=0.0))
     monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, gather=0.0))
 
