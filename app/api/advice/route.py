@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.advice.request import AdviceRequest
 from joulepath.app.api.advice.task import AdviceAnswer, AdviceTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.problem_lists import CYCLE_PROBLEMS, MOTION_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.stored import UnknownAnswer
-from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -24,13 +22,8 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     response_model=model_of(AdviceAnswer),
     responses=problem_responses(*dict.fromkeys((*MOTION_PROBLEMS, *CYCLE_PROBLEMS)), UnknownAnswer),
 )
-async def advice(
-    request: Request, body: AdviceRequest, settings: ServiceSettings, engine: ServiceArmEngine
-) -> Response:
+async def advice(body: AdviceRequest, tasks: ServiceTasks) -> Response:
     """Computes what else a task could be: a motion over the whole cycle, brakes at rest, a cycle
     without the way home, shorter stops, a lighter tool. Each change is optimised, and listed with
     its energy if it saves something. Nothing is kept."""
-    task = AdviceTask(body, request.state.id)
-    return result_response(
-        await unless_disconnected(request, engine.run(task, settings.max_deadline))
-    )
+    return await tasks.answer(AdviceTask(body, tasks.request_id))

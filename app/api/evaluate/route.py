@@ -8,17 +8,16 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer, EvaluateTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.api.shared.dependencies import ServiceSettings
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater, deadlines
 from joulepath.app.api.shared.parameters import WantedFormat, is_fresh
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.api.shared.query_settings import query_parameters
-from joulepath.app.api.shared.uploads import upload
+from joulepath.app.api.shared.reply import ServiceTasks
+from joulepath.app.api.shared.uploads import received
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import KeyReused, UnknownFigures, UnknownLog
 from joulepath.app.exceptions.transport import UnsupportedMediaType
-from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.handlers import result_response
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
@@ -85,7 +84,7 @@ async def evaluate(
     request: Request,
     wanted: WantedFormat,
     settings: ServiceSettings,
-    engine: ServiceArmEngine,
+    tasks: ServiceTasks,
     later: ServiceLater,
 ) -> Response:
     """The energy of a given motion, per segment and in total, and its violated limits. The motion
@@ -97,19 +96,15 @@ async def evaluate(
     kind = _KINDS.get(declared)
     if kind is None and declared not in UNDECLARED:
         raise UnsupportedMediaType
-    longest = settings.max_deadline
-    with upload() as (file, path):
-        async for chunk in request.stream():
-            file.write(chunk)
+    async with received(request) as (file, path):
         kind = kind or _kind_of(file)
         if kind == "json" and request.query_params:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         if later.wanted and kind == "json":
             body = JobBodyTask(
-                path, deadlines(settings), request.state.id, is_fresh(request), evaluate=True
+                path, deadlines(settings), tasks.request_id, is_fresh(request), evaluate=True
             )
             return await later.respond_with(await later.validated(body))
-        task = EvaluateTask(
-            path, kind, dict(request.query_params), wanted, request.state.id, longest
-        )
-        return result_response(await unless_disconnected(request, engine.run(task, longest)))
+        query, longest = dict(request.query_params), settings.max_deadline
+        task = EvaluateTask(path, kind, query, wanted, tasks.request_id, longest)
+        return await tasks.answer(task)

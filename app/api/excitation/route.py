@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.excitation.task import ExcitationAnswer, ExcitationRequest, ExcitationTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import WantedFormat, deadline_of
+from joulepath.app.api.shared.parameters import WantedFormat
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.stored import UnknownFigures
-from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.optimizer.exceptions import OutsideLimits
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
@@ -31,17 +29,9 @@ _CSV = "t,q1,…,q6,v1,…,v6,a1,…,a6\n0.0,0.0,-1.57,…\n0.008,0.0001,-1.5699
     },
 )
 async def excitation(
-    request: Request,
-    body: ExcitationRequest,
-    wanted: WantedFormat,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
+    body: ExcitationRequest, wanted: WantedFormat, tasks: ServiceTasks
 ) -> Response:
     """A periodic motion from rest to rest for a log with separable friction, rotor inertias and
     base parameters, within all limits and free of collisions. `Accept: text/csv` returns its
     samples as a table for `/evaluate`."""
-    task = ExcitationTask(body, wanted, request.state.id)
-    result = await unless_disconnected(
-        request, engine.run(task, deadline_of(body, settings.max_deadline))
-    )
-    return result_response(result)
+    return await tasks.answer(ExcitationTask(body, wanted, tasks.request_id), body)

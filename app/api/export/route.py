@@ -9,11 +9,10 @@ from fastapi import APIRouter, Path, Request, Response
 
 from joulepath.app.api.export.request import ExportRequest
 from joulepath.app.api.export.task import ExportResult, ExportTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON, is_wanted
 from joulepath.optimizer.evaluate.errors import NotCertified
@@ -83,16 +82,13 @@ async def export(
     request: Request,
     format: Annotated[FormatName, _FORMAT],
     body: ExportRequest,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
+    tasks: ServiceTasks,
 ) -> Response:
     """Writes the motion of an answer as a file for a robot controller. The certificate of the
     motion is computed again for the requested speed; a motion without a valid certificate is not
     exported. No format was run on hardware."""
     as_json = is_wanted(request, JSON)
-    task = ExportTask(body, format, as_json, request.state.id)
-    work = engine.run(task, settings.max_deadline)
-    result = await unless_disconnected(request, work)
+    result = await tasks.result(ExportTask(body, format, as_json, tasks.request_id))
     assert isinstance(result, ExportResult)
     return _response(result)
 

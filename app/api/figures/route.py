@@ -14,7 +14,6 @@ from joulepath.app.api.figures.models import FiguresDetail, FiguresList, Figures
 from joulepath.app.api.figures.request import FiguresDocument
 from joulepath.app.api.figures.task import FiguresTask
 from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
     ServiceClient,
     ServiceSettings,
     ServiceStore,
@@ -22,6 +21,7 @@ from joulepath.app.api.shared.dependencies import (
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.stored import (
     FiguresInUse,
@@ -29,7 +29,6 @@ from joulepath.app.exceptions.stored import (
     TooManyFigures,
     UnknownFigures,
 )
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import is_wanted
 from joulepath.app.schemas.examples.figures import FIGURES, UNKNOWN_ID
@@ -60,15 +59,14 @@ async def put(
     response: Response,
     body: FiguresDocument,
     settings: ServiceSettings,
-    engine: ServiceArmEngine,
+    tasks: ServiceTasks,
     store: ServiceStore,
     client: ServiceClient,
 ) -> FiguresDetail:
     """Stores figures identified on one arm, in the form of `GET /figures/{id}` of this or another
     server. The id follows from the content: the same figures are stored once.
     Their first owner keeps them."""
-    task = FiguresTask(body, request.state.id)
-    result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+    result = await tasks.result(FiguresTask(body, tasks.request_id))
     new = figures.new_figures(body.robot, orjson.loads(result.document), client.owner)
     row, is_new = await store.create(partial(figures.put, figures=new, most=settings.max_figures))
     if is_new:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.ik.task import IKAnswer, IKRequest, IKTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import WantedFormat, deadline_of
+from joulepath.app.api.shared.parameters import WantedFormat
 from joulepath.app.api.shared.problem_lists import POSE_PROBLEMS, WORKER_PROBLEMS
-from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.handlers import result_response
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.http.openapi import problem_responses
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -27,18 +25,10 @@ _CSV = "q1,q2,q3,q4,q5,q6\n0.0,-1.57,1.57,-1.57,-1.57,0.0\n"
         **problem_responses(*WORKER_PROBLEMS, *POSE_PROBLEMS),
     },
 )
-async def solve(
-    request: Request,
-    body: IKRequest,
-    wanted: WantedFormat,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
-) -> Response:
+async def solve(body: IKRequest, wanted: WantedFormat, tasks: ServiceTasks) -> Response:
     """All solutions within the joint ranges, with branch, distance to the limits and smallest
     singular value. A pose with infinitely many configurations (stretched wrist) has some of them,
     with the `free` joints. Every solution has its nearest or colliding pair of bodies: links, tool,
     payload and obstacles. `Accept: text/csv` returns the joint positions as a table for
     `/evaluate`."""
-    task = IKTask(body, request.state.id, wanted)
-    work = engine.run(task, deadline_of(body, settings.max_deadline))
-    return result_response(await unless_disconnected(request, work))
+    return await tasks.answer(IKTask(body, tasks.request_id, wanted), body)

@@ -23,7 +23,7 @@ from joulepath.app.api.shared.parameters import (
     is_fresh,
     set_location,
 )
-from joulepath.app.api.shared.uploads import upload
+from joulepath.app.api.shared.uploads import received
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import Busy, ShuttingDown, WorkerLost
@@ -108,9 +108,7 @@ async def create(
     survives a restart of the service. Requests with a waiting client run before those of jobs."""
     if media_type(request.headers) not in (JSON, *UNDECLARED):
         raise UnsupportedMediaType
-    with upload() as (file, path):
-        async for chunk in request.stream():
-            file.write(chunk)
+    async with received(request) as (_, path):
         task = JobBodyTask(path, deadlines(settings), request.state.id, is_fresh(request))
         result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
     assert isinstance(result, Validated)

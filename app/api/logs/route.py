@@ -14,7 +14,6 @@ from joulepath.app.api.logs.models import LogDetail, LogList, LogPage, LogSummar
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.api.logs.task import ReadLogTask
 from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
     ServiceClient,
     ServiceSettings,
     ServiceStore,
@@ -22,12 +21,12 @@ from joulepath.app.api.shared.dependencies import (
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.api.shared.query_settings import query_parameters, settings_of
-from joulepath.app.api.shared.uploads import upload
+from joulepath.app.api.shared.reply import ServiceTasks
+from joulepath.app.api.shared.uploads import received
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import StoreUnavailable, TooManyLogs, UnknownLog
 from joulepath.app.exceptions.transport import UnsupportedMediaType
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.json_route import UNDECLARED, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import LOG_ID
@@ -76,7 +75,7 @@ async def add(
     request: Request,
     response: Response,
     settings: ServiceSettings,
-    engine: ServiceArmEngine,
+    tasks: ServiceTasks,
     store: ServiceStore,
     client: ServiceClient,
 ) -> LogDetail:
@@ -87,11 +86,10 @@ async def add(
     if declared not in _TAKEN:
         raise UnsupportedMediaType
     asked = settings_of(LogSettings, request)
-    with upload() as (file, path):
-        async for chunk in request.stream():
-            file.write(chunk)
-        task = ReadLogTask(path, asked, settings.max_upload_bytes, request.state.id)
-        result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+    async with received(request) as (file, path):
+        result = await tasks.result(
+            ReadLogTask(path, asked, settings.max_upload_bytes, tasks.request_id)
+        )
         body = await run_in_threadpool(_packed, file)
     log = StoredLog(
         id=new_id(),

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.replay.task import ReplayAnswer, ReplayRequest, ReplayTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import deadline_of
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.stored import UnknownAnswer, UnknownFigures
-from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.optimizer.evaluate.errors import NotCertified
 
@@ -30,12 +27,8 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
         NotCertified,
     ),
 )
-async def replay(
-    request: Request, body: ReplayRequest, settings: ServiceSettings, engine: ServiceArmEngine
-) -> Response:
+async def replay(body: ReplayRequest, tasks: ServiceTasks) -> Response:
     """Plays the motion of an answer in MuJoCo, with a controller, and puts what happens beside what
     the answer says: deviation, torques, contacts and energy. With `perturb`, also on arms that are
     not quite the one planned with, and with what is left of the savings there."""
-    task = ReplayTask(body, request.state.id)
-    work = engine.run(task, deadline_of(body, settings.max_deadline))
-    return result_response(await unless_disconnected(request, work))
+    return await tasks.answer(ReplayTask(body, tasks.request_id), body)

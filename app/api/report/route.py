@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.api.report.request import ReportRequest
 from joulepath.app.api.report.task import ReportTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.problem_lists import CYCLE_PROBLEMS, MOTION_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.report import NoTypst
 from joulepath.app.exceptions.stored import UnknownAnswer
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.placement.errors import NoPlacement
@@ -52,14 +51,11 @@ _FILE: dict[int | str, dict[str, Any]] = {
         ),
     },
 )
-async def report(
-    request: Request, body: ReportRequest, settings: ServiceSettings, engine: ServiceArmEngine
-) -> Response:
+async def report(body: ReportRequest, tasks: ServiceTasks) -> Response:
     """Writes a page about a motion, a cycle or a placement: energy and its parts, savings against
     ways within all limits or other places, costs per shift and year. Request and answer are
     attached, so that `joulepath check` can compute both again."""
-    task = ReportTask(body, request.state.id)
-    result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+    result = await tasks.result(ReportTask(body, tasks.request_id))
     name = f"joulepath-report.{body.format}"
     return Response(
         result.document,

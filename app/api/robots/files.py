@@ -13,17 +13,16 @@ from joulepath.app.api.robots.joint_limits import JointLimitsQuery, JointLimitsT
 from joulepath.app.api.robots.mjcf import MjcfTask
 from joulepath.app.api.robots.pictures import MEDIA_TYPE, PictureTask, digest, kept
 from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
     ServiceClientEngine,
     ServiceSettings,
     ServiceStore,
 )
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import NoMeshes, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.entity_tag import is_known
-from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.store import robots
 from joulepath.models.registry import load_robot, robot_names
@@ -72,15 +71,12 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
         ),
     },
 )
-async def mjcf(
-    request: Request, name: Name, settings: ServiceSettings, engine: ServiceArmEngine
-) -> Response:
+async def mjcf(name: Name, tasks: ServiceTasks) -> Response:
     """The chain of joints from `base` to `flange` with rotor inertias, friction, limits, torque
     motors and the capsules of the links, for MuJoCo. Torques in MuJoCo equal the torques of the
     answers.
     """
-    work = engine.run(MjcfTask(name, request.state.id), settings.max_deadline)
-    return result_response(await unless_disconnected(request, work))
+    return await tasks.answer(MjcfTask(name, tasks.request_id))
 
 
 @router.get(
@@ -104,16 +100,11 @@ async def mjcf(
     },
 )
 async def joint_limits(
-    request: Request,
-    name: Name,
-    query: Annotated[JointLimitsQuery, Query()],
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
+    name: Name, query: Annotated[JointLimitsQuery, Query()], tasks: ServiceTasks
 ) -> Response:
     """Limits on speed and acceleration with a proof: motions within them respect the torque limits
     in every posture, with every payload up to the given mass."""
-    work = engine.run(JointLimitsTask(name, query, request.state.id), settings.max_deadline)
-    return result_response(await unless_disconnected(request, work))
+    return await tasks.answer(JointLimitsTask(name, query, tasks.request_id))
 
 
 @router.get(

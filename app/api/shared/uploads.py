@@ -4,10 +4,12 @@ however the service ends."""
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from tempfile import TemporaryFile
 from typing import BinaryIO
+
+from fastapi import Request
 
 
 @contextmanager
@@ -17,3 +19,12 @@ def upload() -> Iterator[tuple[BinaryIO, str]]:
     """
     with TemporaryFile(prefix="joulepath-", buffering=0) as file:
         yield file, f"/proc/{os.getpid()}/fd/{file.fileno()}"
+
+
+@asynccontextmanager
+async def received(request: Request) -> AsyncIterator[tuple[BinaryIO, str]]:
+    """An `upload` with the body of a request."""
+    with upload() as (file, path):
+        async for chunk in request.stream():
+            file.write(chunk)
+        yield file, path

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
     ServiceClient,
     ServiceSettings,
     ServiceStore,
 )
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
-from joulepath.app.api.shared.parameters import deadline_of
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.api.whatif.answer import WhatifAnswer
 from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.store.store_answers import store_answers
@@ -45,10 +43,9 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     },
 )
 async def whatif(
-    request: Request,
     body: WhatifRequest,
     settings: ServiceSettings,
-    engine: ServiceArmEngine,
+    tasks: ServiceTasks,
     store: ServiceStore,
     client: ServiceClient,
     later: ServiceLater,
@@ -59,8 +56,6 @@ async def whatif(
     motion (`evaluate`) is evaluated only."""
     if later.wanted:
         return await later.respond("whatif", body)
-    task = WhatifTask(body, request.state.id)
-    deadline = deadline_of(body, settings.max_deadline)
-    result = await unless_disconnected(request, engine.run(task, deadline))
+    result = await tasks.result(WhatifTask(body, tasks.request_id), body)
     kind = "evaluate" if body.optimize is None else "optimize"
     return result_response(await store_answers(store, settings, kind, result, client.owner))
