@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import uuid
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from io import StringIO
 from typing import Any
 
 import orjson
@@ -118,9 +120,11 @@ class TaskResult:
         return replace(self, document=first + rest, kept_as=answer_id)
 
     @classmethod
-    def of_csv(cls, table: str, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
-        """A CSV document."""
-        return cls(table.encode(), "text/csv", stored)
+    def of_csv(
+        cls, rows: Iterable[Iterable[Any]], stored: tuple[StoredAnswer, ...] = ()
+    ) -> TaskResult:
+        """A CSV document: see `csv_document`."""
+        return cls(csv_document(rows), "text/csv", stored)
 
 
 def _last_field(answer_id: str | None) -> bytes:
@@ -138,3 +142,10 @@ def json_document(content: Any) -> bytes:
         default=as_json,
         option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_PASSTHROUGH_DATACLASS,
     )
+
+
+def csv_document(rows: Iterable[Iterable[Any]]) -> bytes:
+    """Rows as CSV, the head included; None is an empty cell."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import csv
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from io import StringIO
 from typing import Any
 
 import orjson
 
 from joulepath.app.convert.packed import unpacked
+from joulepath.app.engine.result import csv_document
 from joulepath.app.http.problems import PREFIX
 from joulepath.app.store import jobs
 from joulepath.app.store.job_events import eta, progress
@@ -87,13 +86,13 @@ async def as_lines(store: Store, job_id: str) -> AsyncIterator[bytes]:
 
 async def as_csv(store: Store, job_id: str) -> AsyncIterator[bytes]:
     """The ended requests of a job by index, as a table of their figures."""
-    yield _rows([_COLUMNS])
+    yield csv_document([_COLUMNS])
     last = -1
     while found := await store.read(
         partial(jobs.ended, job_id=job_id, limit=PAGES.rows, after=last)
     ):
         last = found[-1].number
-        yield _rows([_row(request) for request in found])
+        yield csv_document([_row(request) for request in found])
 
 
 def _lines(found: Sequence[tuple[JobRequest, bytes | None]]) -> bytes:
@@ -109,9 +108,3 @@ def _row(request: JobRequest) -> list[Any]:
     own = status(request)
     problem = None if request.problem is None else request.problem["type"].removeprefix(PREFIX)
     return list((own | {"problem": problem}).values())
-
-
-def _rows(rows: Sequence[Sequence[Any]]) -> bytes:
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue().encode()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Iterable
 from dataclasses import asdict
-from io import StringIO
 from typing import Any
 
+from joulepath.app.engine.result import csv_document
 from joulepath.app.schemas import studies as schemas
 from joulepath.app.store.studies import Entry, History, State, energy_of
 from joulepath.app.store.tables import Iteration, Study
@@ -78,18 +78,16 @@ def detail(entry: Entry) -> schemas.IterationDetail:
     )
 
 
-def as_csv(history: History) -> str:
+def as_csv(history: History) -> bytes:
     """The history as CSV, one line per iteration; a null value is an empty cell."""
-    text = StringIO()
-    writer = csv.DictWriter(text, _COLUMNS.values(), lineterminator="\n")
-    writer.writeheader()
+    rows: list[Iterable[Any]] = [_COLUMNS.values()]
     for entry in entries(history):
         row = entry | {
             "created": entry["created"].isoformat(),
             "threshold_met": "true" if entry["threshold_met"] else "false",
         }
-        writer.writerow({column: row[name] for name, column in _COLUMNS.items()})
-    return text.getvalue()
+        rows.append([row[name] for name in _COLUMNS])
+    return csv_document(rows)
 
 
 def _columns_of(iteration: Iteration) -> dict[str, Any]:

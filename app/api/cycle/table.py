@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from io import StringIO
+from collections.abc import Iterator
 
 from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
@@ -12,24 +11,19 @@ from joulepath.optimizer.result.cycle import LegReport
 Row = list[float | str]
 
 
-def to_cycle_csv(found: CycleSolution) -> str:
-    """CSV with the columns t, leg, kind, then q, v, a, tau_motor of every joint, and power.
+def cycle_rows(found: CycleSolution) -> Iterator[Row]:
+    """Rows with the columns t, leg, kind, then q, v, a, tau_motor of every joint, and power.
 
     Units as in the JSON answer. A rest has its mean power, and no torques: motors or brakes may
     hold the arm.
     """
     joints = range(1, found.moves[0].planned.arm.robot.nq + 1)
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     names = ("q", "v", "a", "tau_motor")
-    writer.writerow(
-        ["t", "leg", "kind", *(f"{name}{joint}" for name in names for joint in joints), "power"]
-    )
+    yield ["t", "leg", "kind", *(f"{name}{joint}" for name in names for joint in joints), "power"]
     legs = ((move, leg) for move in found.moves for leg in move.legs(found.objective))
     for number, (move, leg) in enumerate(legs):
         rests = leg.kind in ("dwell", "wait")
-        writer.writerows(_of_rest(leg, number) if rests else _of_move(move, number))
-    return text.getvalue()
+        yield from _of_rest(leg, number) if rests else _of_move(move, number)
 
 
 def _of_move(move: CycleMove, number: int) -> list[Row]:

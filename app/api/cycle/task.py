@@ -10,7 +10,7 @@ from joulepath.app.answers.envelope import Answer, AnswerFigures
 from joulepath.app.api.cycle.arms import arms_of_moves
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
-from joulepath.app.api.cycle.table import to_cycle_csv
+from joulepath.app.api.cycle.table import cycle_rows
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.known_motions import to_kept, to_known_motions
@@ -91,7 +91,7 @@ class CycleTask:
 
     def _result(self, found: CycleSolution) -> TaskResult:
         if self.wanted == "csv":
-            return TaskResult.of_csv(to_cycle_csv(found))
+            return TaskResult.of_csv(cycle_rows(found))
         collector = AnswerCollector()
         answer = cycle_answer(self.request, self.request_id, found, collector)
         stored, asked = collector.stored, sent(self.request)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import reduce
-from io import StringIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
@@ -177,7 +175,7 @@ class EvaluateTask:
         began = Deadline.after(deadline - self.longest)
         found = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
         if self.wanted == "csv":
-            return TaskResult.of_csv(_csv_table(found))
+            return TaskResult.of_csv(_rows(found))
         return TaskResult.of_json(EvaluateAnswer.of(self.request_id, found))
 
     def _evaluate_csv(self, began: Deadline) -> Evaluated:
@@ -269,12 +267,12 @@ def _csv_motion(settings: EvaluateCsvSettings, table: MotionCsv) -> Waypoints | 
     return Recording(table.log(), FIRST_ROW)
 
 
-def _csv_table(found: Evaluated) -> str:
-    """The answer as CSV: one line per segment, and a last line `total`.
+def _rows(found: Evaluated) -> Iterator[Iterable[Any]]:
+    """The answer as a table: one row per segment, and a last row `total`.
 
     Columns have the names of the JSON fields.
     """
-    text, writer = StringIO(), None
+    head: list[str] = []
     rows = [(str(k), each) for k, each in enumerate(found.segments, 1)]
     for name, interval in [*rows, ("total", found.total)]:
         row = {"segment": name, **dict(_flat("", interval))}
@@ -285,11 +283,10 @@ def _csv_table(found: Evaluated) -> str:
         known = interval.energy.electrical.interval
         for end in ("p5", "p95"):
             row[f"electrical.interval.{end}"] = None if known is None else getattr(known, end)
-        if writer is None:
-            writer = csv.DictWriter(text, row.keys(), lineterminator="\n")
-            writer.writeheader()
-        writer.writerow(row)
-    return text.getvalue()
+        if not head:
+            head = list(row)
+            yield head
+        yield (row.get(key) for key in head)
 
 
 def _flat(name: str, value: Any) -> list[tuple[str, Any]]:

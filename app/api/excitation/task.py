@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from io import StringIO
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -126,7 +124,7 @@ class ExcitationTask:
         """The answer of `POST /excitation`, within about `deadline` seconds."""
         found = excite(_problem(self.request, deadline), listener())
         if self.wanted == "csv":
-            return TaskResult.of_csv(_csv(found))
+            return TaskResult.of_csv(_rows(found))
         request, arm = self.request, arm_fields(self.request)
         return TaskResult.of_json(
             ExcitationAnswer(request=self.request_id, robot=request.robot, arm=arm, **vars(found))
@@ -162,11 +160,9 @@ def _problem(request: ExcitationRequest, deadline: float) -> ExcitationProblem:
     )
 
 
-def _csv(found: Excitation) -> str:
-    """CSV with the columns t, then q, v and a of all joints, for `POST /evaluate`."""
-    samples, text = found.trajectory, StringIO()
+def _rows(found: Excitation) -> list[list[Any]]:
+    """Rows with the columns t, then q, v and a of all joints, for `POST /evaluate`."""
+    samples = found.trajectory
     joints = range(1, samples.q.shape[1] + 1)
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["t", *(f"{name}{joint}" for name in "qva" for joint in joints)])
-    writer.writerows(np.hstack([samples.t[:, None], samples.q, samples.v, samples.a]).tolist())
-    return text.getvalue()
+    table = np.hstack([samples.t[:, None], samples.q, samples.v, samples.a])
+    return [["t", *(f"{name}{joint}" for name in "qva" for joint in joints)], *table.tolist()]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from io import StringIO
-from typing import Literal
+from typing import Any, Literal
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.convert.arm import robot_named
@@ -84,7 +82,7 @@ class IKTask:
             arm, pose = to_ik_arm(request, robot), to_target_pose(request.pose, robot)
         found = inverse_kinematics(arm, pose, request.windings, end.left)
         if self.wanted == "csv":
-            return TaskResult.of_csv(_table(found, robot.nq))
+            return TaskResult.of_csv(_rows(found, robot.nq))
         answer = IKAnswer(
             request=self.request_id,
             robot=request.robot,
@@ -94,13 +92,9 @@ class IKTask:
         return TaskResult.of_json(answer)
 
 
-def _table(found: IKSolutions, nq: int) -> str:
-    """CSV with the columns q1 … qn [rad] and one line per configuration, for `POST /evaluate`."""
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([f"q{joint}" for joint in range(1, nq + 1)])
-    writer.writerows(each.q.tolist() for each in found)
-    return text.getvalue()
+def _rows(found: IKSolutions, nq: int) -> list[list[Any]]:
+    """Rows with the columns q1 … qn [rad], one per configuration, for `POST /evaluate`."""
+    return [[f"q{joint}" for joint in range(1, nq + 1)], *(each.q.tolist() for each in found)]
 
 
 def to_ik_arm(request: IKRequest, robot: Robot) -> Arm:

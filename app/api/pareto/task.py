@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Iterable
 from dataclasses import dataclass
-from io import StringIO
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from joulepath.app.answers.declared import as_json
 from joulepath.app.answers.envelope import Answer
@@ -148,7 +147,7 @@ class ParetoTask:
             path = collector.add(OptimizeAnswer.of(asked, self.request_id, motion, arm))
             points.append(ParetoPoint.of(motion, asked.objective, path))
         if self.wanted == "csv":
-            return TaskResult.of_csv(_table(points), collector.stored)
+            return TaskResult.of_csv(_rows(points), collector.stored)
         answer = ParetoAnswer(
             request=self.request_id,
             robot=asked.robot,
@@ -163,10 +162,6 @@ class ParetoTask:
         return TaskResult.of_json(answer, collector.stored)
 
 
-def _table(points: list[ParetoPoint]) -> str:
-    """CSV with one line per point; columns are named as in the JSON answer."""
-    text = StringIO()
-    writer = csv.DictWriter(text, shown_fields(ParetoPoint), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(map(as_json, points))
-    return text.getvalue()
+def _rows(points: list[ParetoPoint]) -> list[Iterable[Any]]:
+    """One row per point; columns are named as in the JSON answer."""
+    return [shown_fields(ParetoPoint), *(as_json(point).values() for point in points)]
