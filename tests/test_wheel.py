@@ -8,7 +8,6 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import sysconfig
@@ -22,6 +21,7 @@ from pathlib import Path
 import pytest
 
 from joulepath.optimizer.native.build import LIBRARY
+from tests.app.live import free_port
 from tests.app.requests import move
 
 ROOT = Path(__file__).parents[1]
@@ -181,9 +181,7 @@ def test_the_service_starts_from_anywhere(
     environment: Path, tmp_path: Path, command: tuple[str, ...]
 ) -> None:
     """Ready, with a database that its migrations have made, and ended by SIGTERM."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     settings = {
         "JOULEPATH_HOST": "127.0.0.1",
         "JOULEPATH_PORT": str(port),

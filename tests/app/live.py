@@ -170,6 +170,13 @@ class Server:
             time.sleep(0.05)
 
 
+def free_port() -> int:
+    """A port that no program of this machine has."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
 @contextmanager
 def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Iterator[Server]:
     """A server with these settings, by default waited for until it is warm and with an empty
@@ -179,9 +186,7 @@ def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Itera
     processes.
     """
     module = "tests.app.recorded" if recorded else "joulepath.app"
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "log")
         settings = {

@@ -8,7 +8,6 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -20,7 +19,17 @@ import pytest
 from joulepath.app.api.cluster import ClusterState
 from joulepath.app.exceptions.queue import ClusterUnavailable
 from tests.app.job_clients import ended, evaluation, over, sent, shown
-from tests.app.live import EXIT, GRACE, ROOT, Server, alive, processor_time, serving, until
+from tests.app.live import (
+    EXIT,
+    GRACE,
+    ROOT,
+    Server,
+    alive,
+    free_port,
+    processor_time,
+    serving,
+    until,
+)
 from tests.app.problems import checked
 from tests.app.requests import long_search, move
 from tests.app.test_live_jobs import check_each_once, mixture
@@ -72,9 +81,7 @@ def computing(log: Path) -> list[int]:
 
 
 def test_what_is_killed_loses_and_doubles_nothing(tmp_path: Path) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     address = f"tcp://127.0.0.1:{port}"
     with ExitStack() as stack:
         dask = stack.enter_context(scheduler(tmp_path, port))

@@ -32,7 +32,7 @@ from joulepath.optimizer.native.library_cache import CacheSettings
 from tests.app.cluster.test_link import scheduler_process
 from tests.app.forks import run
 from tests.app.job_clients import ended, evaluation, over, sent, shown
-from tests.app.live import ROOT, WARM_UP, serving, until
+from tests.app.live import ROOT, WARM_UP, free_port, serving, until
 from tests.app.problems import checked
 from tests.app.requests import move
 from tests.app.test_live_cluster import machines, process
@@ -47,12 +47,6 @@ ANSWERED = 120.0  # s
 in_a_repository = pytest.mark.skipif(
     not (ROOT / ".git").exists(), reason="there is no repository to clone"
 )
-
-
-def free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
 
 
 @contextmanager

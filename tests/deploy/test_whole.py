@@ -25,7 +25,7 @@ import pytest
 from joulepath.app.exceptions.access import CrossSite, Unauthenticated, WrongHost
 from tests.app.access.test_key_file import add
 from tests.app.databases import postgres, why_no_postgres
-from tests.app.live import ANSWER, ROOT, Server, serving, until
+from tests.app.live import ANSWER, ROOT, Server, free_port, serving, until
 from tests.app.requests import move
 from tests.app.routes.test_problems import refused
 
@@ -53,12 +53,6 @@ class Whole:
         return self.client.request(
             method, self.url + path, json=body, headers={"Host": host, **headers}
         )
-
-
-def free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
 
 
 def certificate(folder: Path) -> None:
