@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath.app.store.store import Store
+from tests.app.databases import opened
 from tests.app.live import GRACE, Server, serving
 from tests.app.recorded import recorded_service
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    """What runs the tests that are coroutines."""
+    return "asyncio"
+
+
+@pytest.fixture
+def url(tmp_path: Path) -> str:
+    """An empty database."""
+    return f"sqlite:///{tmp_path}/joulepath.db"
+
+
+@pytest.fixture
+async def store(url: str) -> AsyncIterator[Store]:
+    """The store of an empty database."""
+    async with opened(url) as store:
+        yield store
 
 
 @pytest.fixture(scope="session")

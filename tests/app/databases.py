@@ -7,17 +7,29 @@ from __future__ import annotations
 import os
 import pwd
 import shutil
-import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from joulepath.app.store.store import Store
+from tests.app.live import free_port
+
 START = 30.0
 """Until a new PostgreSQL server takes connections, at most [s]."""
+
+
+@asynccontextmanager
+async def opened(url: str) -> AsyncIterator[Store]:
+    """The store of a database."""
+    store = Store(url)
+    try:
+        yield store
+    finally:
+        await store.close()
 
 
 def _binary(name: str) -> Path | None:
@@ -113,9 +125,7 @@ def postgres() -> Iterator[Postgres]:
             stdout=subprocess.DEVNULL,
             cwd=folder,
         )
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
+        port = free_port()
         server = Postgres(folder, port)
         server.start()
         try:

@@ -4,6 +4,7 @@ service runs on it.
 
 from __future__ import annotations
 
+import asyncio
 import os
 import shutil
 import sqlite3
@@ -15,10 +16,8 @@ from pathlib import Path
 import pytest
 
 from joulepath.app.store import studies
-from joulepath.app.store.store import Store
-from tests.app.databases import postgres, why_no_postgres
+from tests.app.databases import opened, postgres, why_no_postgres
 from tests.app.live import ROOT, Server, serving
-from tests.app.store.test_store import with_store
 
 SCRIPT = ROOT / "deploy" / "backup.sh"
 BEFORE, MEANWHILE = 30, 30
@@ -62,14 +61,11 @@ def back_up_under_load(server: Server, url: str, file: Path) -> list[str]:
     return before
 
 
-def assert_all_there(url: str, ids: list[str]) -> None:
+async def assert_all_there(url: str, ids: list[str]) -> None:
     """As the service reads them, from a database that it migrates if need be."""
-
-    async def read(store: Store) -> None:
+    async with opened(url) as store:
         for id in ids:
             await store.read(partial(studies.history, study_id=id))
-
-    with_store(url, read)
 
 
 @pytest.mark.long
@@ -83,7 +79,7 @@ def test_sqlite_under_load(tmp_path: Path) -> None:
     with sqlite3.connect(file) as copy:
         assert copy.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
         assert copy.execute("SELECT count(*) FROM studies").fetchone()[0] >= BEFORE + MEANWHILE
-    assert_all_there(f"sqlite:///{file}", ids)
+    asyncio.run(assert_all_there(f"sqlite:///{file}", ids))
 
 
 def test_a_backup_that_fails_leaves_the_last_one(tmp_path: Path) -> None:
@@ -108,4 +104,4 @@ def test_postgresql_under_load(tmp_path: Path) -> None:
             ["psql", database.url, "--quiet", "--command", "CREATE DATABASE restored"], check=True
         )
         subprocess.run(["pg_restore", "--dbname", empty, "--no-owner", file], check=True)
-        assert_all_there(empty, ids)
+        asyncio.run(assert_all_there(empty, ids))

@@ -8,15 +8,13 @@ import asyncio
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-import dask
 import pytest
 from distributed import Scheduler, Worker
 
@@ -32,7 +30,7 @@ from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.exceptions import OutsideLimits
 from joulepath.optimizer.progress import Told
 from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId
-from tests.app.live import ROOT, alive
+from tests.app.live import ROOT, alive, free_port
 
 PATIENCE = 120.0
 """What a busy machine may take for anything below [s]; no test waits for it to pass."""
@@ -45,9 +43,9 @@ async def until(condition: Callable[[], bool]) -> None:
             await asyncio.sleep(0.01)
 
 
-def machine(scheduler: Scheduler, workers: int = 1) -> Worker:
+def machine(scheduler: str, workers: int = 1) -> Worker:
     return Worker(
-        scheduler.address,
+        scheduler,
         nthreads=workers,
         memory_limit=0,
         preload=["joulepath.app.cluster"],
@@ -55,28 +53,34 @@ def machine(scheduler: Scheduler, workers: int = 1) -> Worker:
     )
 
 
-def with_cluster(
-    test: Callable[[Cluster, Scheduler], Awaitable[None]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Runs a test against a cluster of one machine with one worker, which is not warm for any
-    robot.
-    """
+@asynccontextmanager
+async def linked(address: str) -> AsyncIterator[Cluster]:
+    """A link to a scheduler."""
+    cluster = Cluster(address)
+    cluster.start()
+    try:
+        yield cluster
+    finally:
+        await cluster.stop()
+
+
+@pytest.fixture
+async def scheduler(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Scheduler]:
+    """A scheduler with one machine of one worker, which is not warm for any robot."""
     monkeypatch.setenv("JOULEPATH_ROBOTS", "")
+    async with (
+        Scheduler(host="127.0.0.1", port=0, dashboard=False) as scheduler,
+        machine(scheduler.address),
+    ):
+        yield scheduler
 
-    async def run() -> None:
-        async with (
-            Scheduler(host="127.0.0.1", port=0, dashboard=False) as scheduler,
-            machine(scheduler),
-        ):
-            cluster = Cluster(scheduler.address)
-            cluster.start()
-            try:
-                await until(lambda: cluster.slots == LINK.per_process)
-                await test(cluster, scheduler)
-            finally:
-                await cluster.stop()
 
-    asyncio.run(run())
+@pytest.fixture
+async def cluster(scheduler: Scheduler) -> AsyncIterator[Cluster]:
+    """A link to the scheduler and its machine."""
+    async with linked(scheduler.address) as cluster:
+        await until(lambda: cluster.slots == LINK.per_process)
+        yield cluster
 
 
 def start(cluster: Cluster, task: Task) -> asyncio.Task[int]:
@@ -93,167 +97,143 @@ def hold(folder: Path) -> Hold:
     return Hold(folder)
 
 
-def test_results_errors_and_what_is_found_come_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def test(cluster: Cluster, _: Scheduler) -> None:
-        told: list[Told] = []
-        first = int((await result_of(cluster.run, Count(100), LONG, tell=told.append)).document)
-        await until(lambda: len(told) == 100)
-        assert told == Count(100).told
-        assert first == await start(cluster, ProcessId()), "the same warm process"
-        limits = OutsideLimits("start", 1, 9.0, -1.0, 1.0)
-        with pytest.raises(OutsideLimits) as raised:
-            await result_of(cluster.run, Fail(limits), LONG)
-        assert vars(raised.value) == vars(limits)
-        with pytest.raises(InternalError):
-            await result_of(cluster.run, Fail(ZeroDivisionError("caller-secret")), LONG)
-        with pytest.raises(WorkerLost):
-            await result_of(cluster.run, Die(), LONG)
-        assert first != await start(cluster, ProcessId()), "another one in its place"
-
-    with_cluster(test, monkeypatch)
+async def test_results_errors_and_what_is_found_come_back(cluster: Cluster) -> None:
+    told: list[Told] = []
+    first = int((await result_of(cluster.run, Count(100), LONG, tell=told.append)).document)
+    await until(lambda: len(told) == 100)
+    assert told == Count(100).told
+    assert first == await start(cluster, ProcessId()), "the same warm process"
+    limits = OutsideLimits("start", 1, 9.0, -1.0, 1.0)
+    with pytest.raises(OutsideLimits) as raised:
+        await result_of(cluster.run, Fail(limits), LONG)
+    assert vars(raised.value) == vars(limits)
+    with pytest.raises(InternalError):
+        await result_of(cluster.run, Fail(ZeroDivisionError("caller-secret")), LONG)
+    with pytest.raises(WorkerLost):
+        await result_of(cluster.run, Die(), LONG)
+    assert first != await start(cluster, ProcessId()), "another one in its place"
 
 
-def test_a_cancel_kills_what_runs_and_what_waits_never_begins(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+async def test_a_cancel_kills_what_runs_and_what_waits_never_begins(
+    tmp_path: Path, cluster: Cluster
 ) -> None:
     """Dask itself lets a task that runs go on to its end."""
-
-    async def test(cluster: Cluster, _: Scheduler) -> None:
-        process = await start(cluster, ProcessId())
-        running = start(cluster, hold(tmp_path / "runs"))
-        await until((tmp_path / "runs" / "started").exists)
-        waiting = start(cluster, hold(tmp_path / "waits"))
-        await asyncio.sleep(0)
-        waiting.cancel()
-        running.cancel()
-        await until(lambda: not alive(process))
-        assert await start(cluster, ProcessId()) != process
-        assert not (tmp_path / "waits" / "started").exists()
-
-    with_cluster(test, monkeypatch)
+    process = await start(cluster, ProcessId())
+    running = start(cluster, hold(tmp_path / "runs"))
+    await until((tmp_path / "runs" / "started").exists)
+    waiting = start(cluster, hold(tmp_path / "waits"))
+    await asyncio.sleep(0)
+    waiting.cancel()
+    running.cancel()
+    await until(lambda: not alive(process))
+    assert await start(cluster, ProcessId()) != process
+    assert not (tmp_path / "waits" / "started").exists()
 
 
-def test_what_a_service_leaves_behind_is_stopped(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+async def test_what_a_service_leaves_behind_is_stopped(
+    tmp_path: Path, cluster: Cluster, scheduler: Scheduler
 ) -> None:
-    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        other = Cluster(scheduler.address)
-        other.start()
-        await until(lambda: other.slots == LINK.per_process)
-        process = await start(cluster, ProcessId())
-        orphan = start(other, hold(tmp_path / "orphan"))
-        await until((tmp_path / "orphan" / "started").exists)
-        assert other._keeper is not None
-        other._keeper.cancel()  # its connection ends, as that of a service that is killed
-        await until(lambda: not alive(process))
-        with pytest.raises(ClusterUnavailable):
-            await orphan
-        await other.stop()
-
-    with_cluster(test, monkeypatch)
+    other = Cluster(scheduler.address)
+    other.start()
+    await until(lambda: other.slots == LINK.per_process)
+    process = await start(cluster, ProcessId())
+    orphan = start(other, hold(tmp_path / "orphan"))
+    await until((tmp_path / "orphan" / "started").exists)
+    assert other._keeper is not None
+    other._keeper.cancel()  # its connection ends, as that of a service that is killed
+    await until(lambda: not alive(process))
+    with pytest.raises(ClusterUnavailable):
+        await orphan
+    await other.stop()
 
 
-def test_work_of_a_machine_that_stops_is_done_elsewhere(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+async def test_work_of_a_machine_that_stops_is_done_elsewhere(
+    tmp_path: Path, cluster: Cluster, scheduler: Scheduler
 ) -> None:
-    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        process = await start(cluster, ProcessId())
-        running = start(cluster, hold(tmp_path / "runs"))
+    process = await start(cluster, ProcessId())
+    running = start(cluster, hold(tmp_path / "runs"))
+    await until((tmp_path / "runs" / "started").exists)
+    async with machine(scheduler.address, workers=2):
+        await until(lambda: cluster.slots == 3 * LINK.per_process)
+        (tmp_path / "runs" / "started").unlink()
+        first = next(address for address, count in cluster.workers.items() if count == 1)
+        scheduler.close_worker(first)
         await until((tmp_path / "runs" / "started").exists)
-        async with machine(scheduler, workers=2):
-            await until(lambda: cluster.slots == 3 * LINK.per_process)
-            (tmp_path / "runs" / "started").unlink()
-            first = next(address for address, count in cluster.workers.items() if count == 1)
-            scheduler.close_worker(first)
-            await until((tmp_path / "runs" / "started").exists)
-            (tmp_path / "runs" / "released").touch()
-            assert await running != process
-            assert not alive(process)
-            await until(lambda: cluster.slots == 2 * LINK.per_process)
-
-    with_cluster(test, monkeypatch)
+        (tmp_path / "runs" / "released").touch()
+        assert await running != process
+        assert not alive(process)
+        await until(lambda: cluster.slots == 2 * LINK.per_process)
 
 
-def test_a_scheduler_that_goes_and_comes_back(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+async def test_a_scheduler_that_goes_and_comes_back(
+    tmp_path: Path, cluster: Cluster, scheduler: Scheduler
 ) -> None:
-    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        running = start(cluster, hold(tmp_path / "runs"))
-        await until((tmp_path / "runs" / "started").exists)
-        port = scheduler.port
-        await scheduler.close()
-        with pytest.raises(ClusterUnavailable):
-            await running
-        await until(lambda: cluster.slots == 0)
-        with pytest.raises(ClusterUnavailable):
-            await result_of(cluster.run, ProcessId(), LONG)
-        with pytest.raises(ClusterUnavailable):
-            assert cluster.workers
-        async with Scheduler(host="127.0.0.1", port=port, dashboard=False) as again, machine(again):
-            await until(lambda: cluster.slots == LINK.per_process)
-            await start(cluster, ProcessId())
+    running = start(cluster, hold(tmp_path / "runs"))
+    await until((tmp_path / "runs" / "started").exists)
+    port = scheduler.port
+    await scheduler.close()
+    with pytest.raises(ClusterUnavailable):
+        await running
+    await until(lambda: cluster.slots == 0)
+    with pytest.raises(ClusterUnavailable):
+        await result_of(cluster.run, ProcessId(), LONG)
+    with pytest.raises(ClusterUnavailable):
+        assert cluster.workers
+    async with (
+        Scheduler(host="127.0.0.1", port=port, dashboard=False) as again,
+        machine(again.address),
+    ):
+        await until(lambda: cluster.slots == LINK.per_process)
+        await start(cluster, ProcessId())
 
-    with_cluster(test, monkeypatch)
 
-
-def test_workers_of_others_get_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        async with Worker(scheduler.address, nthreads=4, dashboard=False):
-            await asyncio.gather(*(start(cluster, ProcessId()) for _ in range(6)))
-            assert list(cluster.workers.values()) == [1]
-
-    with_cluster(test, monkeypatch)
+async def test_workers_of_others_get_nothing(cluster: Cluster, scheduler: Scheduler) -> None:
+    async with Worker(scheduler.address, nthreads=4, dashboard=False):
+        await asyncio.gather(*(start(cluster, ProcessId()) for _ in range(6)))
+        assert list(cluster.workers.values()) == [1]
 
 
 def short(task: Task, ended: list[Ended]) -> Work:
     return Work(task, LONG, ended.append, expected=0.01)
 
 
-def test_short_works_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_short_works_go_together(cluster: Cluster, scheduler: Scheduler) -> None:
     """One that dies takes none of the others with it, and what each finds gets to those who listen
     to it.
     """
-
-    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        ended, told = list[Ended](), list[Told]()
-        works = [short(task, ended) for task in (ProcessId(), Count(3), Die(), ProcessId())]
-        works[1].tell = told.append
-        before = len(scheduler.tasks)
-        running = asyncio.create_task(cluster.run(taking(*works)))
-        await until(lambda: len(scheduler.tasks) > before or running.done())
-        assert len(scheduler.tasks) <= before + 1, "one task of Dask"
-        await running
-        first, counted, died, last = ended
-        assert isinstance(died, WorkerLost)
-        assert isinstance(first, TaskResult) and isinstance(last, TaskResult)
-        assert counted == first != last
-        await until(lambda: len(told) == 3)
-
-    with_cluster(test, monkeypatch)
+    ended, told = list[Ended](), list[Told]()
+    works = [short(task, ended) for task in (ProcessId(), Count(3), Die(), ProcessId())]
+    works[1].tell = told.append
+    before = len(scheduler.tasks)
+    running = asyncio.create_task(cluster.run(taking(*works)))
+    await until(lambda: len(scheduler.tasks) > before or running.done())
+    assert len(scheduler.tasks) <= before + 1, "one task of Dask"
+    await running
+    first, counted, died, last = ended
+    assert isinstance(died, WorkerLost)
+    assert isinstance(first, TaskResult) and isinstance(last, TaskResult)
+    assert counted == first != last
+    await until(lambda: len(told) == 3)
 
 
-def test_those_whose_machine_died_are_tried_one_by_one(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+async def test_those_whose_machine_died_are_tried_one_by_one(
+    tmp_path: Path, cluster: Cluster, scheduler: Scheduler
 ) -> None:
     """One of them may be what machines die of."""
-
-    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        ended = list[Ended]()
-        (first,) = cluster.workers
-        running = asyncio.create_task(
-            cluster.run(taking(short(hold(tmp_path), ended), short(ProcessId(), ended)))
-        )
+    scheduler.allowed_failures = 0
+    ended = list[Ended]()
+    (first,) = cluster.workers
+    running = asyncio.create_task(
+        cluster.run(taking(short(hold(tmp_path), ended), short(ProcessId(), ended)))
+    )
+    await until((tmp_path / "started").exists)
+    async with machine(scheduler.address):
+        (tmp_path / "started").unlink()
+        scheduler.close_worker(first)
         await until((tmp_path / "started").exists)
-        async with machine(scheduler):
-            (tmp_path / "started").unlink()
-            scheduler.close_worker(first)
-            await until((tmp_path / "started").exists)
-            (tmp_path / "released").touch()
-            await running
-            assert [type(each) for each in ended] == [TaskResult] * 2
-
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        with_cluster(test, monkeypatch)
+        (tmp_path / "released").touch()
+        await running
+        assert [type(each) for each in ended] == [TaskResult] * 2
 
 
 @contextmanager
@@ -266,9 +246,7 @@ def scheduler_process(
     if not (folder / "joulepath").exists() and "PYTHONPATH" not in environment:
         # the one that is installed is hidden
         (folder / "joulepath.py").write_text("raise ImportError('there is none')\n")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     command = [
         "-m",
         "distributed.cli.dask_scheduler",
@@ -327,80 +305,55 @@ def other_version(folder: Path) -> None:
         pytest.param("another", "has another version", marks=pytest.mark.long),
     ],
 )
-def test_a_scheduler_without_this_version_gets_nothing(
+async def test_a_scheduler_without_this_version_gets_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, there: str, reason: str
 ) -> None:
     """It reads what it passes on, and would fail every request."""
-
-    async def run(address: str) -> None:
-        cluster = Cluster(address)
-        cluster.start()
-        try:
-            await refused_by(cluster, caplog, reason)
-        finally:
-            await cluster.stop()
-
     if there == "another":
         other_version(tmp_path)
     with scheduler_process(tmp_path) as (_, address):
-        asyncio.run(run(address))
+        async with linked(address) as cluster:
+            await refused_by(cluster, caplog, reason)
 
 
-def test_a_machine_of_another_version_gets_nothing(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+async def test_a_machine_of_another_version_gets_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    cluster: Cluster,
+    scheduler: Scheduler,
 ) -> None:
-    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
-        monkeypatch.setattr(app_machine, "resource", lambda: f"{RESOURCES}another")
-        async with machine(scheduler, workers=4) as other:
-            await until(lambda: len(scheduler.workers) == 2)
-            monkeypatch.undo()
-            await until(
-                lambda: any("another version" in record.message for record in caplog.records)
-            )
-            assert cluster.slots == LINK.per_process
-            pids = await asyncio.gather(*(start(cluster, ProcessId()) for _ in range(6)))
-            assert len(set(pids)) == 1
-            assert other.address not in cluster.workers
-        await asyncio.sleep(3 * LINK.look)
-        (record,) = (record for record in caplog.records if "another version" in record.message)
-        assert vars(record)["machines"] == [other.address]
-
-    with_cluster(test, monkeypatch)
+    monkeypatch.setattr(app_machine, "resource", lambda: f"{RESOURCES}another")
+    async with machine(scheduler.address, workers=4) as other:
+        await until(lambda: len(scheduler.workers) == 2)
+        monkeypatch.undo()
+        await until(lambda: any("another version" in record.message for record in caplog.records))
+        assert cluster.slots == LINK.per_process
+        pids = await asyncio.gather(*(start(cluster, ProcessId()) for _ in range(6)))
+        assert len(set(pids)) == 1
+        assert other.address not in cluster.workers
+    await asyncio.sleep(3 * LINK.look)
+    (record,) = (record for record in caplog.records if "another version" in record.message)
+    assert vars(record)["machines"] == [other.address]
 
 
 @pytest.mark.long
-def test_a_scheduler_that_hangs_and_goes_on(
+async def test_a_scheduler_that_hangs_and_goes_on(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Its connections stay open, and say nothing."""
     monkeypatch.setattr(link, "LINK", replace(link.LINK, patience=1.0))
     monkeypatch.setenv("JOULEPATH_ROBOTS", "")
-
-    async def run(process: subprocess.Popen[bytes], address: str) -> None:
-        cluster = Cluster(address)
-        cluster.start()
-        try:
-            async with Worker(
-                address,
-                nthreads=1,
-                memory_limit=0,
-                preload=["joulepath.app.cluster"],
-                dashboard=False,
-            ):
-                await until(lambda: cluster.slots == LINK.per_process)
-                running = start(cluster, hold(tmp_path / "runs"))
-                await until((tmp_path / "runs" / "started").exists)
-                process.send_signal(signal.SIGSTOP)
-                await until(lambda: cluster.slots == 0)
-                with pytest.raises(ClusterUnavailable):
-                    await running
-                with pytest.raises(ClusterUnavailable):
-                    await result_of(cluster.run, ProcessId(), LONG)
-                process.send_signal(signal.SIGCONT)
-                await until(lambda: cluster.slots == LINK.per_process)
-                await start(cluster, ProcessId())
-        finally:
-            await cluster.stop()
-
     with scheduler_process(tmp_path, PYTHONPATH=str(ROOT)) as (process, address):
-        asyncio.run(run(process, address))
+        async with linked(address) as cluster, machine(address):
+            await until(lambda: cluster.slots == LINK.per_process)
+            running = start(cluster, hold(tmp_path / "runs"))
+            await until((tmp_path / "runs" / "started").exists)
+            process.send_signal(signal.SIGSTOP)
+            await until(lambda: cluster.slots == 0)
+            with pytest.raises(ClusterUnavailable):
+                await running
+            with pytest.raises(ClusterUnavailable):
+                await result_of(cluster.run, ProcessId(), LONG)
+            process.send_signal(signal.SIGCONT)
+            await until(lambda: cluster.slots == LINK.per_process)
+            await start(cluster, ProcessId())

@@ -11,8 +11,8 @@ import pytest
 
 from joulepath.app.engine.fair_queue import PATIENCE
 from joulepath.app.exceptions.queue import Busy, TooManyRequests
+from tests.app.engine.bench import LONG, Bench, settings, until
 from tests.app.engine.simple_tasks import Hold, ProcessId
-from tests.app.engine.test_pool import LONG, Bench, until, with_engine
 
 
 async def held(bench: Bench, folder: Path, client: str) -> tuple[asyncio.Task[Any], Path]:
@@ -35,125 +35,115 @@ async def waiting(bench: Bench, client: str, name: str, ended: list[str]) -> asy
     return task
 
 
-def test_clients_are_served_in_turn(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[str] = []
-        running, release = await held(bench, tmp_path / "a", "a")
-        tasks = [await waiting(bench, "a", f"a{k}", ended) for k in range(3)]
-        tasks += [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
-        tasks.append(await waiting(bench, "c", "c0", ended))
-        release.touch()
-        await asyncio.gather(running, *tasks)
-        assert ended == ["a0", "b0", "c0", "a1", "b1", "a2"]
-
-    with_engine(tmp_path, test, queue_size=10)
+@settings(queue_size=10)
+async def test_clients_are_served_in_turn(tmp_path: Path, bench: Bench) -> None:
+    ended: list[str] = []
+    running, release = await held(bench, tmp_path / "a", "a")
+    tasks = [await waiting(bench, "a", f"a{k}", ended) for k in range(3)]
+    tasks += [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
+    tasks.append(await waiting(bench, "c", "c0", ended))
+    release.touch()
+    await asyncio.gather(running, *tasks)
+    assert ended == ["a0", "b0", "c0", "a1", "b1", "a2"]
 
 
-def test_who_waits_and_who_works_is_counted(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[str] = []
-        queue = bench.engine.queue
-        assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
-        running, release = await held(bench, tmp_path / "a", "a")
-        tasks = [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
-        assert [place.client for place in queue.waiting] == ["b", "b"] and queue.busy == 1
-        assert queue.oldest > 0
-        tasks[0].cancel()
-        await asyncio.wait(tasks[:1])
-        assert len(queue.waiting) == 1, "who leaves waits no more"
-        release.touch()
-        await asyncio.gather(running, tasks[1])
-        assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
-
-    with_engine(tmp_path, test, queue_size=10)
+@settings(queue_size=10)
+async def test_who_waits_and_who_works_is_counted(tmp_path: Path, bench: Bench) -> None:
+    ended: list[str] = []
+    queue = bench.engine.queue
+    assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
+    running, release = await held(bench, tmp_path / "a", "a")
+    tasks = [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
+    assert [place.client for place in queue.waiting] == ["b", "b"] and queue.busy == 1
+    assert queue.oldest > 0
+    tasks[0].cancel()
+    await asyncio.wait(tasks[:1])
+    assert len(queue.waiting) == 1, "who leaves waits no more"
+    release.touch()
+    await asyncio.gather(running, tasks[1])
+    assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
 
 
-def test_a_client_without_a_worker_comes_before_one_that_has_some(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[str] = []
-        first, release_first = await held(bench, tmp_path / "first", "a")
-        second, release_second = await held(bench, tmp_path / "second", "b")
-        tasks = [await waiting(bench, "a", "a0", ended), await waiting(bench, "c", "c0", ended)]
-        release_second.touch()
-        await asyncio.gather(second, *tasks)
-        assert ended == ["c0", "a0"]
-        release_first.touch()
-        await first
+@settings(workers=2, queue_size=10)
+async def test_a_client_without_a_worker_comes_before_one_that_has_some(
+    tmp_path: Path, bench: Bench
+) -> None:
+    ended: list[str] = []
+    first, release_first = await held(bench, tmp_path / "first", "a")
+    second, release_second = await held(bench, tmp_path / "second", "b")
+    tasks = [await waiting(bench, "a", "a0", ended), await waiting(bench, "c", "c0", ended)]
+    release_second.touch()
+    await asyncio.gather(second, *tasks)
+    assert ended == ["c0", "a0"]
+    release_first.touch()
+    await first
 
-    with_engine(tmp_path, test, workers=2, queue_size=10)
 
-
-def test_one_client_has_its_share_of_the_queue(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[str] = []
-        running, release = await held(bench, tmp_path / "a", "a")
-        tasks = [await waiting(bench, "a", "a0", ended)]
-        with pytest.raises(TooManyRequests):
-            await bench.engine.run(ProcessId(), LONG, "a")
-        tasks += [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
-        with pytest.raises(Busy) as refused:
-            await bench.engine.run(ProcessId(), LONG, "c")
-        assert not isinstance(refused.value, TooManyRequests)
-        release.touch()
-        await asyncio.gather(running, *tasks)
+@settings(queue_size=3, client_requests=2)
+async def test_one_client_has_its_share_of_the_queue(tmp_path: Path, bench: Bench) -> None:
+    ended: list[str] = []
+    running, release = await held(bench, tmp_path / "a", "a")
+    tasks = [await waiting(bench, "a", "a0", ended)]
+    with pytest.raises(TooManyRequests):
         await bench.engine.run(ProcessId(), LONG, "a")
-
-    with_engine(tmp_path, test, queue_size=3, client_requests=2)
-
-
-def test_a_client_with_several_workers_gives_one_back(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[str] = []
-        first, release_first = await held(bench, tmp_path / "first", "a")
-        second, release_second = await held(bench, tmp_path / "second", "a")
-        newcomer = await waiting(bench, "b", "b0", ended)
-        await asyncio.sleep(0.05)
-        assert not ended
-        (tmp_path / "second" / "started").unlink()
-        bench.move_clock(PATIENCE)
-        await newcomer
-        # the last to have begun begins again, once its client has no other worker
-        assert not first.done() and not (tmp_path / "second" / "started").exists()
-        release_first.touch()
-        await first
-        release_second.touch()
-        await second
-        assert (tmp_path / "second" / "started").exists()
-
-    with_engine(tmp_path, test, workers=2, queue_size=10)
+    tasks += [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
+    with pytest.raises(Busy) as refused:
+        await bench.engine.run(ProcessId(), LONG, "c")
+    assert not isinstance(refused.value, TooManyRequests)
+    release.touch()
+    await asyncio.gather(running, *tasks)
+    await bench.engine.run(ProcessId(), LONG, "a")
 
 
-def test_nobody_gives_a_worker_back_twice_or_the_only_one(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[str] = []
-        first, release_first = await held(bench, tmp_path / "first", "a")
-        second, release_second = await held(bench, tmp_path / "second", "a")
-        newcomers = [await waiting(bench, "b", "b0", ended), await waiting(bench, "c", "c0", ended)]
-        pids = set(bench.engine.worker_pids)
-        bench.move_clock(PATIENCE)
-        await asyncio.gather(*newcomers)
-        assert len(pids & set(bench.engine.worker_pids)) == 1, "one worker was enough for both"
-        release_first.touch()
-        release_second.touch()
-        await asyncio.gather(first, second)
+@settings(workers=2, queue_size=10)
+async def test_a_client_with_several_workers_gives_one_back(tmp_path: Path, bench: Bench) -> None:
+    ended: list[str] = []
+    first, release_first = await held(bench, tmp_path / "first", "a")
+    second, release_second = await held(bench, tmp_path / "second", "a")
+    newcomer = await waiting(bench, "b", "b0", ended)
+    await asyncio.sleep(0.05)
+    assert not ended
+    (tmp_path / "second" / "started").unlink()
+    bench.move_clock(PATIENCE)
+    await newcomer
+    # the last to have begun begins again, once its client has no other worker
+    assert not first.done() and not (tmp_path / "second" / "started").exists()
+    release_first.touch()
+    await first
+    release_second.touch()
+    await second
+    assert (tmp_path / "second" / "started").exists()
 
-    with_engine(tmp_path, test, workers=2, queue_size=10)
+
+@settings(workers=2, queue_size=10)
+async def test_nobody_gives_a_worker_back_twice_or_the_only_one(
+    tmp_path: Path, bench: Bench
+) -> None:
+    ended: list[str] = []
+    first, release_first = await held(bench, tmp_path / "first", "a")
+    second, release_second = await held(bench, tmp_path / "second", "a")
+    newcomers = [await waiting(bench, "b", "b0", ended), await waiting(bench, "c", "c0", ended)]
+    pids = set(bench.engine.worker_pids)
+    bench.move_clock(PATIENCE)
+    await asyncio.gather(*newcomers)
+    assert len(pids & set(bench.engine.worker_pids)) == 1, "one worker was enough for both"
+    release_first.touch()
+    release_second.touch()
+    await asyncio.gather(first, second)
 
 
-def test_leaving_while_a_worker_is_given_back(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[str] = []
-        first, release_first = await held(bench, tmp_path / "first", "a")
-        second, _ = await held(bench, tmp_path / "second", "a")
-        newcomer = await waiting(bench, "b", "b0", ended)
-        bench.move_clock(PATIENCE)
-        await newcomer
-        second.cancel()
-        await asyncio.gather(second, return_exceptions=True)
-        assert second.cancelled()
-        release_first.touch()
-        await first
-        for client in ("a", "b"):
-            await bench.engine.run(ProcessId(), LONG, client)
-
-    with_engine(tmp_path, test, workers=2, queue_size=1, client_requests=2)
+@settings(workers=2, queue_size=1, client_requests=2)
+async def test_leaving_while_a_worker_is_given_back(tmp_path: Path, bench: Bench) -> None:
+    ended: list[str] = []
+    first, release_first = await held(bench, tmp_path / "first", "a")
+    second, _ = await held(bench, tmp_path / "second", "a")
+    newcomer = await waiting(bench, "b", "b0", ended)
+    bench.move_clock(PATIENCE)
+    await newcomer
+    second.cancel()
+    await asyncio.gather(second, return_exceptions=True)
+    assert second.cancelled()
+    release_first.touch()
+    await first
+    for client in ("a", "b"):
+        await bench.engine.run(ProcessId(), LONG, client)

@@ -15,8 +15,8 @@ from joulepath.app.engine.spare import PATIENCE
 from joulepath.app.engine.work import Ended, Work, result_of, taking
 from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
+from tests.app.engine.bench import DEADLINE_GRACE, LONG, Bench, settings, until
 from tests.app.engine.simple_tasks import Die, Fail, Hold, ProcessId
-from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, Bench, until, with_engine
 
 
 async def spare(bench: Bench, folder: Path, **options: Any) -> tuple[asyncio.Task[Any], Path]:
@@ -27,165 +27,136 @@ async def spare(bench: Bench, folder: Path, **options: Any) -> tuple[asyncio.Tas
     return running, folder / "released"
 
 
-def test_it_waits_while_a_caller_waits(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        first, release = await bench.held()
-        later = asyncio.create_task(result_of(bench.engine.spare.run, ProcessId(), LONG))
-        second = await bench.queued(ProcessId())
-        order: list[str] = []
-        later.add_done_callback(lambda _: order.append("later"))
-        second.add_done_callback(lambda _: order.append("second"))
-        release.touch()
-        await asyncio.gather(first, second, later)
-        assert order == ["second", "later"], "it came first and yet was run last"
-
-    with_engine(tmp_path, test, queue_size=2)
+@settings(queue_size=2)
+async def test_it_waits_while_a_caller_waits(bench: Bench) -> None:
+    first, release = await bench.held()
+    later = asyncio.create_task(result_of(bench.engine.spare.run, ProcessId(), LONG))
+    second = await bench.queued(ProcessId())
+    order: list[str] = []
+    later.add_done_callback(lambda _: order.append("later"))
+    second.add_done_callback(lambda _: order.append("second"))
+    release.touch()
+    await asyncio.gather(first, second, later)
+    assert order == ["second", "later"], "it came first and yet was run last"
 
 
-def test_a_caller_that_waits_takes_its_worker(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        running, _ = await spare(bench, tmp_path / "spare")
-        (pid,) = bench.engine.worker_pids
-        caller = await bench.queued(ProcessId())
-        await asyncio.sleep(0.05)
-        assert not running.done(), "it has some time"
-        bench.move_clock(PATIENCE)
-        with pytest.raises(Preempted):
-            await running
-        assert int((await caller).document) != pid
-
-    with_engine(tmp_path, test)
+async def test_a_caller_that_waits_takes_its_worker(tmp_path: Path, bench: Bench) -> None:
+    running, _ = await spare(bench, tmp_path / "spare")
+    (pid,) = bench.engine.worker_pids
+    caller = await bench.queued(ProcessId())
+    await asyncio.sleep(0.05)
+    assert not running.done(), "it has some time"
+    bench.move_clock(PATIENCE)
+    with pytest.raises(Preempted):
+        await running
+    assert int((await caller).document) != pid
 
 
-def test_what_is_not_stoppable_is_left_to_end(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        running, release = await spare(bench, tmp_path / "spare", stoppable=False)
-        caller = await bench.queued(ProcessId())
-        bench.move_clock(10 * PATIENCE)
-        await asyncio.sleep(0.05)
-        assert not running.done()
-        release.touch()
-        assert (await running).document == (await caller).document
-
-    with_engine(tmp_path, test)
+async def test_what_is_not_stoppable_is_left_to_end(tmp_path: Path, bench: Bench) -> None:
+    running, release = await spare(bench, tmp_path / "spare", stoppable=False)
+    caller = await bench.queued(ProcessId())
+    bench.move_clock(10 * PATIENCE)
+    await asyncio.sleep(0.05)
+    assert not running.done()
+    release.touch()
+    assert (await running).document == (await caller).document
 
 
-def test_a_caller_that_waits_for_callers_takes_nothing(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        running, release = await spare(bench, tmp_path / "spare")
-        held, release_held = await bench.held()
-        caller = await bench.queued(ProcessId())
-        bench.move_clock(10 * PATIENCE)
-        await asyncio.sleep(0.05)
-        assert not running.done(), "work that can wait has one of two workers only"
-        release.touch()
-        release_held.touch()
-        await asyncio.gather(running, held, caller)
-
-    with_engine(tmp_path, test, workers=2)
+@settings(workers=2)
+async def test_a_caller_that_waits_for_callers_takes_nothing(tmp_path: Path, bench: Bench) -> None:
+    running, release = await spare(bench, tmp_path / "spare")
+    held, release_held = await bench.held()
+    caller = await bench.queued(ProcessId())
+    bench.move_clock(10 * PATIENCE)
+    await asyncio.sleep(0.05)
+    assert not running.done(), "work that can wait has one of two workers only"
+    release.touch()
+    release_held.touch()
+    await asyncio.gather(running, held, caller)
 
 
-def test_cancelling_kills_its_worker(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        running, _ = await spare(bench, tmp_path / "spare")
-        (pid,) = bench.engine.worker_pids
-        running.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await running
-        assert await bench.pid() != pid
-
-    with_engine(tmp_path, test)
+async def test_cancelling_kills_its_worker(tmp_path: Path, bench: Bench) -> None:
+    running, _ = await spare(bench, tmp_path / "spare")
+    (pid,) = bench.engine.worker_pids
+    running.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await running
+    assert await bench.pid() != pid
 
 
-def test_its_deadline_counts_from_its_start(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        first, release = await bench.held()
-        later = asyncio.create_task(result_of(bench.engine.spare.run, ProcessId(), 1.0))
-        await asyncio.sleep(0)
-        bench.move_clock(LONG / 2)
-        release.touch()
-        assert (await later).document == (await first).document
-        running, _ = await spare(bench, tmp_path / "spare")
-        bench.move_clock(LONG + DEADLINE_GRACE)
-        with pytest.raises(DeadlineExceeded):
-            await running
-
-    with_engine(tmp_path, test)
+async def test_its_deadline_counts_from_its_start(tmp_path: Path, bench: Bench) -> None:
+    first, release = await bench.held()
+    later = asyncio.create_task(result_of(bench.engine.spare.run, ProcessId(), 1.0))
+    await asyncio.sleep(0)
+    bench.move_clock(LONG / 2)
+    release.touch()
+    assert (await later).document == (await first).document
+    running, _ = await spare(bench, tmp_path / "spare")
+    bench.move_clock(LONG + DEADLINE_GRACE)
+    with pytest.raises(DeadlineExceeded):
+        await running
 
 
-def test_a_crash_is_told(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        with pytest.raises(WorkerLost):
-            await result_of(bench.engine.spare.run, Die(), LONG)
-        await result_of(bench.engine.spare.run, ProcessId(), LONG)
-
-    with_engine(tmp_path, test)
+async def test_a_crash_is_told(bench: Bench) -> None:
+    with pytest.raises(WorkerLost):
+        await result_of(bench.engine.spare.run, Die(), LONG)
+    await result_of(bench.engine.spare.run, ProcessId(), LONG)
 
 
 @pytest.mark.parametrize("is_short", [False, True])
-def test_one_after_another_on_one_worker(tmp_path: Path, is_short: bool) -> None:
+async def test_one_after_another_on_one_worker(is_short: bool, bench: Bench) -> None:
     """Errors of tasks end nothing but themselves; what kills the worker leaves the rest. Short ones
     are sent ahead.
     """
-
-    async def test(bench: Bench) -> None:
-        ended: list[Ended] = []
-        tasks = [
-            ProcessId(),
-            Fail(OutsideLimits("start", 1, 9.0, -1.0, 1.0)),
-            ProcessId(),
-            Die(),
-            ProcessId(),
-        ]
-        works = [Work(task, LONG, ended.append, expected=0.0, is_small=is_short) for task in tasks]
-        await bench.engine.spare.run(taking(*works))
-        first, limits, second, died = ended
-        assert isinstance(limits, OutsideLimits) and isinstance(died, WorkerLost)
-        assert isinstance(first, TaskResult) and first == second
-        await bench.engine.spare.run(taking(works[4]))
-        assert isinstance(ended[4], TaskResult) and ended[4] != first
-
-    with_engine(tmp_path, test)
+    ended: list[Ended] = []
+    tasks = [
+        ProcessId(),
+        Fail(OutsideLimits("start", 1, 9.0, -1.0, 1.0)),
+        ProcessId(),
+        Die(),
+        ProcessId(),
+    ]
+    works = [Work(task, LONG, ended.append, expected=0.0, is_small=is_short) for task in tasks]
+    await bench.engine.spare.run(taking(*works))
+    first, limits, second, died = ended
+    assert isinstance(limits, OutsideLimits) and isinstance(died, WorkerLost)
+    assert isinstance(first, TaskResult) and first == second
+    await bench.engine.spare.run(taking(works[4]))
+    assert isinstance(ended[4], TaskResult) and ended[4] != first
 
 
-def test_it_takes_nothing_more_while_a_caller_waits(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[Ended] = []
-        tmp_path.joinpath("held").mkdir()
-        take = taking(
-            *(Work(task, LONG, ended.append) for task in (Hold(tmp_path / "held"), ProcessId()))
-        )
-        running = asyncio.create_task(bench.engine.spare.run(take))
-        await until((tmp_path / "held" / "started").exists)
-        caller = await bench.queued(ProcessId())
-        (tmp_path / "held" / "released").touch()
-        await running
-        assert len(ended) == 1, "the caller comes first"
-        assert (await caller) == ended[0]
-        await bench.engine.spare.run(take)
-        assert len(ended) == 2
-
-    with_engine(tmp_path, test)
+async def test_it_takes_nothing_more_while_a_caller_waits(tmp_path: Path, bench: Bench) -> None:
+    ended: list[Ended] = []
+    tmp_path.joinpath("held").mkdir()
+    take = taking(
+        *(Work(task, LONG, ended.append) for task in (Hold(tmp_path / "held"), ProcessId()))
+    )
+    running = asyncio.create_task(bench.engine.spare.run(take))
+    await until((tmp_path / "held" / "started").exists)
+    caller = await bench.queued(ProcessId())
+    (tmp_path / "held" / "released").touch()
+    await running
+    assert len(ended) == 1, "the caller comes first"
+    assert (await caller) == ended[0]
+    await bench.engine.spare.run(take)
+    assert len(ended) == 2
 
 
-def test_each_has_its_own_deadline(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        ended: list[Ended] = []
-        folders = [tmp_path / name for name in ("first", "second")]
-        for folder in folders:
-            folder.mkdir()
-        works = [Work(Hold(folder), LONG, ended.append) for folder in folders]
-        running = asyncio.create_task(bench.engine.spare.run(taking(*works)))
-        await until((folders[0] / "started").exists)
-        bench.move_clock(LONG)
-        (folders[0] / "released").touch()
-        await until((folders[1] / "started").exists)
-        await until(lambda: len(ended) == 1)
-        bench.move_clock(LONG)
-        await asyncio.sleep(0.05)
-        assert not running.done(), "the grace is left"
-        bench.move_clock(DEADLINE_GRACE)
-        await running
-        assert isinstance(ended[1], DeadlineExceeded)
-
-    with_engine(tmp_path, test)
+async def test_each_has_its_own_deadline(tmp_path: Path, bench: Bench) -> None:
+    ended: list[Ended] = []
+    folders = [tmp_path / name for name in ("first", "second")]
+    for folder in folders:
+        folder.mkdir()
+    works = [Work(Hold(folder), LONG, ended.append) for folder in folders]
+    running = asyncio.create_task(bench.engine.spare.run(taking(*works)))
+    await until((folders[0] / "started").exists)
+    bench.move_clock(LONG)
+    (folders[0] / "released").touch()
+    await until((folders[1] / "started").exists)
+    await until(lambda: len(ended) == 1)
+    bench.move_clock(LONG)
+    await asyncio.sleep(0.05)
+    assert not running.done(), "the grace is left"
+    bench.move_clock(DEADLINE_GRACE)
+    await running
+    assert isinstance(ended[1], DeadlineExceeded)

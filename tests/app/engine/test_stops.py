@@ -19,15 +19,15 @@ from joulepath.app.engine.work import result_of
 from joulepath.app.exceptions.base import ServiceError
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
-from tests.app.engine.simple_tasks import Die, DieOnce, EndEarly, Hold, HoldWatching, ProcessId
-from tests.app.engine.test_pool import (
+from tests.app.engine.bench import (
     DEADLINE_GRACE,
     LONG,
     SHUTDOWN_GRACE,
     Bench,
+    settings,
     until,
-    with_engine,
 )
+from tests.app.engine.simple_tasks import Die, DieOnce, EndEarly, Hold, HoldWatching, ProcessId
 
 # no busy machine is so late that a worker that looks is killed [s]
 NEVER_KILLED = 200.0
@@ -44,252 +44,226 @@ async def begun(
 
 
 @pytest.mark.parametrize("kind", [HoldWatching, EndEarly])
-def test_leaving_spares_the_worker(tmp_path: Path, kind: Any) -> None:
-    async def test(bench: Bench) -> None:
-        (pid,) = bench.engine.worker_pids
-        running = await begun(bench, kind(tmp_path / "held"))
-        running.cancel()
-        assert await bench.pid() == pid, "and the answer is that to the second task"
-
-    with_engine(tmp_path, test, stop_grace=NEVER_KILLED)
+@settings(stop_grace=NEVER_KILLED)
+async def test_leaving_spares_the_worker(tmp_path: Path, kind: Any, bench: Bench) -> None:
+    (pid,) = bench.engine.worker_pids
+    running = await begun(bench, kind(tmp_path / "held"))
+    running.cancel()
+    assert await bench.pid() == pid, "and the answer is that to the second task"
 
 
-def test_a_deadline_that_is_overrun_spares_the_worker(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        (pid,) = bench.engine.worker_pids
-        running = await begun(bench, HoldWatching(tmp_path / "held"))
-        bench.move_clock(LONG + DEADLINE_GRACE)
-        with pytest.raises(DeadlineExceeded):
-            await running
-        assert await bench.pid() == pid
-
-    with_engine(tmp_path, test, stop_grace=NEVER_KILLED)
+@settings(stop_grace=NEVER_KILLED)
+async def test_a_deadline_that_is_overrun_spares_the_worker(tmp_path: Path, bench: Bench) -> None:
+    (pid,) = bench.engine.worker_pids
+    running = await begun(bench, HoldWatching(tmp_path / "held"))
+    bench.move_clock(LONG + DEADLINE_GRACE)
+    with pytest.raises(DeadlineExceeded):
+        await running
+    assert await bench.pid() == pid
 
 
-def test_a_task_that_does_not_look_is_killed_after_the_grace(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        (pid,) = bench.engine.worker_pids
-        running = await begun(bench, Hold(tmp_path / "held"))
-        running.cancel()
-        waiting = await bench.queued(ProcessId())
-        await asyncio.sleep(0.05)
-        assert bench.engine.worker_pids == [pid] and not waiting.done(), "it has some time"
-        bench.move_clock(NEVER_KILLED)
-        assert int((await waiting).document) != pid
+@settings(stop_grace=NEVER_KILLED)
+async def test_a_task_that_does_not_look_is_killed_after_the_grace(
+    tmp_path: Path, bench: Bench
+) -> None:
+    (pid,) = bench.engine.worker_pids
+    running = await begun(bench, Hold(tmp_path / "held"))
+    running.cancel()
+    waiting = await bench.queued(ProcessId())
+    await asyncio.sleep(0.05)
+    assert bench.engine.worker_pids == [pid] and not waiting.done(), "it has some time"
+    bench.move_clock(NEVER_KILLED)
+    assert int((await waiting).document) != pid
 
-    with_engine(tmp_path, test, stop_grace=NEVER_KILLED)
 
-
-def test_a_stop_ends_no_following_task(tmp_path: Path) -> None:
+@settings(stop_grace=NEVER_KILLED, queue_size=4)
+async def test_a_stop_ends_no_following_task(bench: Bench) -> None:
     """Many stops beside the end of a task, and the next task at once."""
-
-    async def test(bench: Bench) -> None:
-        (pid,) = bench.engine.worker_pids
-        rng = random.Random(0)
-        for _ in range(200):
-            running = asyncio.create_task(bench.engine.run(ProcessId(), LONG))
-            # some before they are sent, some after they are answered
-            for _ in range(rng.randrange(8)):
-                await asyncio.sleep(0)
-            await asyncio.sleep(rng.choice([0.0, 0.0003, 0.001]))
-            running.cancel()
-            assert await bench.pid() == pid
-            await asyncio.gather(running, return_exceptions=True)
-
-    with_engine(tmp_path, test, stop_grace=NEVER_KILLED, queue_size=4)
+    (pid,) = bench.engine.worker_pids
+    rng = random.Random(0)
+    for _ in range(200):
+        running = asyncio.create_task(bench.engine.run(ProcessId(), LONG))
+        # some before they are sent, some after they are answered
+        for _ in range(rng.randrange(8)):
+            await asyncio.sleep(0)
+        await asyncio.sleep(rng.choice([0.0, 0.0003, 0.001]))
+        running.cancel()
+        assert await bench.pid() == pid
+        await asyncio.gather(running, return_exceptions=True)
 
 
 @pytest.mark.parametrize("kind", [HoldWatching, EndEarly])
-def test_who_gives_a_worker_back_gets_no_part_of_an_answer(tmp_path: Path, kind: Any) -> None:
-    async def test(bench: Bench) -> None:
-        pids = set(bench.engine.worker_pids)
-        first = await begun(bench, HoldWatching(tmp_path / "first"), client="a")
-        second = await begun(bench, kind(tmp_path / "second"), client="a")
-        newcomer = asyncio.create_task(bench.engine.run(ProcessId(), LONG, "b"))
-        await asyncio.sleep(0)
-        (tmp_path / "second" / "started").unlink()
-        bench.move_clock(PATIENCE)
-        assert int((await newcomer).document) in pids, "no worker was killed"
-        assert set(bench.engine.worker_pids) == pids
-        (tmp_path / "first" / "released").touch()
-        await first
-        await until((tmp_path / "second" / "started").exists)
-        assert not second.done()
-        if kind is EndEarly:
-            second.cancel()
-        else:
-            (tmp_path / "second" / "released").touch()
-            assert int((await second).document) in pids
-
-    with_engine(tmp_path, test, workers=2, queue_size=10, stop_grace=NEVER_KILLED)
-
-
-def test_spare_work_gives_its_worker_back_warm(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        (pid,) = bench.engine.worker_pids
-        tmp_path.joinpath("spare").mkdir()
-        spare = asyncio.create_task(
-            result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG)
-        )
-        await until((tmp_path / "spare" / "started").exists)
-        caller = await bench.queued(ProcessId())
-        bench.move_clock(PATIENCE)
-        with pytest.raises(Preempted):
-            await spare
-        assert int((await caller).document) == pid
-        spare = asyncio.create_task(
-            result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG)
-        )
-        spare.cancel()
-        await asyncio.gather(spare, return_exceptions=True)
-        assert await bench.pid() == pid
-
-    with_engine(tmp_path, test, stop_grace=NEVER_KILLED)
-
-
-def test_a_task_whose_worker_dies_begins_again_once(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+@settings(workers=2, queue_size=10, stop_grace=NEVER_KILLED)
+async def test_who_gives_a_worker_back_gets_no_part_of_an_answer(
+    tmp_path: Path, kind: Any, bench: Bench
 ) -> None:
-    async def test(bench: Bench) -> None:
-        assert (
-            int((await bench.engine.run(DieOnce(tmp_path), LONG)).document)
-            in bench.engine.worker_pids
-        )
-        deaths = tmp_path / "deaths"
-        deaths.mkdir()
-        with pytest.raises(WorkerLost):
-            await bench.engine.run(Die(deaths), LONG)
-        assert len(list(deaths.iterdir())) == 2, "it kills no third one"
-        await bench.pid()
-        causes = [
-            vars(each)["exit_code"]
-            for each in caplog.records
-            if each.message == "worker ended by itself"
-        ]
-        assert causes == [-signal.SIGKILL, -signal.SIGABRT, -signal.SIGABRT]
-
-    with_engine(tmp_path, test)
-
-
-def test_the_second_attempt_is_within_the_deadline(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        running, _ = await bench.held(deadline=LONG)
-        (pid,) = bench.engine.worker_pids
-        bench.move_clock(0.9 * LONG)
-        os.kill(pid, signal.SIGKILL)
-        await until(lambda: bench.engine.worker_pids not in ([], [pid]))
-        bench.move_clock(0.1 * LONG + DEADLINE_GRACE)
-        with pytest.raises(DeadlineExceeded):
-            await running
-
-    with_engine(tmp_path, test)
+    pids = set(bench.engine.worker_pids)
+    first = await begun(bench, HoldWatching(tmp_path / "first"), client="a")
+    second = await begun(bench, kind(tmp_path / "second"), client="a")
+    newcomer = asyncio.create_task(bench.engine.run(ProcessId(), LONG, "b"))
+    await asyncio.sleep(0)
+    (tmp_path / "second" / "started").unlink()
+    bench.move_clock(PATIENCE)
+    assert int((await newcomer).document) in pids, "no worker was killed"
+    assert set(bench.engine.worker_pids) == pids
+    (tmp_path / "first" / "released").touch()
+    await first
+    await until((tmp_path / "second" / "started").exists)
+    assert not second.done()
+    if kind is EndEarly:
+        second.cancel()
+    else:
+        (tmp_path / "second" / "released").touch()
+        assert int((await second).document) in pids
 
 
-def test_a_service_is_not_ready_while_requests_wait_and_none_runs(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        running, release = await bench.held()
-        waiting = await bench.queued(ProcessId())
-        assert bench.engine.ready, "one is at work"
-        # as a defect would leave it: the worker is alive, and nobody has it
-        (worker,) = bench.engine._workers
-        del bench.engine.queue._loans[worker]
-        assert not bench.engine.ready
-        release.touch()
+@settings(stop_grace=NEVER_KILLED)
+async def test_spare_work_gives_its_worker_back_warm(tmp_path: Path, bench: Bench) -> None:
+    (pid,) = bench.engine.worker_pids
+    tmp_path.joinpath("spare").mkdir()
+    spare = asyncio.create_task(
+        result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG)
+    )
+    await until((tmp_path / "spare" / "started").exists)
+    caller = await bench.queued(ProcessId())
+    bench.move_clock(PATIENCE)
+    with pytest.raises(Preempted):
+        await spare
+    assert int((await caller).document) == pid
+    spare = asyncio.create_task(
+        result_of(bench.engine.spare.run, HoldWatching(tmp_path / "spare"), LONG)
+    )
+    spare.cancel()
+    await asyncio.gather(spare, return_exceptions=True)
+    assert await bench.pid() == pid
+
+
+async def test_a_task_whose_worker_dies_begins_again_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, bench: Bench
+) -> None:
+    assert (
+        int((await bench.engine.run(DieOnce(tmp_path), LONG)).document) in bench.engine.worker_pids
+    )
+    deaths = tmp_path / "deaths"
+    deaths.mkdir()
+    with pytest.raises(WorkerLost):
+        await bench.engine.run(Die(deaths), LONG)
+    assert len(list(deaths.iterdir())) == 2, "it kills no third one"
+    await bench.pid()
+    causes = [
+        vars(each)["exit_code"]
+        for each in caplog.records
+        if each.message == "worker ended by itself"
+    ]
+    assert causes == [-signal.SIGKILL, -signal.SIGABRT, -signal.SIGABRT]
+
+
+async def test_the_second_attempt_is_within_the_deadline(bench: Bench) -> None:
+    running, _ = await bench.held(deadline=LONG)
+    (pid,) = bench.engine.worker_pids
+    bench.move_clock(0.9 * LONG)
+    os.kill(pid, signal.SIGKILL)
+    await until(lambda: bench.engine.worker_pids not in ([], [pid]))
+    bench.move_clock(0.1 * LONG + DEADLINE_GRACE)
+    with pytest.raises(DeadlineExceeded):
         await running
-        assert not waiting.done() and not bench.engine.ready
-        for _ in range(2):
-            bench.move_clock(pool.POOL.check_period)
-            await asyncio.sleep(0.01)
-        assert int((await waiting).document) == bench.engine.worker_pids[0], "the queue is mended"
-        assert bench.engine.ready
-
-    with_engine(tmp_path, test)
 
 
-def test_shutdown_while_requests_wait(tmp_path: Path) -> None:
-    async def test(bench: Bench) -> None:
-        running = await begun(bench, HoldWatching(tmp_path / "held"))
-        waiting = [await bench.queued(ProcessId()) for _ in range(3)]
-        bench.engine.drain()
-        (pid,) = bench.engine.worker_pids
-        os.kill(pid, signal.SIGKILL)
-        bench.move_clock(SHUTDOWN_GRACE)
-        for each in (running, *waiting):
-            with pytest.raises(ShuttingDown):
-                await each
+async def test_a_service_is_not_ready_while_requests_wait_and_none_runs(bench: Bench) -> None:
+    running, release = await bench.held()
+    waiting = await bench.queued(ProcessId())
+    assert bench.engine.ready, "one is at work"
+    # as a defect would leave it: the worker is alive, and nobody has it
+    (worker,) = bench.engine._workers
+    del bench.engine.queue._loans[worker]
+    assert not bench.engine.ready
+    release.touch()
+    await running
+    assert not waiting.done() and not bench.engine.ready
+    for _ in range(2):
+        bench.move_clock(pool.POOL.check_period)
+        await asyncio.sleep(0.01)
+    assert int((await waiting).document) == bench.engine.worker_pids[0], "the queue is mended"
+    assert bench.engine.ready
 
-    with_engine(tmp_path, test, queue_size=5)
+
+@settings(queue_size=5)
+async def test_shutdown_while_requests_wait(tmp_path: Path, bench: Bench) -> None:
+    running = await begun(bench, HoldWatching(tmp_path / "held"))
+    waiting = [await bench.queued(ProcessId()) for _ in range(3)]
+    bench.engine.drain()
+    (pid,) = bench.engine.worker_pids
+    os.kill(pid, signal.SIGKILL)
+    bench.move_clock(SHUTDOWN_GRACE)
+    for each in (running, *waiting):
+        with pytest.raises(ShuttingDown):
+            await each
 
 
 @pytest.mark.parametrize("turns", range(4))
-def test_shutdown_in_the_turn_of_a_deadline(tmp_path: Path, turns: int) -> None:
-    async def test(bench: Bench) -> None:
-        running = await begun(bench, HoldWatching(tmp_path / "held"))
-        waiting = await bench.queued(ProcessId(), deadline=1.0)
-        others = await bench.queued(ProcessId())
-        bench.move_clock(1.0)
-        for _ in range(turns):
-            await asyncio.sleep(0)
-        bench.engine.drain()
-        with pytest.raises((DeadlineExceeded, ShuttingDown)):
-            await waiting
-        bench.move_clock(SHUTDOWN_GRACE)
-        for each in (running, others):
-            with pytest.raises(ShuttingDown):
-                await each
-
-    with_engine(tmp_path, test, queue_size=5)
+@settings(queue_size=5)
+async def test_shutdown_in_the_turn_of_a_deadline(tmp_path: Path, turns: int, bench: Bench) -> None:
+    running = await begun(bench, HoldWatching(tmp_path / "held"))
+    waiting = await bench.queued(ProcessId(), deadline=1.0)
+    others = await bench.queued(ProcessId())
+    bench.move_clock(1.0)
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    bench.engine.drain()
+    with pytest.raises((DeadlineExceeded, ShuttingDown)):
+        await waiting
+    bench.move_clock(SHUTDOWN_GRACE)
+    for each in (running, others):
+        with pytest.raises(ShuttingDown):
+            await each
 
 
-def test_workers_killed_at_random_beside_everything(tmp_path: Path) -> None:
+@settings(workers=2, queue_size=200, client_requests=100)
+async def test_workers_killed_at_random_beside_everything(tmp_path: Path, bench: Bench) -> None:
     """Requests that end, leave and time out, jobs beside them, and a worker killed again and
     again."""
     rng = random.Random(1)
+    engine = bench.engine
 
-    async def test(bench: Bench) -> None:
-        engine = bench.engine
+    async def request(index: int) -> int:
+        folder = tmp_path / f"request {index}"
+        folder.mkdir()
+        task = rng.choice([ProcessId(), HoldWatching(folder), DieOnce(folder)])
+        running = asyncio.create_task(
+            engine.run(task, rng.choice([0.05, 0.3, LONG]), rng.choice("abc"))
+        )
+        if isinstance(task, HoldWatching):
+            await asyncio.sleep(rng.uniform(0.0, 0.05))
+            running.cancel()
+        try:
+            return int((await running).document)
+        except (JoulepathError, ServiceError, asyncio.CancelledError):
+            return 0
 
-        async def request(index: int) -> int:
-            folder = tmp_path / f"request {index}"
-            folder.mkdir()
-            task = rng.choice([ProcessId(), HoldWatching(folder), DieOnce(folder)])
-            running = asyncio.create_task(
-                engine.run(task, rng.choice([0.05, 0.3, LONG]), rng.choice("abc"))
-            )
-            if isinstance(task, HoldWatching):
-                await asyncio.sleep(rng.uniform(0.0, 0.05))
-                running.cancel()
+    async def job(index: int) -> None:
+        while True:
             try:
-                return int((await running).document)
-            except (JoulepathError, ServiceError, asyncio.CancelledError):
-                return 0
+                await result_of(engine.spare.run, ProcessId(), LONG)
+            except (Preempted, WorkerLost):
+                continue
+            await asyncio.sleep(0.001)
 
-        async def job(index: int) -> None:
-            while True:
-                try:
-                    await result_of(engine.spare.run, ProcessId(), LONG)
-                except (Preempted, WorkerLost):
-                    continue
-                await asyncio.sleep(0.001)
+    async def kill() -> None:
+        while True:
+            await asyncio.sleep(0.05)
+            if engine.worker_pids:
+                os.kill(rng.choice(engine.worker_pids), signal.SIGKILL)
 
-        async def kill() -> None:
-            while True:
-                await asyncio.sleep(0.05)
-                if engine.worker_pids:
-                    os.kill(rng.choice(engine.worker_pids), signal.SIGKILL)
-
-        others = [asyncio.create_task(each) for each in (job(0), job(1), kill())]
-        found = await asyncio.gather(*(request(index) for index in range(120)))
-        for each in others:
-            each.cancel()
-        results = await asyncio.gather(*others, return_exceptions=True)
-        assert all(isinstance(each, asyncio.CancelledError) for each in results), results
-        assert any(found)
-        await until(lambda: engine.warm_workers == 2)
-        assert set(engine.queue._loans) == engine._workers
-        await until(lambda: all(loan is None for loan in engine.queue._loans.values()))
-        assert (engine.queue.waiting, engine.queue.busy) == ([], 0)
-        assert not engine.queue.someone_waits and not engine.queue._places
-        assert await bench.pid() in engine.worker_pids
-
-    with_engine(tmp_path, test, workers=2, queue_size=200, client_requests=100)
+    others = [asyncio.create_task(each) for each in (job(0), job(1), kill())]
+    found = await asyncio.gather(*(request(index) for index in range(120)))
+    for each in others:
+        each.cancel()
+    results = await asyncio.gather(*others, return_exceptions=True)
+    assert all(isinstance(each, asyncio.CancelledError) for each in results), results
+    assert any(found)
+    await until(lambda: engine.warm_workers == 2)
+    assert set(engine.queue._loans) == engine._workers
+    await until(lambda: all(loan is None for loan in engine.queue._loans.values()))
+    assert (engine.queue.waiting, engine.queue.busy) == ([], 0)
+    assert not engine.queue.someone_waits and not engine.queue._places
+    assert await bench.pid() in engine.worker_pids

@@ -22,10 +22,11 @@ from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
 from joulepath.app.schemas.examples.values import STUDY_ID
 from joulepath.app.settings import Settings
 from tests.app.access.test_key_file import add
+from tests.app.databases import opened
 from tests.app.documents import open_document
 from tests.app.live import ANSWER, CLIENT, Server, serving
 from tests.app.routes.test_problems import refused
-from tests.app.store.test_store import put, with_store
+from tests.app.store.test_store import put
 
 STUDY = {"name": "press", "threshold": 60.0}
 NAME = {"name": "Mine"}
@@ -263,15 +264,9 @@ def test_a_job_is_its_owners(guarded: Guarded) -> None:
     assert guarded.send("boss", "DELETE", later.headers["location"]).status_code == 204
 
 
-def test_an_answer_is_its_owners(guarded: Guarded) -> None:
-    ids: list[str] = []
-
-    async def fill(store: Any) -> None:
-        for owner in ("press", None):
-            work = partial(put, owner=owner)
-            ids.append(await store.write(work))
-
-    with_store(guarded.database, fill)
+async def test_an_answer_is_its_owners(guarded: Guarded) -> None:
+    async with opened(guarded.database) as store:
+        ids = [await store.write(partial(put, owner=owner)) for owner in ("press", None)]
     owned, free = (f"/answers/{id}" for id in ids)
     assert guarded.send("viewer", "GET", owned).json()["owner"] == "press"
     for path in (owned, free):

@@ -91,17 +91,6 @@ async def until(condition: Callable[[], bool | Awaitable[bool]]) -> None:
             await asyncio.sleep(0.01)
 
 
-def with_store(folder: Path, test: Callable[[Store], Awaitable[None]]) -> None:
-    async def run() -> None:
-        store = Store(f"sqlite:///{folder}/joulepath.db")
-        try:
-            await test(store)
-        finally:
-            await store.close()
-
-    asyncio.run(run())
-
-
 async def sent(service: Service, count: int = 1, kind: str = "optimize") -> str:
     job_id, _ = await service.jobs.create(
         NewJob([NewRequest(kind, BODY, 10.0)] * count, "x"), None, None
@@ -117,185 +106,156 @@ async def is_done(service: Service, job_id: str) -> bool:
     return (await service.jobs.view(job_id)).job.ended is not None
 
 
-def test_a_second_service_takes_over_and_the_late_answer_is_dropped(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        first, second = Service("first", store), Service("second", store)
-        job_id = await sent(first)
-        first.dispatcher.start()
-        await until(lambda: first.work.begun == [0])
-        second.dispatcher.start()
-        second.work.free.set()
-        # the first stands still, so that it renews nothing
-        second.moved = LEASE + timedelta(seconds=5)
-        await until(lambda: is_done(second, job_id))
-        # it has lost the lease, and sees it by itself
-        await until(lambda: first.work.stopped == [0])
-        first.work.free.set()
-        await first.dispatcher.stop()
-        await second.dispatcher.stop()
-        (only,) = await requests(store, job_id)
-        assert (only.state, only.attempt, first.work.begun, second.work.begun) == (
-            "done",
-            2,
-            [0],
-            [0],
-        )
-        _, body = await store.read(partial(jobs.outcome, job_id=job_id, number=0))
-        assert body is not None
-        assert unpacked(body) == b'"second"'
-
-    with_store(tmp_path, test)
+async def test_a_second_service_takes_over_and_the_late_answer_is_dropped(store: Store) -> None:
+    first, second = Service("first", store), Service("second", store)
+    job_id = await sent(first)
+    first.dispatcher.start()
+    await until(lambda: first.work.begun == [0])
+    second.dispatcher.start()
+    second.work.free.set()
+    # the first stands still, so that it renews nothing
+    second.moved = LEASE + timedelta(seconds=5)
+    await until(lambda: is_done(second, job_id))
+    # it has lost the lease, and sees it by itself
+    await until(lambda: first.work.stopped == [0])
+    first.work.free.set()
+    await first.dispatcher.stop()
+    await second.dispatcher.stop()
+    (only,) = await requests(store, job_id)
+    assert (only.state, only.attempt, first.work.begun, second.work.begun) == (
+        "done",
+        2,
+        [0],
+        [0],
+    )
+    _, body = await store.read(partial(jobs.outcome, job_id=job_id, number=0))
+    assert body is not None
+    assert unpacked(body) == b'"second"'
 
 
-def test_a_long_request_is_not_taken_over(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        first, second = Service("first", store), Service("second", store)
-        job_id = await sent(first)
-        first.dispatcher.start()
-        await until(lambda: first.work.begun == [0])
-        second.dispatcher.start()
-        for _ in range(3):
-            for service in (first, second):
-                service.moved += LEASE / 2
-            leased = first.dispatcher._now() + LEASE / 2
+async def test_a_long_request_is_not_taken_over(store: Store) -> None:
+    first, second = Service("first", store), Service("second", store)
+    job_id = await sent(first)
+    first.dispatcher.start()
+    await until(lambda: first.work.begun == [0])
+    second.dispatcher.start()
+    for _ in range(3):
+        for service in (first, second):
+            service.moved += LEASE / 2
+        leased = first.dispatcher._now() + LEASE / 2
 
-            async def renewed(at: object = leased) -> bool:
-                (only,) = await requests(store, job_id)
-                end = only.leased_until
-                return end is not None and end >= at  # type: ignore[operator]
+        async def renewed(at: object = leased) -> bool:
+            (only,) = await requests(store, job_id)
+            end = only.leased_until
+            return end is not None and end >= at  # type: ignore[operator]
 
-            await until(renewed)
-        first.work.free.set()
-        await until(lambda: is_done(first, job_id))
-        assert second.work.begun == []
-        await first.dispatcher.stop()
-        await second.dispatcher.stop()
-
-    with_store(tmp_path, test)
+        await until(renewed)
+    first.work.free.set()
+    await until(lambda: is_done(first, job_id))
+    assert second.work.begun == []
+    await first.dispatcher.stop()
+    await second.dispatcher.stop()
 
 
-def test_a_request_that_kills_three_workers_fails(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        service.work.errors = [WorkerLost(), WorkerLost(), WorkerLost()]
-        service.work.free.set()
-        job_id = await sent(service)
-        service.dispatcher.start()
-        await until(lambda: is_done(service, job_id))
-        (only,) = await requests(store, job_id)
-        assert (only.state, only.attempt, service.work.begun) == ("failed", 3, [0, 0, 0])
-        assert only.problem is not None
-        assert only.problem["type"] == "/problems/worker-died"
-        await service.jobs.retry(job_id, OPERATOR)
-        await until(lambda: is_done(service, job_id))
-        (only,) = await requests(store, job_id)
-        assert (only.state, only.attempt, only.problem) == ("done", 4, None)
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_a_request_that_kills_three_workers_fails(store: Store) -> None:
+    service = Service("only", store)
+    service.work.errors = [WorkerLost(), WorkerLost(), WorkerLost()]
+    service.work.free.set()
+    job_id = await sent(service)
+    service.dispatcher.start()
+    await until(lambda: is_done(service, job_id))
+    (only,) = await requests(store, job_id)
+    assert (only.state, only.attempt, service.work.begun) == ("failed", 3, [0, 0, 0])
+    assert only.problem is not None
+    assert only.problem["type"] == "/problems/worker-died"
+    await service.jobs.retry(job_id, OPERATOR)
+    await until(lambda: is_done(service, job_id))
+    (only,) = await requests(store, job_id)
+    assert (only.state, only.attempt, only.problem) == ("done", 4, None)
+    await service.dispatcher.stop()
 
 
-def test_a_caller_may_take_its_worker_twice(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        service.work.errors = [Preempted(), Preempted()]
-        service.work.free.set()
-        job_id = await sent(service)
-        service.dispatcher.start()
-        await until(lambda: is_done(service, job_id))
-        (only,) = await requests(store, job_id)
-        assert (only.state, only.attempt) == ("done", 1)
-        assert service.work.stoppable == [True, True, False]
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_a_caller_may_take_its_worker_twice(store: Store) -> None:
+    service = Service("only", store)
+    service.work.errors = [Preempted(), Preempted()]
+    service.work.free.set()
+    job_id = await sent(service)
+    service.dispatcher.start()
+    await until(lambda: is_done(service, job_id))
+    (only,) = await requests(store, job_id)
+    assert (only.state, only.attempt) == ("done", 1)
+    assert service.work.stoppable == [True, True, False]
+    await service.dispatcher.stop()
 
 
-def test_cancelling_stops_what_runs_here_and_elsewhere(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        here, elsewhere = Service("here", store), Service("elsewhere", store)
-        job_id = await sent(here, 6)
-        here.dispatcher.start()
-        await until(lambda: len(here.work.begun) == 1)
-        elsewhere.dispatcher.start()
-        await until(lambda: len(elsewhere.work.begun) == 1)
-        await here.jobs.cancel(job_id, OPERATOR)
-        await until(lambda: is_done(here, job_id))
-        assert here.work.stopped == here.work.begun
-        assert elsewhere.work.stopped == elsewhere.work.begun
-        view = await here.jobs.view(job_id)
-        assert (view.job.state, view.counts["cancelled"]) == ("cancelled", 6)
-        await here.dispatcher.stop()
-        await elsewhere.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_cancelling_stops_what_runs_here_and_elsewhere(store: Store) -> None:
+    here, elsewhere = Service("here", store), Service("elsewhere", store)
+    job_id = await sent(here, 6)
+    here.dispatcher.start()
+    await until(lambda: len(here.work.begun) == 1)
+    elsewhere.dispatcher.start()
+    await until(lambda: len(elsewhere.work.begun) == 1)
+    await here.jobs.cancel(job_id, OPERATOR)
+    await until(lambda: is_done(here, job_id))
+    assert here.work.stopped == here.work.begun
+    assert elsewhere.work.stopped == elsewhere.work.begun
+    view = await here.jobs.view(job_id)
+    assert (view.job.state, view.counts["cancelled"]) == ("cancelled", 6)
+    await here.dispatcher.stop()
+    await elsewhere.dispatcher.stop()
 
 
-def test_deleting_stops_what_runs(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        job_id = await sent(service, 2)
-        service.dispatcher.start()
-        await until(lambda: service.work.begun == [0])
-        await service.jobs.delete(job_id, OPERATOR)
-        await until(lambda: service.work.stopped == [0])
-        another = await sent(service)
-        service.work.free.set()
-        await until(lambda: is_done(service, another))
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_deleting_stops_what_runs(store: Store) -> None:
+    service = Service("only", store)
+    job_id = await sent(service, 2)
+    service.dispatcher.start()
+    await until(lambda: service.work.begun == [0])
+    await service.jobs.delete(job_id, OPERATOR)
+    await until(lambda: service.work.stopped == [0])
+    another = await sent(service)
+    service.work.free.set()
+    await until(lambda: is_done(service, another))
+    await service.dispatcher.stop()
 
 
-def test_a_stop_gives_everything_back(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store, workers=2)
-        job_id = await sent(service, 9)
-        service.dispatcher.start()
-        await until(lambda: len(service.work.begun) == 2)
-        await service.dispatcher.stop()
-        assert sorted(service.work.stopped) == sorted(service.work.begun)
-        found = await requests(store, job_id)
-        assert {(each.state, each.leased_by, each.deaths) for each in found} == {
-            ("waiting", None, 0)
-        }
-
-    with_store(tmp_path, test)
+async def test_a_stop_gives_everything_back(store: Store) -> None:
+    service = Service("only", store, workers=2)
+    job_id = await sent(service, 9)
+    service.dispatcher.start()
+    await until(lambda: len(service.work.begun) == 2)
+    await service.dispatcher.stop()
+    assert sorted(service.work.stopped) == sorted(service.work.begun)
+    found = await requests(store, job_id)
+    assert {(each.state, each.leased_by, each.deaths) for each in found} == {("waiting", None, 0)}
 
 
-def test_an_unforeseen_error_ends_no_job(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        service.work.errors = [ZeroDivisionError()]
-        service.work.free.set()
-        job_id = await sent(service, 3)
-        service.dispatcher.start()
-        await until(lambda: is_done(service, job_id))
-        assert [each.state for each in await requests(store, job_id)] == ["failed", "done", "done"]
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_an_unforeseen_error_ends_no_job(store: Store) -> None:
+    service = Service("only", store)
+    service.work.errors = [ZeroDivisionError()]
+    service.work.free.set()
+    job_id = await sent(service, 3)
+    service.dispatcher.start()
+    await until(lambda: is_done(service, job_id))
+    assert [each.state for each in await requests(store, job_id)] == ["failed", "done", "done"]
+    await service.dispatcher.stop()
 
 
-def test_outcomes_outlive_a_database_that_fails(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        job_id = await sent(service)
-        service.dispatcher.start()
-        await until(lambda: service.work.begun == [0])
-        engine, store._engine = (
-            store._engine,
-            Store(f"sqlite:///{tmp_path}/no/such/folder.db")._engine,
-        )
-        service.work.free.set()
-        await until(lambda: len(service.dispatcher._outcomes) == 1)
-        await asyncio.sleep(2 * module.DISPATCHER.look)
-        store._engine = engine
-        await until(lambda: is_done(service, job_id))
-        assert (await requests(store, job_id))[0].state == "done"
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_outcomes_outlive_a_database_that_fails(tmp_path: Path, store: Store) -> None:
+    service = Service("only", store)
+    job_id = await sent(service)
+    service.dispatcher.start()
+    await until(lambda: service.work.begun == [0])
+    engine, store._engine = (
+        store._engine,
+        Store(f"sqlite:///{tmp_path}/no/such/folder.db")._engine,
+    )
+    service.work.free.set()
+    await until(lambda: len(service.dispatcher._outcomes) == 1)
+    await asyncio.sleep(2 * module.DISPATCHER.look)
+    store._engine = engine
+    await until(lambda: is_done(service, job_id))
+    assert (await requests(store, job_id))[0].state == "done"
+    await service.dispatcher.stop()
 
 
 def test_a_holder_is_gone_once_its_process_is() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import orjson
@@ -22,7 +21,7 @@ from joulepath.app.store.store import Store
 from joulepath.app.store.tables import JobRequest
 from joulepath.app.tasks.job_request import JobRequestTask, JobResult
 from joulepath.optimizer.exceptions import OutsideLimits
-from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, until, with_store
+from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, until
 
 
 def computed(task: JobRequestTask, status: str = "optimal") -> TaskResult:
@@ -74,125 +73,104 @@ async def document(service: Service, job_id: str, number: int) -> Any:
     return orjson.loads(unpacked(body))
 
 
-def test_one_is_computed_and_the_others_get_its_answer(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = service_of(store, workers=2)
-        service.dispatcher.start()
-        first = await send(service, *[asks()] * 20, asks("b"), asks(deadline=99.0))
-        await until(lambda: sorted(service.work.begun) == [0, 20])
-        service.work.free.set()
-        await until(lambda: is_done(service, first))
-        found = await requests(store, first)
-        assert {each.state for each in found} == {"done"} and {each.energy for each in found} == {
-            5.0
+async def test_one_is_computed_and_the_others_get_its_answer(store: Store) -> None:
+    service = service_of(store, workers=2)
+    service.dispatcher.start()
+    first = await send(service, *[asks()] * 20, asks("b"), asks(deadline=99.0))
+    await until(lambda: sorted(service.work.begun) == [0, 20])
+    service.work.free.set()
+    await until(lambda: is_done(service, first))
+    found = await requests(store, first)
+    assert {each.state for each in found} == {"done"} and {each.energy for each in found} == {5.0}
+    for number in (*range(20), 21):
+        kept = found[number].answer_id
+        own = {
+            "request": f"{first}.{number}",
+            "id": kept,
+            "by": f"{first}.0",
+            "answer": f"/answers/{kept}",
         }
-        for number in (*range(20), 21):
-            kept = found[number].answer_id
-            own = {
-                "request": f"{first}.{number}",
-                "id": kept,
-                "by": f"{first}.0",
-                "answer": f"/answers/{kept}",
-            }
-            assert await document(service, first, number) == own
-        await done(service, asks(), asks("b"))
-        assert len(service.work.begun) == 2, "those of another job are known, too"
-        await done(service, asks(), owner="somebody")
-        await done(service, asks(version="another"), NewRequest("optimize", BODY, 10.0))
-        assert len(service.work.begun) == 5
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+        assert await document(service, first, number) == own
+    await done(service, asks(), asks("b"))
+    assert len(service.work.begun) == 2, "those of another job are known, too"
+    await done(service, asks(), owner="somebody")
+    await done(service, asks(version="another"), NewRequest("optimize", BODY, 10.0))
+    assert len(service.work.begun) == 5
+    await service.dispatcher.stop()
 
 
-def test_more_time_may_find_a_better_answer(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = service_of(store)
-        service.work.answer = partial(computed, status="feasible")
-        service.work.free.set()
-        service.dispatcher.start()
-        await done(service, asks(), asks(deadline=20.0), asks(deadline=5.0))
-        assert service.work.begun == [0, 1]
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_more_time_may_find_a_better_answer(store: Store) -> None:
+    service = service_of(store)
+    service.work.answer = partial(computed, status="feasible")
+    service.work.free.set()
+    service.dispatcher.start()
+    await done(service, asks(), asks(deadline=20.0), asks(deadline=5.0))
+    assert service.work.begun == [0, 1]
+    await service.dispatcher.stop()
 
 
-def test_answers_that_refer_to_others_stay_in_their_job(tmp_path: Path) -> None:
+async def test_answers_that_refer_to_others_stay_in_their_job(store: Store) -> None:
     """Those that they refer to are deleted with it."""
-
-    async def test(store: Store) -> None:
-        service = service_of(store)
-        service.work.free.set()
-        service.dispatcher.start()
-        await done(service, asks(kind="cycle"), asks(kind="cycle"))
-        assert service.work.begun == [0]
-        await done(service, asks(kind="cycle"))
-        assert service.work.begun == [0, 0]
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+    service = service_of(store)
+    service.work.free.set()
+    service.dispatcher.start()
+    await done(service, asks(kind="cycle"), asks(kind="cycle"))
+    assert service.work.begun == [0]
+    await done(service, asks(kind="cycle"))
+    assert service.work.begun == [0, 0]
+    await service.dispatcher.stop()
 
 
 @pytest.mark.parametrize(
     ("error", "begun"),
     [(OutsideLimits("start", "elbow_joint", 9.0, -1.0, 1.0), [0]), (InternalError(), [0, 1])],
 )
-def test_only_a_request_that_is_wrong_fails_for_all(
-    tmp_path: Path, error: Exception, begun: list[int]
+async def test_only_a_request_that_is_wrong_fails_for_all(
+    error: Exception, begun: list[int], store: Store
 ) -> None:
-    async def test(store: Store) -> None:
-        service = service_of(store, workers=2)
-        service.work.errors = [error]
-        service.work.free.set()
-        service.dispatcher.start()
-        job_id, found = await done(service, asks(), asks(), asks())
-        assert service.work.begun == begun
-        failed = [each for each in found if each.state == "failed"]
-        assert len(failed) == (3 if len(begun) == 1 else 1)
-        assert [each.problem and each.problem["instance"] for each in failed] == [
-            f"{job_id}.{each.number}" for each in failed
-        ]
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+    service = service_of(store, workers=2)
+    service.work.errors = [error]
+    service.work.free.set()
+    service.dispatcher.start()
+    job_id, found = await done(service, asks(), asks(), asks())
+    assert service.work.begun == begun
+    failed = [each for each in found if each.state == "failed"]
+    assert len(failed) == (3 if len(begun) == 1 else 1)
+    assert [each.problem and each.problem["instance"] for each in failed] == [
+        f"{job_id}.{each.number}" for each in failed
+    ]
+    await service.dispatcher.stop()
 
 
-def test_one_that_waits_for_another_can_be_cancelled(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = service_of(store)
-        first = await send(service, asks())
-        service.dispatcher.start()
-        await until(lambda: service.work.begun == [0])
-        second = await send(service, asks())
-        await until(lambda: service.dispatcher._equals.waiting == 1)
-        await service.jobs.cancel(second, OPERATOR)
-        await until(lambda: is_done(service, second))
-        third = await send(service, asks())
-        await until(lambda: service.dispatcher._equals.waiting == 1)
-        await service.jobs.cancel(first, OPERATOR)
-        await until(lambda: is_done(service, first))
-        service.work.free.set()
-        await until(lambda: is_done(service, third))
-        assert [each.state for each in await requests(store, third)] == ["done"], (
-            "it is computed in its place"
-        )
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_one_that_waits_for_another_can_be_cancelled(store: Store) -> None:
+    service = service_of(store)
+    first = await send(service, asks())
+    service.dispatcher.start()
+    await until(lambda: service.work.begun == [0])
+    second = await send(service, asks())
+    await until(lambda: service.dispatcher._equals.waiting == 1)
+    await service.jobs.cancel(second, OPERATOR)
+    await until(lambda: is_done(service, second))
+    third = await send(service, asks())
+    await until(lambda: service.dispatcher._equals.waiting == 1)
+    await service.jobs.cancel(first, OPERATOR)
+    await until(lambda: is_done(service, first))
+    service.work.free.set()
+    await until(lambda: is_done(service, third))
+    assert [each.state for each in await requests(store, third)] == ["done"], (
+        "it is computed in its place"
+    )
+    await service.dispatcher.stop()
 
 
-def test_a_job_that_is_deleted_takes_its_answers_with_it(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = service_of(store)
-        service.work.free.set()
-        service.dispatcher.start()
-        first, _ = await done(service, asks())
-        second, _ = await done(service, asks())
-        await service.jobs.delete(first, OPERATOR)
-        assert (await document(service, second, 0))["request"] == f"{second}.0", "it has a copy"
-        await done(service, asks())
-        assert service.work.begun == [0, 0]
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_a_job_that_is_deleted_takes_its_answers_with_it(store: Store) -> None:
+    service = service_of(store)
+    service.work.free.set()
+    service.dispatcher.start()
+    first, _ = await done(service, asks())
+    second, _ = await done(service, asks())
+    await service.jobs.delete(first, OPERATOR)
+    assert (await document(service, second, 0))["request"] == f"{second}.0", "it has a copy"
+    await done(service, asks())
+    assert service.work.begun == [0, 0]
+    await service.dispatcher.stop()

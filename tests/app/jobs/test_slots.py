@@ -6,7 +6,6 @@ import json
 import math
 from datetime import timedelta
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -29,137 +28,117 @@ from joulepath.optimizer.progress import (
     StepsDone,
     no_listener,
 )
-from tests.app.jobs.test_dispatcher import Service, is_done, requests, sent, until, with_store
+from tests.app.jobs.test_dispatcher import Service, is_done, requests, sent, until
 
 TRIED = {"solved": 1, "share": None}
 """Progress within a request that has tried one candidate."""
 
 
-def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        job_id = await sent(service, kind="cycle")
+async def test_progress_within_a_long_request_is_an_event(store: Store) -> None:
+    service = Service("only", store)
+    job_id = await sent(service, kind="cycle")
 
-        async def reports() -> list[dict[str, Any]]:
-            found, _ = await store.read(
-                partial(job_events.after, job_id=job_id, number=0, limit=100)
-            )
-            told = [each.data["requests"] for each in found if each.name == "progress"]
-            return [only for each in told for only in each]
+    async def reports() -> list[dict[str, Any]]:
+        found, _ = await store.read(partial(job_events.after, job_id=job_id, number=0, limit=100))
+        told = [each.data["requests"] for each in found if each.name == "progress"]
+        return [only for each in told for only in each]
 
-        async def tells(report: dict[str, Any], *events: Event) -> None:
-            for event in events:
-                service.work.tell(event)
-            service.moved += timedelta(seconds=1)
-            await until(lambda: is_told(report))
+    async def tells(report: dict[str, Any], *events: Event) -> None:
+        for event in events:
+            service.work.tell(event)
+        service.moved += timedelta(seconds=1)
+        await until(lambda: is_told(report))
 
-        async def is_told(report: dict[str, Any]) -> bool:
-            return report in await reports()
+    async def is_told(report: dict[str, Any]) -> bool:
+        return report in await reports()
 
-        service.dispatcher.start()
-        await until(lambda: service.work.begun == [0])
-        first = {"index": 0, "attempt": 1, "found": None, "bound": None, **TRIED}
-        await tells(first, CandidatesFound(3), CandidateTried(1, "solved", 1.0, 9.0))
-        best = {"index": 0, "attempt": 1, "found": 9.0, "bound": None, **TRIED}
-        await tells(
-            best,
-            Improved(9.0, bound=-math.inf),
-            Improved(9.5),
-            CandidateTried(1, "solved", 1.0, 8.0),
-        )
-        await tells(best | {"found": 7.0, "bound": 5.0}, Improved(7.0, bound=5.0))
-        service.work.free.set()
-        await until(lambda: is_done(service, job_id))
-        found = await reports()
-        assert len(found) == 3, "what is no news is no event, and the end has none"
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+    service.dispatcher.start()
+    await until(lambda: service.work.begun == [0])
+    first = {"index": 0, "attempt": 1, "found": None, "bound": None, **TRIED}
+    await tells(first, CandidatesFound(3), CandidateTried(1, "solved", 1.0, 9.0))
+    best = {"index": 0, "attempt": 1, "found": 9.0, "bound": None, **TRIED}
+    await tells(
+        best,
+        Improved(9.0, bound=-math.inf),
+        Improved(9.5),
+        CandidateTried(1, "solved", 1.0, 8.0),
+    )
+    await tells(best | {"found": 7.0, "bound": 5.0}, Improved(7.0, bound=5.0))
+    service.work.free.set()
+    await until(lambda: is_done(service, job_id))
+    found = await reports()
+    assert len(found) == 3, "what is no news is no event, and the end has none"
+    await service.dispatcher.stop()
 
 
-def test_time_left_of_an_identification(tmp_path: Path) -> None:
+async def test_time_left_of_an_identification(store: Store) -> None:
     """From its fits: before the first one has ended, nothing is said."""
+    service = Service("only", store)
+    job_id = await sent(service, kind=IDENTIFY)
 
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        job_id = await sent(service, kind=IDENTIFY)
+    async def told() -> list[tuple[float | None, float | None]]:
+        found, _ = await store.read(partial(job_events.after, job_id=job_id, number=0, limit=100))
+        data = [each.data for each in found if each.name == "progress"]
+        return [(each["requests"][0]["share"], each["eta"]) for each in data if each["requests"]]
 
-        async def told() -> list[tuple[float | None, float | None]]:
-            found, _ = await store.read(
-                partial(job_events.after, job_id=job_id, number=0, limit=100)
-            )
-            data = [each.data for each in found if each.name == "progress"]
-            return [
-                (each["requests"][0]["share"], each["eta"]) for each in data if each["requests"]
-            ]
+    async def tells(done: float, count: int) -> None:
+        service.work.tell(StepsDone(done, 4.0, "fits"))
+        service.moved += timedelta(seconds=10)
+        await until(lambda: has(count))
 
-        async def tells(done: float, count: int) -> None:
-            service.work.tell(StepsDone(done, 4.0, "fits"))
-            service.moved += timedelta(seconds=10)
-            await until(lambda: has(count))
+    async def has(count: int) -> bool:
+        return len(await told()) == count
 
-        async def has(count: int) -> bool:
-            return len(await told()) == count
-
-        service.dispatcher.start()
-        await until(lambda: service.work.begun == [0])
-        await tells(0.0, 1)
-        await tells(1.0, 2)
-        await tells(3.0, 3)
-        shares, left = zip(*await told(), strict=True)
-        assert shares == (0.0, 0.25, 0.75)
-        assert left[0] is None
-        # 20 s and 30 s after the start, a fourth and three fourths are done
-        assert left[1:] == (pytest.approx(60, rel=0.1), pytest.approx(10, rel=0.1))
-        service.work.free.set()
-        await until(lambda: is_done(service, job_id))
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+    service.dispatcher.start()
+    await until(lambda: service.work.begun == [0])
+    await tells(0.0, 1)
+    await tells(1.0, 2)
+    await tells(3.0, 3)
+    shares, left = zip(*await told(), strict=True)
+    assert shares == (0.0, 0.25, 0.75)
+    assert left[0] is None
+    # 20 s and 30 s after the start, a fourth and three fourths are done
+    assert left[1:] == (pytest.approx(60, rel=0.1), pytest.approx(10, rel=0.1))
+    service.work.free.set()
+    await until(lambda: is_done(service, job_id))
+    await service.dispatcher.stop()
 
 
-def test_jobs_wait_until_there_is_a_slot(tmp_path: Path) -> None:
+async def test_jobs_wait_until_there_is_a_slot(store: Store) -> None:
     """As for a cluster that cannot be reached, and for machines that come and go."""
+    service = Service("only", store)
+    service.work.slots = 0
+    job_id = await sent(service, 3)
+    service.dispatcher.start()
+    exchanged = service.dispatcher._exchange
+    cycles = 0
 
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        service.work.slots = 0
-        job_id = await sent(service, 3)
-        service.dispatcher.start()
-        exchanged = service.dispatcher._exchange
-        cycles = 0
+    async def counted() -> None:
+        nonlocal cycles
+        await exchanged()
+        cycles += 1
 
-        async def counted() -> None:
-            nonlocal cycles
-            await exchanged()
-            cycles += 1
-
-        service.dispatcher._exchange = counted  # type: ignore[method-assign]
-        service.dispatcher.wake()
-        await until(lambda: cycles >= 2)
-        assert [each.state for each in await requests(store, job_id)] == ["waiting"] * 3
-        service.work.slots = 3
-        service.work.errors = [ClusterUnavailable()]
-        await until(lambda: len(service.work.begun) == 4)
-        service.work.free.set()
-        await until(lambda: is_done(service, job_id))
-        states = [(each.state, each.problem) for each in await requests(store, job_id)]
-        assert states == [("done", None)] * 3, "a lost cluster is no failure"
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+    service.dispatcher._exchange = counted  # type: ignore[method-assign]
+    service.dispatcher.wake()
+    await until(lambda: cycles >= 2)
+    assert [each.state for each in await requests(store, job_id)] == ["waiting"] * 3
+    service.work.slots = 3
+    service.work.errors = [ClusterUnavailable()]
+    await until(lambda: len(service.work.begun) == 4)
+    service.work.free.set()
+    await until(lambda: is_done(service, job_id))
+    states = [(each.state, each.problem) for each in await requests(store, job_id)]
+    assert states == [("done", None)] * 3, "a lost cluster is no failure"
+    await service.dispatcher.stop()
 
 
-def test_nobody_listens_to_short_requests(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        service = Service("only", store)
-        await sent(service)
-        service.dispatcher.start()
-        await until(lambda: service.work.begun == [0])
-        assert service.work.tell is no_listener
-        await service.dispatcher.stop()
-
-    with_store(tmp_path, test)
+async def test_nobody_listens_to_short_requests(store: Store) -> None:
+    service = Service("only", store)
+    await sent(service)
+    service.dispatcher.start()
+    await until(lambda: service.work.begun == [0])
+    assert service.work.tell is no_listener
+    await service.dispatcher.stop()
 
 
 class Runner:
@@ -179,35 +158,32 @@ class Runner:
 
 
 @pytest.mark.parametrize("where", ["here", "cluster"])
-def test_an_identification_gets_its_logs_wherever_it_is_computed(
-    tmp_path: Path, where: str
+async def test_an_identification_gets_its_logs_wherever_it_is_computed(
+    where: str, store: Store
 ) -> None:
-    async def test(store: Store) -> None:
-        log = StoredLog(
-            id=new_id(),
-            robot="ur5e",
-            created=now(),
-            size=3,
-            settings={"robot": "ur5e"},
-            report={},
-            body=b"log",
-        )
-        await store.write(partial(logs.add, log=log, most=100))
-        body = packed(json.dumps({"logs": [log.id]}).encode())
-        runner: Any = Runner()
-        executor = (
-            LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
-        )
-        ended: list[Ended] = []
-        others = [
-            Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append)
-            for kind in (IDENTIFY, "optimize")
-        ]
-        await executor.run(taking(*others))
-        assert [task.logs for task in runner.tasks] == [
-            (),
-            (GivenLog(log.id, {"robot": "ur5e"}, b"log"),),
-        ]
-        assert [type(each) for each in ended] == [InternalError, InternalError]
-
-    with_store(tmp_path, test)
+    log = StoredLog(
+        id=new_id(),
+        robot="ur5e",
+        created=now(),
+        size=3,
+        settings={"robot": "ur5e"},
+        report={},
+        body=b"log",
+    )
+    await store.write(partial(logs.add, log=log, most=100))
+    body = packed(json.dumps({"logs": [log.id]}).encode())
+    runner: Any = Runner()
+    executor = (
+        LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
+    )
+    ended: list[Ended] = []
+    others = [
+        Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append)
+        for kind in (IDENTIFY, "optimize")
+    ]
+    await executor.run(taking(*others))
+    assert [task.logs for task in runner.tasks] == [
+        (),
+        (GivenLog(log.id, {"robot": "ur5e"}, b"log"),),
+    ]
+    assert [type(each) for each in ended] == [InternalError, InternalError]

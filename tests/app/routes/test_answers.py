@@ -25,7 +25,6 @@ from joulepath.app.store.store_answers import keep_answer
 from tests.app.job_clients import ended, optimization, sent
 from tests.app.problems import checked
 from tests.app.requests import EXAMPLES, HOME, NEAR, PATIENT, move
-from tests.app.store.test_store import with_store
 
 TWO_POSES = EXAMPLES["joint_to_pose"]
 
@@ -197,20 +196,14 @@ def test_a_result_that_is_not_kept_says_so() -> None:
 
 
 @pytest.mark.parametrize(("most", "kept"), [(0, False), (100, False), (1 << 20, True)])
-def test_an_answer_larger_than_all_that_may_be_kept_is_not(
-    tmp_path: Any, most: int, kept: bool
+async def test_an_answer_larger_than_all_that_may_be_kept_is_not(
+    most: int, kept: bool, store: Store
 ) -> None:
     content = {"request": "r", "id": None, "q": list(range(1000)), "answer": None}
     result = TaskResult.of_kept_json(content, AnswerFigures())
-
-    async def test(store: Store) -> None:
-        answered = await keep_answer(
-            store, Settings(answers_max_bytes=most), "optimize", result, None
-        )
-        said = orjson.loads(answered.document)
-        assert (said["id"] is not None, said["answer"] is not None) == (kept, kept)
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+    answered = await keep_answer(store, Settings(answers_max_bytes=most), "optimize", result, None)
+    said = orjson.loads(answered.document)
+    assert (said["id"] is not None, said["answer"] is not None) == (kept, kept)
 
 
 def test_the_answers_of_a_front_and_a_cycle_have_their_paths_and_candidates(

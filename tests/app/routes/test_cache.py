@@ -28,7 +28,6 @@ from joulepath.app.tasks.answer_figures import figures_of
 from joulepath.app.tasks.read_body import HeldBody
 from tests.app.job_clients import ended
 from tests.app.requests import HOME, NEAR, move
-from tests.app.store.test_store import with_store
 
 KNOWN = {"Cache-Control": "max-age=60"}
 
@@ -117,97 +116,77 @@ def numbers(document: bytes) -> Any:
     return orjson.loads(document)["number"]
 
 
-def test_one_that_is_not_optimal_does_for_shorter_deadlines(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        async def keep(number: int, status: str, deadline: float) -> None:
-            asked = Asked("key", deadline)
-            await keep_answer(store, Settings(), "optimize", result(number, status), None, asked)
+async def test_one_that_is_not_optimal_does_for_shorter_deadlines(store: Store) -> None:
+    async def keep(number: int, status: str, deadline: float) -> None:
+        asked = Asked("key", deadline)
+        await keep_answer(store, Settings(), "optimize", result(number, status), None, asked)
 
-        async def found(deadline: float) -> Any:
-            known = await AnswerCache(store, None, False).find(Asked("key", deadline), "mine")
-            return None if known is None else numbers(known.document)
+    async def found(deadline: float) -> Any:
+        known = await AnswerCache(store, None, False).find(Asked("key", deadline), "mine")
+        return None if known is None else numbers(known.document)
 
-        assert await found(1.0) is None
-        await keep(1, "feasible", 10.0)
-        assert [await found(each) for each in (5.0, 10.0, 10.5)] == [1, 1, None]
-        await keep(2, "optimal", 20.0)
-        assert [await found(each) for each in (5.0, 100.0)] == [2, 2]
-        await keep(3, "feasible", 200.0)
-        assert await found(1.0) == 2
-        await keep(4, "optimal", 1.0)
-        assert await found(100.0) == 4
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+    assert await found(1.0) is None
+    await keep(1, "feasible", 10.0)
+    assert [await found(each) for each in (5.0, 10.0, 10.5)] == [1, 1, None]
+    await keep(2, "optimal", 20.0)
+    assert [await found(each) for each in (5.0, 100.0)] == [2, 2]
+    await keep(3, "feasible", 200.0)
+    assert await found(1.0) == 2
+    await keep(4, "optimal", 1.0)
+    assert await found(100.0) == 4
 
 
-def test_two_services_that_answer_at_the_same_time_lose_nothing(tmp_path: Path) -> None:
+async def test_two_services_that_answer_at_the_same_time_lose_nothing(store: Store) -> None:
     """The row of the first comes between the look and the write of the second."""
-
-    async def test(store: Store) -> None:
-        asked, settings = Asked("key", 1.0), Settings()
-        first = await keep_answer(store, settings, "optimize", result(1, "optimal"), None, asked)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Session, "scalars", lambda *_: [])  # it sees nothing
-            second = await keep_answer(
-                store, settings, "optimize", result(2, "optimal"), None, asked
-            )
-        assert first.document != second.document and not second.document.endswith(b'"answer":null}')
-        known = await AnswerCache(store, None, False).find(asked, "mine")
-        assert known is not None and numbers(known.document) == 1
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+    asked, settings = Asked("key", 1.0), Settings()
+    first = await keep_answer(store, settings, "optimize", result(1, "optimal"), None, asked)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Session, "scalars", lambda *_: [])  # it sees nothing
+        second = await keep_answer(store, settings, "optimize", result(2, "optimal"), None, asked)
+    assert first.document != second.document and not second.document.endswith(b'"answer":null}')
+    known = await AnswerCache(store, None, False).find(asked, "mine")
+    assert known is not None and numbers(known.document) == 1
 
 
-def test_what_is_pruned_is_forgotten(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        asked = Asked("key", 1.0)
-        await keep_answer(store, Settings(), "optimize", result(1, "optimal"), None, asked)
-        await store.write(lambda session: prune(session, 0, timedelta(days=1)))
-        assert await AnswerCache(store, None, False).find(asked, "mine") is None
-        assert await store.read(lambda session: session.query(CachedAnswer).count()) == 0
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+async def test_what_is_pruned_is_forgotten(store: Store) -> None:
+    asked = Asked("key", 1.0)
+    await keep_answer(store, Settings(), "optimize", result(1, "optimal"), None, asked)
+    await store.write(lambda session: prune(session, 0, timedelta(days=1)))
+    assert await AnswerCache(store, None, False).find(asked, "mine") is None
+    assert await store.read(lambda session: session.query(CachedAnswer).count()) == 0
 
 
-def test_keys_tell_clients_kinds_and_robots_apart(tmp_path: Path) -> None:
+async def test_keys_tell_clients_kinds_and_robots_apart(store: Store) -> None:
     body = OptimizeRequest.model_validate(move())
 
-    async def test(store: Store) -> None:
-        async def key(
-            owner: str | None = None, kind: str = "optimize", **fields: Any
-        ) -> str | None:
-            asked = await AnswerCache(store, owner, False).asked(
-                kind, body.model_copy(update=fields), 1.0
-            )
-            return None if asked is None else asked.key
+    async def key(owner: str | None = None, kind: str = "optimize", **fields: Any) -> str | None:
+        asked = await AnswerCache(store, owner, False).asked(
+            kind, body.model_copy(update=fields), 1.0
+        )
+        return None if asked is None else asked.key
 
-        keys = [
-            await key(),
-            await key("a"),
-            await key("b"),
-            await key(kind="pareto"),
-            await key(robot="ur10e"),
-        ]
-        assert len(set(keys)) == 5 and None not in keys
-        assert await key() == await key(deadline=77.0)
-        assert await key(robot="nobodys") is None
-        cache_of_large = AnswerCache(store, None, False)
-        assert await cache_of_large.asked("optimize", HeldBody(b"", {}, set()), 1.0) is None
-        assert await cache_of_large.find(None, "mine") is None
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+    keys = [
+        await key(),
+        await key("a"),
+        await key("b"),
+        await key(kind="pareto"),
+        await key(robot="ur10e"),
+    ]
+    assert len(set(keys)) == 5 and None not in keys
+    assert await key() == await key(deadline=77.0)
+    assert await key(robot="nobodys") is None
+    cache_of_large = AnswerCache(store, None, False)
+    assert await cache_of_large.asked("optimize", HeldBody(b"", {}, set()), 1.0) is None
+    assert await cache_of_large.find(None, "mine") is None
 
 
-def test_a_database_that_hangs_is_not_waited_for(tmp_path: Path) -> None:
+async def test_a_database_that_hangs_is_not_waited_for(tmp_path: Path) -> None:
     class Hanging(Store):
         async def read(self, work: Any) -> Any:
             await asyncio.Event().wait()
 
-    async def test() -> None:
-        store = Hanging(f"sqlite:///{tmp_path}/joulepath.db")
-        assert await AnswerCache(store, None, False).find(Asked("key", 1.0), "mine") is None
-
-    asyncio.run(test())
+    store = Hanging(f"sqlite:///{tmp_path}/joulepath.db")
+    assert await AnswerCache(store, None, False).find(Asked("key", 1.0), "mine") is None
 
 
 def job(client: TestClient, requests: list[Any], headers: dict[str, str]) -> list[dict[str, Any]]:

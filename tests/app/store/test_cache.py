@@ -15,7 +15,6 @@ from joulepath.app.store import answers, cache
 from joulepath.app.store.cache import Answered, Asked
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import new_id
-from tests.app.store.test_store import with_store
 
 ASKED = Asked("a" * 64, 10.0)
 OTHER = Asked("b" * 64, 10.0)
@@ -35,38 +34,32 @@ async def known(store: Store, *asked: Asked) -> dict[str, str]:
     return {each.key[0]: answer.id for each, answer in found.items()}
 
 
-def test_what_takes_the_place_of_what(url: str) -> None:
-    async def test(store: Store) -> None:
-        assert await known(store, ASKED, OTHER) == {}
-        first = await store.write(lambda session: keep(session, OTHER, ASKED, is_optimal=False))
-        assert await known(store, ASKED, OTHER) == {"a": first, "b": first}
-        assert await known(store, Asked(ASKED.key, 11.0)) == {}
-        second = await store.write(lambda session: keep(session, ASKED))
-        assert await known(store, Asked(ASKED.key, 11.0), OTHER) == {"a": second, "b": first}
-        await store.write(lambda session: keep(session, ASKED, is_optimal=False))
-        assert await known(store, ASKED) == {"a": second}, "an optimal one stays"
-
-    with_store(url, test)
+async def test_what_takes_the_place_of_what(store: Store) -> None:
+    assert await known(store, ASKED, OTHER) == {}
+    first = await store.write(lambda session: keep(session, OTHER, ASKED, is_optimal=False))
+    assert await known(store, ASKED, OTHER) == {"a": first, "b": first}
+    assert await known(store, Asked(ASKED.key, 11.0)) == {}
+    second = await store.write(lambda session: keep(session, ASKED))
+    assert await known(store, Asked(ASKED.key, 11.0), OTHER) == {"a": second, "b": first}
+    await store.write(lambda session: keep(session, ASKED, is_optimal=False))
+    assert await known(store, ASKED) == {"a": second}, "an optimal one stays"
 
 
-def test_two_that_remember_the_same_at_the_same_time(url: str) -> None:
-    async def test(store: Store) -> None:
-        has_written, may_end = threading.Event(), threading.Event()
+async def test_two_that_remember_the_same_at_the_same_time(store: Store) -> None:
+    has_written, may_end = threading.Event(), threading.Event()
 
-        def slow(session: Session) -> str:
-            kept = keep(session, ASKED)
-            session.flush()
-            has_written.set()
-            assert may_end.wait(60)
-            return kept
+    def slow(session: Session) -> str:
+        kept = keep(session, ASKED)
+        session.flush()
+        has_written.set()
+        assert may_end.wait(60)
+        return kept
 
-        first = asyncio.create_task(store.write(slow))
-        await asyncio.to_thread(has_written.wait, 60)
-        second = asyncio.create_task(store.write(lambda session: keep(session, ASKED, OTHER)))
-        await asyncio.sleep(0.2)
-        may_end.set()
-        ids = await first, await second
-        # in PostgreSQL, the first; in SQLite, which has one writer at a time, the last
-        assert (await known(store, ASKED, OTHER)) in [{"a": each, "b": ids[1]} for each in ids]
-
-    with_store(url, test)
+    first = asyncio.create_task(store.write(slow))
+    await asyncio.to_thread(has_written.wait, 60)
+    second = asyncio.create_task(store.write(lambda session: keep(session, ASKED, OTHER)))
+    await asyncio.sleep(0.2)
+    may_end.set()
+    ids = await first, await second
+    # in PostgreSQL, the first; in SQLite, which has one writer at a time, the last
+    assert (await known(store, ASKED, OTHER)) in [{"a": each, "b": ids[1]} for each in ids]

@@ -24,11 +24,11 @@ from joulepath.app.store import answers, studies
 from joulepath.app.store.database import create_database_engine
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import new_id
-from tests.app.databases import postgres
+from tests.app.databases import opened, postgres
 from tests.app.live import serving
 from tests.app.requests import move
 from tests.app.store.test_iterations import step
-from tests.app.store.test_store import MISSING, put, until_refused, with_store
+from tests.app.store.test_store import MISSING, put, until_refused
 
 NEARLY_FULL = 24 << 20
 
@@ -36,6 +36,11 @@ NEARLY_FULL = 24 << 20
 @pytest.fixture
 def database(tmp_path: Path) -> Path:
     return tmp_path / "joulepath.db"
+
+
+@pytest.fixture
+def url(database: Path) -> str:
+    return f"sqlite:///{database}"
 
 
 async def refused(store: Store, work: Any = put, writes: bool = True) -> StoreFault:
@@ -46,129 +51,108 @@ async def refused(store: Store, work: Any = put, writes: bool = True) -> StoreFa
 
 @pytest.mark.parametrize("lost", ["joulepath.db", "joulepath.db-wal"])
 @pytest.mark.parametrize("how", ["deleted", "replaced"])
-def test_nothing_is_acknowledged_in_a_file_that_is_gone(
-    database: Path, lost: str, how: str
+async def test_nothing_is_acknowledged_in_a_file_that_is_gone(
+    database: Path, lost: str, how: str, store: Store
 ) -> None:
-    async def test(store: Store) -> None:
-        await store.write(put)
-        if how == "deleted":
-            (database.parent / lost).unlink()
-        else:
-            (database.parent / "other").write_bytes((database.parent / lost).read_bytes())
-            (database.parent / "other").rename(database.parent / lost)
-        assert await refused(store) == "deleted"
-        assert store.fault == "deleted"
-
-    with_store(f"sqlite:///{database}", test)
+    await store.write(put)
+    if how == "deleted":
+        (database.parent / lost).unlink()
+    else:
+        (database.parent / "other").write_bytes((database.parent / lost).read_bytes())
+        (database.parent / "other").rename(database.parent / lost)
+    assert await refused(store) == "deleted"
+    assert store.fault == "deleted"
 
 
-def test_a_file_that_goes_during_the_work_is_seen_at_its_end(database: Path) -> None:
-    async def test(store: Store) -> None:
-        await store.write(put)
+async def test_a_file_that_goes_during_the_work_is_seen_at_its_end(
+    database: Path, store: Store
+) -> None:
+    await store.write(put)
 
-        def work(session: Any) -> None:
-            put(session)
-            database.unlink()
-
-        assert await refused(store, work) == "deleted"
-
-    with_store(f"sqlite:///{database}", test)
-
-
-def test_a_missing_database_is_not_replaced_by_an_empty_one(database: Path) -> None:
-    async def test(store: Store) -> None:
-        kept = await store.write(put)
-        await store.write(lambda session: session.connection().exec_driver_sql("SELECT 1"))
-        aside = database.with_name("aside")
-        with closing(sqlite3.connect(database)) as connection:
-            connection.execute("VACUUM INTO ?", (str(aside),))
+    def work(session: Any) -> None:
+        put(session)
         database.unlink()
-        for _ in range(2):
-            assert await refused(store) == "deleted"
-            await store.check()
-            assert store.fault == "deleted"
-        assert not database.exists()
-        # put back: used again, without a restart
-        for path in database.parent.glob("joulepath.db-*"):
-            path.unlink()
-        aside.rename(database)
+
+    assert await refused(store, work) == "deleted"
+
+
+async def test_a_missing_database_is_not_replaced_by_an_empty_one(
+    database: Path, store: Store
+) -> None:
+    kept = await store.write(put)
+    await store.write(lambda session: session.connection().exec_driver_sql("SELECT 1"))
+    aside = database.with_name("aside")
+    with closing(sqlite3.connect(database)) as connection:
+        connection.execute("VACUUM INTO ?", (str(aside),))
+    database.unlink()
+    for _ in range(2):
+        assert await refused(store) == "deleted"
         await store.check()
-        assert store.fault is None
+        assert store.fault == "deleted"
+    assert not database.exists()
+    # put back: used again, without a restart
+    for path in database.parent.glob("joulepath.db-*"):
+        path.unlink()
+    aside.rename(database)
+    await store.check()
+    assert store.fault is None
+    assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}"
+
+
+async def test_a_read_only_database_is_read(database: Path) -> None:
+    async with opened(f"sqlite:///{database}") as store:
+        kept = await store.write(put)
+    async with opened(f"sqlite:///file:{database}?mode=ro&uri=true") as store:
         assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}"
-
-    with_store(f"sqlite:///{database}", test)
-
-
-def test_a_read_only_database_is_read(database: Path) -> None:
-    kept: list[str] = []
-
-    async def fill(store: Store) -> None:
-        kept.append(await store.write(put))
-
-    async def test(store: Store) -> None:
-        assert (await store.read(partial(answers.get, answer_id=kept[0])))[1] == b"{}"
         assert await refused(store) == "read-only"
         await store.check()
         assert store.fault == "read-only"
 
-    with_store(f"sqlite:///{database}", fill)
-    with_store(f"sqlite:///file:{database}?mode=ro&uri=true", test)
 
-
-def test_a_lock_of_another_process_is_waited_for_once(database: Path) -> None:
+async def test_a_lock_of_another_process_is_waited_for_once(database: Path, store: Store) -> None:
     now = 0.0
-
-    async def test(store: Store) -> None:
-        nonlocal now
-        kept = await store.write(put)
-        # the clock stands for the wait, which is left out
-        began = iter((0.0, 0.0, 100.0, 100.0))
-        with closing(sqlite3.connect(database, isolation_level=None)) as other:
-            other.execute("BEGIN IMMEDIATE")
-            store._clock = lambda: next(began)
-            assert await refused(store) == "locked"
-            assert store.fault == "locked"
-            now = 100.5
-            store._clock = lambda: now
-            tried = 0
-
-            def work(session: Any) -> None:
-                nonlocal tried
-                tried += 1
-
-            assert await refused(store, work) == "locked" and tried == 0, (
-                "the next one does not wait"
-            )
-            assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}", (
-                "reading goes on"
-            )
-            other.execute("ROLLBACK")
-        now = 102.0
-        await store.check()
-        assert store.fault is None
-        await store.write(put)
-
-    with_store(f"sqlite:///{database}", test)
-
-
-def test_too_little_room_is_told_by_its_code(database: Path) -> None:
-    async def test(store: Store) -> None:
-        await store.write(put)
+    kept = await store.write(put)
+    # the clock stands for the wait, which is left out
+    began = iter((0.0, 0.0, 100.0, 100.0))
+    with closing(sqlite3.connect(database, isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        store._clock = lambda: next(began)
+        assert await refused(store) == "locked"
+        assert store.fault == "locked"
+        now = 100.5
+        store._clock = lambda: now
+        tried = 0
 
         def work(session: Any) -> None:
-            session.connection().exec_driver_sql("PRAGMA max_page_count = 1")
-            put(session, os.urandom(1 << 20))
+            nonlocal tried
+            tried += 1
 
-        assert await refused(store, work) == "full"
+        assert await refused(store, work) == "locked" and tried == 0, "the next one does not wait"
+        assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}", (
+            "reading goes on"
+        )
+        other.execute("ROLLBACK")
+    now = 102.0
+    await store.check()
+    assert store.fault is None
+    await store.write(put)
 
-    with_store(f"sqlite:///{database}", test)
+
+async def test_too_little_room_is_told_by_its_code(store: Store) -> None:
+    await store.write(put)
+
+    def work(session: Any) -> None:
+        session.connection().exec_driver_sql("PRAGMA max_page_count = 1")
+        put(session, os.urandom(1 << 20))
+
+    assert await refused(store, work) == "full"
 
 
 @pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
-def test_faults_of_postgresql_are_told_by_their_codes() -> None:
+async def test_faults_of_postgresql_are_told_by_their_codes() -> None:
     with postgres() as server:
-
-        async def test(store: Store) -> None:
+        other = create_database_engine(server.url)
+        async with opened(server.url) as store:
             kept = await store.write(put)
             with other.connect() as connection:
                 connection.execute(text("LOCK TABLE answers IN SHARE MODE"))
@@ -179,14 +163,11 @@ def test_faults_of_postgresql_are_told_by_their_codes() -> None:
             with other.begin() as connection:
                 connection.execute(text("ALTER ROLE tester SET default_transaction_read_only = on"))
 
-        async def later(store: Store) -> None:
+        async with opened(server.url) as store:
             assert await refused(store) == "read-only"
             await store.check()
             assert store.fault == "read-only"
 
-        other = create_database_engine(server.url)
-        with_store(server.url, test)
-        with_store(server.url, later)
         other.dispose()
 
 
@@ -206,8 +187,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", "-l", disk], check=True)
 
 
-def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
-    database = small_disk / "joulepath.db"
+async def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
     causes: list[StoreFault] = []
 
     async def fill(store: Store, study_id: str) -> int:
@@ -225,7 +205,7 @@ def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
             count += 1
         raise AssertionError("the disk is never full")
 
-    async def test(store: Store) -> None:
+    async with opened(f"sqlite:///{small_disk}/joulepath.db") as store:
         await store.open()
         assert (small_disk / "joulepath.db.reserve").stat().st_size > 0
         for _ in range(3):
@@ -252,8 +232,6 @@ def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
             await store.check()
         kept = await store.write(put)
         assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}"
-
-    with_store(f"sqlite:///{database}", test)
 
 
 def test_over_http_the_fault_is_said_and_answers_go_on(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ whatever its length.
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
 import pytest
 from sqlalchemy import event
@@ -17,8 +16,8 @@ from joulepath.app.store.store import Store
 from joulepath.app.store.studies import Step
 from joulepath.app.store.tables import Iteration, Study, new_id
 from joulepath.app.studies.answers import detail, entries
-from tests.app.store.test_store import with_store
 
+pytestmark = pytest.mark.parametrize("url", ["sqlite"], indirect=True)
 ENERGIES = [100.0, 80.0, 90.0, 60.0, 60.0, 70.0]
 THRESHOLD = 80.0
 BEST = [1, 2, 2, 4, 4, 4]
@@ -47,59 +46,50 @@ async def begun(store: Store, objective: str = "electrical", count: int = len(EN
     return study
 
 
-def test_each_knows_the_best_so_far(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        study = await begun(store)
-        found = [
-            detail(await store.read(partial(studies.entry, study_id=study.id, number=number)))
-            for number in range(1, len(ENERGIES) + 1)
-        ]
-        assert [each.best.number for each in found] == BEST
-        assert [each.threshold_met_by for each in found] == MET_BY
-        assert [each.request["optimize"] for each in found] == [
-            {"energy": energy} for energy in ENERGIES
-        ]
-        state = await store.read(partial(studies.state, study_id=study.id))
-        best, last = state.best, state.last
-        assert best is not None and last is not None
-        assert (best.number, last.number, last.met_by) == (4, 6, 2)
-        # one at a time, or all at once: the same
-        history = entries(await store.read(partial(studies.history, study_id=study.id)))
-        assert [
-            entry.items() <= each.model_dump().items()
-            for entry, each in zip(history, found, strict=True)
-        ] == [True] * len(ENERGIES)
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+async def test_each_knows_the_best_so_far(store: Store) -> None:
+    study = await begun(store)
+    found = [
+        detail(await store.read(partial(studies.entry, study_id=study.id, number=number)))
+        for number in range(1, len(ENERGIES) + 1)
+    ]
+    assert [each.best.number for each in found] == BEST
+    assert [each.threshold_met_by for each in found] == MET_BY
+    assert [each.request["optimize"] for each in found] == [
+        {"energy": energy} for energy in ENERGIES
+    ]
+    state = await store.read(partial(studies.state, study_id=study.id))
+    best, last = state.best, state.last
+    assert best is not None and last is not None
+    assert (best.number, last.number, last.met_by) == (4, 6, 2)
+    # one at a time, or all at once: the same
+    history = entries(await store.read(partial(studies.history, study_id=study.id)))
+    assert [
+        entry.items() <= each.model_dump().items()
+        for entry, each in zip(history, found, strict=True)
+    ] == [True] * len(ENERGIES)
 
 
-def test_the_objective_is_what_is_compared(tmp_path: Path) -> None:
-    async def test(store: Store) -> None:
-        study = await begun(store, "mechanical")
-        state = await store.read(partial(studies.state, study_id=study.id))
-        assert (state.best.number, state.last.met_by) == (1, None)  # type: ignore[union-attr]
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+async def test_the_objective_is_what_is_compared(store: Store) -> None:
+    study = await begun(store, "mechanical")
+    state = await store.read(partial(studies.state, study_id=study.id))
+    assert (state.best.number, state.last.met_by) == (1, None)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("count", [3, 6])
-def test_to_add_one_reads_as_much_in_a_study_of_any_length(tmp_path: Path, count: int) -> None:
+async def test_to_add_one_reads_as_much_in_a_study_of_any_length(count: int, store: Store) -> None:
     read: list[Iteration] = []
 
     def note(iteration: Iteration, _: object) -> None:
         read.append(iteration)
 
-    async def test(store: Store) -> None:
-        study = await begun(store, count=count)
-        event.listen(Iteration, "load", note)
-        try:
-            number, _ = await store.write(
-                partial(studies.add, study_id=study.id, step=step(50.0), key=None, client=OPERATOR)
-            )
-            assert len(read) == 2, "the last one and the best one"
-            await store.read(partial(studies.entry, study_id=study.id, number=number))
-            assert len(read) == 2 + 3, "it, the one before, and the best one before"
-        finally:
-            event.remove(Iteration, "load", note)
-
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+    study = await begun(store, count=count)
+    event.listen(Iteration, "load", note)
+    try:
+        number, _ = await store.write(
+            partial(studies.add, study_id=study.id, step=step(50.0), key=None, client=OPERATOR)
+        )
+        assert len(read) == 2, "the last one and the best one"
+        await store.read(partial(studies.entry, study_id=study.id, number=number))
+        assert len(read) == 2 + 3, "it, the one before, and the best one before"
+    finally:
+        event.remove(Iteration, "load", note)

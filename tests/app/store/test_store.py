@@ -11,7 +11,6 @@ import os
 import sqlite3
 import threading
 import time
-from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from datetime import timedelta
 from functools import partial
@@ -36,7 +35,7 @@ from joulepath.app.store.faults import OtherVersion, fault_of
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import store_answers
 from joulepath.app.store.tables import Answer, Table, new_id, now
-from tests.app.databases import Postgres, why_no_postgres
+from tests.app.databases import Postgres, opened, why_no_postgres
 from tests.app.forks import Fork
 from tests.app.live import ROOT, WARM_UP, Server, serving
 from tests.app.problems import checked
@@ -52,17 +51,6 @@ def put(session: Any, body: bytes = b"{}", kind: str = "optimize", owner: str | 
     answer = StoredAnswer(new_id(), body)
     answers.put(session, kind, answer, owner=owner)
     return answer.id
-
-
-def with_store(url: str, test: Callable[[Store], Awaitable[None]]) -> None:
-    async def run() -> None:
-        store = Store(url)
-        try:
-            await test(store)
-        finally:
-            await store.close()
-
-    asyncio.run(run())
 
 
 def until_refused(server: Server, cause: str | None) -> None:
@@ -143,7 +131,7 @@ def test_a_new_file_that_another_process_makes_is_waited_for(tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
-def test_a_service_waits_while_another_one_migrates(
+async def test_a_service_waits_while_another_one_migrates(
     server: Postgres, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also for longer than PostgreSQL may take for an ordinary answer: the first request is not
@@ -163,7 +151,10 @@ def test_a_service_waits_while_another_one_migrates(
             locked.set()
             time.sleep(3 * database.DATABASE.server_timeout)
 
-    async def test(store: Store) -> None:
+    other = threading.Thread(target=migrate_slowly)
+    other.start()
+    assert locked.wait(30)
+    async with opened(server.url) as store:
         await store.open()
         assert store.fault is None
         assert (
@@ -172,31 +163,22 @@ def test_a_service_waits_while_another_one_migrates(
             )
             == 0
         )
-
-    other = threading.Thread(target=migrate_slowly)
-    other.start()
-    assert locked.wait(30)
-    with_store(server.url, test)
     other.join()
 
 
-def test_answers_are_kept_whole(url: str) -> None:
+async def test_answers_are_kept_whole(store: Store) -> None:
     body = json.dumps({"energy": [1.5] * 1000, "name": "größte"}).encode()
-
-    async def test(store: Store) -> None:
-        before = now()
-        answer_id = await store.write(partial(put, body=body))
-        answer, kept = await store.read(partial(answers.get, answer_id=answer_id))
-        assert (answer.kind, kept) == ("optimize", body)
-        assert before <= answer.created <= now()
-        assert answer.size < len(body)
-        with pytest.raises(UnknownAnswer):
-            await store.read(partial(answers.get, answer_id="no\0such"))
-
-    with_store(url, test)
+    before = now()
+    answer_id = await store.write(partial(put, body=body))
+    answer, kept = await store.read(partial(answers.get, answer_id=answer_id))
+    assert (answer.kind, kept) == ("optimize", body)
+    assert before <= answer.created <= now()
+    assert answer.size < len(body)
+    with pytest.raises(UnknownAnswer):
+        await store.read(partial(answers.get, answer_id="no\0such"))
 
 
-def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
+async def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
     """A document repeats texts of the caller: none of them may stand for anything else."""
     kept = [StoredAnswer(new_id(), b'{"k": 0}'), StoredAnswer(new_id(), b'{"k": 1}')]
     texts = [f"\x7f{word}/{k}\x7f" for word in ("kept", "stored") for k in range(2)]
@@ -204,7 +186,7 @@ def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
         {"names": texts, "answers": [answer.path for answer in kept]}, tuple(kept)
     )
 
-    async def test(store: Store) -> None:
+    async with opened(f"sqlite:///{tmp_path}/joulepath.db") as store:
         done = await store_answers(store, Settings(), "optimize", result, None)
         assert (done.document, done.media_type, done.stored) == (
             result.document,
@@ -217,66 +199,49 @@ def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
             )
             assert body == answer.body
 
-    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
 
-
-def test_typed_texts_take_room(url: str) -> None:
+async def test_typed_texts_take_room(store: Store) -> None:
     """Only the last ones that were told."""
-
-    async def test(store: Store) -> None:
-        kept = await store.write(put)
-        before = await store.read(lambda session: session.get_one(Answer, kept).size)
-        client = Client("127.0.0.1")
-        for typed in ({"/deadline": "9" * 60}, {"/deadline": "9,0"}, None):
-            tell = partial(answers.rename, answer_id=kept, name=None, typed=typed, client=client)
-            await store.write(tell)
-        size = await store.read(lambda session: session.get_one(Answer, kept).size)
-        assert size == before + len('{"/deadline":"9,0"}') - len("{}")
-
-    with_store(url, test)
+    kept = await store.write(put)
+    before = await store.read(lambda session: session.get_one(Answer, kept).size)
+    client = Client("127.0.0.1")
+    for typed in ({"/deadline": "9" * 60}, {"/deadline": "9,0"}, None):
+        tell = partial(answers.rename, answer_id=kept, name=None, typed=typed, client=client)
+        await store.write(tell)
+    size = await store.read(lambda session: session.get_one(Answer, kept).size)
+    assert size == before + len('{"/deadline":"9,0"}') - len("{}")
 
 
-def test_the_oldest_answers_make_room(url: str) -> None:
-    async def test(store: Store) -> None:
-        ids = [await store.write(put) for _ in range(5)]
-        size = await store.read(lambda session: session.get_one(Answer, ids[0]).size)
-        await store.write(partial(answers.prune, max_bytes=3 * size, max_age=A_DAY))
-        assert await left(store) == set(ids[2:])
-        await store.write(
-            lambda session: session.execute(
-                update(Answer)
-                .where(Answer.id.in_([ids[2], ids[4]]))
-                .values(created=now() - 2 * A_DAY)
-            )
-        )
-        await store.write(partial(answers.prune, max_bytes=MUCH, max_age=A_DAY))
-        assert await left(store) == {ids[3]}
-
-    async def left(store: Store) -> set[str]:
+async def test_the_oldest_answers_make_room(store: Store) -> None:
+    async def left() -> set[str]:
         return set(await store.read(lambda session: session.scalars(select(Answer.id)).all()))
 
-    with_store(url, test)
+    ids = [await store.write(put) for _ in range(5)]
+    size = await store.read(lambda session: session.get_one(Answer, ids[0]).size)
+    await store.write(partial(answers.prune, max_bytes=3 * size, max_age=A_DAY))
+    assert await left() == set(ids[2:])
+    await store.write(
+        lambda session: session.execute(
+            update(Answer).where(Answer.id.in_([ids[2], ids[4]])).values(created=now() - 2 * A_DAY)
+        )
+    )
+    await store.write(partial(answers.prune, max_bytes=MUCH, max_age=A_DAY))
+    assert await left() == {ids[3]}
 
 
-def test_work_that_fails_changes_nothing(url: str) -> None:
+async def test_work_that_fails_changes_nothing(store: Store) -> None:
     def fail(session: Any) -> None:
         put(session)
         session.flush()
         raise ZeroDivisionError
 
-    async def test(store: Store) -> None:
-        with pytest.raises(ZeroDivisionError):
-            await store.write(fail)
-        assert await store.read(lambda session: session.scalar(select(func.count(Answer.id)))) == 0
-
-    with_store(url, test)
+    with pytest.raises(ZeroDivisionError):
+        await store.write(fail)
+    assert await store.read(lambda session: session.scalar(select(func.count(Answer.id)))) == 0
 
 
-def test_writers_wait_for_each_other(url: str) -> None:
-    async def test(store: Store) -> None:
-        assert len(set(await asyncio.gather(*(store.write(put) for _ in range(50))))) == 50
-
-    with_store(url, test)
+async def test_writers_wait_for_each_other(store: Store) -> None:
+    assert len(set(await asyncio.gather(*(store.write(put) for _ in range(50))))) == 50
 
 
 def test_answers_over_http(client: TestClient) -> None:
@@ -328,13 +293,11 @@ def test_without_its_database_the_service_goes_on(url: str) -> None:
 
 
 @pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
-def test_a_database_that_comes_back_is_used_again(server: Postgres) -> None:
-    async def test(store: Store) -> None:
+async def test_a_database_that_comes_back_is_used_again(server: Postgres) -> None:
+    async with opened(server.url) as store:
         answer_id = await store.write(put)
         server.stop()
         with pytest.raises(StoreUnavailable):
             await store.read(partial(answers.get, answer_id=answer_id))
         server.start()
         assert (await store.read(partial(answers.get, answer_id=answer_id)))[1] == b"{}"
-
-    with_store(server.url, test)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
 
 import pytest
 
@@ -42,11 +41,9 @@ class Bench:
         return TaskResult(b"%d" % number, "text/plain")
 
 
-def run(test: Callable[[Bench], Awaitable[None]]) -> None:
-    async def in_loop() -> None:
-        await test(Bench())
-
-    asyncio.run(in_loop())
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
 
 
 async def some_turns() -> None:
@@ -54,57 +51,46 @@ async def some_turns() -> None:
         await asyncio.sleep(0)
 
 
-def test_equal_ones_are_computed_once() -> None:
-    async def test(bench: Bench) -> None:
-        asked = [
-            bench.ask(),
-            bench.ask(),
-            bench.ask(),
-            bench.ask(Asked("key", 9.0)),
-            bench.ask(Asked("other", 10.0)),
-        ]
-        await some_turns()
-        assert bench.begun == 3
-        bench.free.set()
-        found = [
-            (result.document, is_anothers) for result, is_anothers in await asyncio.gather(*asked)
-        ]
-        assert found == [(b"1", False), (b"1", True), (b"1", True), (b"2", False), (b"3", False)]
-        assert (await bench.ask())[0].document == b"4", "later ones find it in the database"
-
-    run(test)
+async def test_equal_ones_are_computed_once(bench: Bench) -> None:
+    asked = [
+        bench.ask(),
+        bench.ask(),
+        bench.ask(),
+        bench.ask(Asked("key", 9.0)),
+        bench.ask(Asked("other", 10.0)),
+    ]
+    await some_turns()
+    assert bench.begun == 3
+    bench.free.set()
+    found = [(result.document, is_anothers) for result, is_anothers in await asyncio.gather(*asked)]
+    assert found == [(b"1", False), (b"1", True), (b"1", True), (b"2", False), (b"3", False)]
+    assert (await bench.ask())[0].document == b"4", "later ones find it in the database"
 
 
-def test_it_goes_on_while_somebody_waits() -> None:
-    async def test(bench: Bench) -> None:
-        first, second = bench.ask(), bench.ask()
-        await some_turns()
-        first.cancel()
-        await some_turns()
-        assert (bench.begun, bench.stopped) == (1, 0)
-        second.cancel()
-        third = bench.ask()
-        await some_turns()
-        assert (bench.begun, bench.stopped) == (2, 1), "what is being stopped answers nobody"
-        bench.free.set()
-        assert (await third)[0].document == b"2"
-
-    run(test)
+async def test_it_goes_on_while_somebody_waits(bench: Bench) -> None:
+    first, second = bench.ask(), bench.ask()
+    await some_turns()
+    first.cancel()
+    await some_turns()
+    assert (bench.begun, bench.stopped) == (1, 0)
+    second.cancel()
+    third = bench.ask()
+    await some_turns()
+    assert (bench.begun, bench.stopped) == (2, 1), "what is being stopped answers nobody"
+    bench.free.set()
+    assert (await third)[0].document == b"2"
 
 
-def test_what_the_service_is_to_blame_for_is_tried_again() -> None:
-    async def test(bench: Bench) -> None:
-        bench.errors = [Busy()]
-        bench.free.set()
-        first, second = bench.ask(), bench.ask()
-        with pytest.raises(Busy):
-            await first
-        assert (await second)[0].document == b"2"
-        bench.errors = [OutsideLimits("start", 1, 9.0, -1.0, 1.0)]
-        wrong = [bench.ask(), bench.ask()]
-        for each in wrong:
-            with pytest.raises(OutsideLimits):
-                await each
-        assert bench.begun == 3
-
-    run(test)
+async def test_what_the_service_is_to_blame_for_is_tried_again(bench: Bench) -> None:
+    bench.errors = [Busy()]
+    bench.free.set()
+    first, second = bench.ask(), bench.ask()
+    with pytest.raises(Busy):
+        await first
+    assert (await second)[0].document == b"2"
+    bench.errors = [OutsideLimits("start", 1, 9.0, -1.0, 1.0)]
+    wrong = [bench.ask(), bench.ask()]
+    for each in wrong:
+        with pytest.raises(OutsideLimits):
+            await each
+    assert bench.begun == 3

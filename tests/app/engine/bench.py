@@ -1,0 +1,70 @@
+"""An engine whose clock a test moves, and tasks that hold its workers."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from joulepath.app.engine.pool import Engine
+from tests.app.engine.simple_tasks import Hold, ProcessId
+
+# What a busy machine may take for anything below [s]; no test waits for it to pass.
+PATIENCE = 120.0
+# A deadline, and two graces, that a busy machine does not reach by itself [s]; the tests move the
+# clock beyond them.
+LONG, DEADLINE_GRACE, SHUTDOWN_GRACE = 1000.0, 300.0, 500.0
+
+
+class MovableLoop(asyncio.SelectorEventLoop):
+    """An event loop whose clock a test moves."""
+
+    moved = 0.0
+
+    def time(self) -> float:
+        return super().time() + self.moved
+
+
+class Bench:
+    """An engine under test, and tasks that hold its workers until the test releases them."""
+
+    def __init__(self, engine: Engine, loop: MovableLoop, folder: Path) -> None:
+        self.engine, self._loop, self._folder = engine, loop, folder
+        self._numbers = itertools.count()
+
+    def move_clock(self, seconds: float) -> None:
+        self._loop.moved += seconds
+
+    async def held(self, deadline: float = LONG) -> tuple[asyncio.Task[Any], Path]:
+        """A task that runs in a worker; touch the path to let it end."""
+        folder = self._folder / str(next(self._numbers))
+        folder.mkdir()
+        running = asyncio.create_task(self.engine.run(Hold(folder), deadline))
+        await until((folder / "started").exists)
+        return running, folder / "released"
+
+    async def queued(self, task: Any, deadline: float = LONG) -> asyncio.Task[Any]:
+        """A task that waits for a worker."""
+        waiting = asyncio.create_task(self.engine.run(task, deadline))
+        await asyncio.sleep(0)  # until it waits
+        return waiting
+
+    async def pid(self) -> int:
+        """Process id of the worker that runs the next task."""
+        return int((await self.engine.run(ProcessId(), LONG)).document)
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    async with asyncio.timeout(PATIENCE):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+def settings(**given: Any) -> pytest.MarkDecorator:
+    """The settings of the engine of a test, and its function `warm`, where they are not those of
+    `bench`."""
+    return pytest.mark.parametrize("bench", [given], indirect=True, ids=[",".join(given)])
