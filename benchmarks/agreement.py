@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.command import on_one_core, parser, verdict
 from benchmarks.statistics import Spread
 from benchmarks.tasks import as_pose, flange
 from joulepath.app.api.compare.task import CompareRequest, CompareTask
@@ -256,11 +256,7 @@ def main() -> int:
     )
     for name, spread in results["differences"].items():
         print(f"{name:14s} {spread.times(100).formatted(' %', 3)}")
-    write_json(given.json, results)
-    failed = failed_requirements(results)
-    for message in failed:
-        print(f"FAILED: {message}")
-    return 1 if failed else 0
+    return verdict(given.json, results, failed_requirements(results))
 
 
 if __name__ == "__main__":

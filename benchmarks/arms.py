@@ -26,7 +26,7 @@ from typing import Any
 
 from benchmarks.arm_files import ArmOutcome, first_motion
 from benchmarks.checks import refusal_errors
-from benchmarks.command import parser, write_json
+from benchmarks.command import parser, verdict, write_json
 from benchmarks.requests import Outcome, send_all
 from benchmarks.service import Service, running
 from benchmarks.statistics import Spread
@@ -128,10 +128,8 @@ def main() -> int:
                 flush=True,
             )
     errors = [error for one in rows for error in one["errors"]]
-    for error in errors:
-        print(f"FAILED: {error}")
-    write_json(given.json, {"count": given.count, "rows": rows, "errors": errors})
-    return 1 if errors else 0
+    results = {"count": given.count, "rows": rows, "errors": errors}
+    return verdict(given.json, results, errors)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,3 +43,11 @@ def write_json(path: Path | None, results: dict[str, Any]) -> None:
         path.write_bytes(
             orjson.dumps(results, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2)
         )
+
+
+def verdict(path: Path | None, results: dict[str, Any], failed: Sequence[object]) -> int:
+    """Writes results as JSON, and prints what failed; returns the exit code."""
+    write_json(path, results)
+    for each in failed:
+        print(f"FAILED: {each}")
+    return 1 if failed else 0

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.command import on_one_core, parser, verdict, write_json
 from benchmarks.statistics import Spread
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
@@ -137,10 +137,7 @@ def main() -> int:
     results = of_patterns(given.seed, given.count or 10_000)
     for name, counted in results["outcomes"].items():
         print(f"{name}: " + ", ".join(f"{count} {each}" for each, count in counted.items()))
-    for each in results["wrong"]:
-        print(f"FAILED: {each}")
-    write_json(given.json, results)
-    return 1 if results["wrong"] else 0
+    return verdict(given.json, results, results["wrong"])
 
 
 if __name__ == "__main__":

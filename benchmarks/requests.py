@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from benchmarks.checks import balance_error, errors_found, gap_of, objective
-from benchmarks.command import parser, write_json
+from benchmarks.command import parser, verdict
 from benchmarks.service import Answer, Client, Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, RequestTask, request_tasks
@@ -224,11 +224,7 @@ def main() -> int:
         outcomes = send_all(service, tasks, given.clients, given.line_every)
     results = summary(outcomes)
     print_summary(results)
-    write_json(given.json, results)
-    failed = failed_requirements(results)
-    for message in failed:
-        print(f"FAILED: {message}")
-    return 1 if failed else 0
+    return verdict(given.json, results, failed_requirements(results))
 
 
 if __name__ == "__main__":

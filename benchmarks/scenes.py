@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.cells import CELLS, CellTask, cell_tasks
 from benchmarks.collision_replay import collisions
-from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.command import on_one_core, parser, verdict
 from benchmarks.statistics import Spread
 from joulepath import optimize
 from joulepath.models.registry import load_robot
@@ -183,11 +183,7 @@ def main() -> int:
     ]
     results = summary(outcomes)
     print_summary(results)
-    write_json(given.json, results)
-    failed = failed_requirements(results)
-    for message in failed:
-        print(f"FAILED: {message}")
-    return 1 if failed else 0
+    return verdict(given.json, results, failed_requirements(results))
 
 
 if __name__ == "__main__":
