@@ -16,15 +16,10 @@ from joulepath.optimizer.picture.view import PictureSettings
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.scene import Attachment, Box, Cylinder, HalfSpace, Obstacle, Scene
 from tests.optimizer.moves import GOAL, ROBOT, START
+from tests.optimizer.placement.cells import at
 
 SVG = "{http://www.w3.org/2000/svg}"
 MIDDLE = (START + GOAL) / 2
-
-
-def at(x: float, y: float, z: float) -> np.ndarray:
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T
 
 
 SCENE = Scene(

@@ -16,6 +16,7 @@ import pytest
 
 import joulepath
 from tests.identification_logs import csv_of, recorded, truth_of
+from tests.optimizer.placement.cells import at
 
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = START + 0.3
@@ -25,18 +26,12 @@ GOAL = START + 0.3
 def problem() -> joulepath.Problem:
     scene = joulepath.Scene(
         [
-            joulepath.Obstacle("post", joulepath.Cylinder(0.05, 0.4), placed(-0.9)),
-            joulepath.Obstacle("wall", joulepath.HalfSpace(), placed(-1.5)),
+            joulepath.Obstacle("post", joulepath.Cylinder(0.05, 0.4), at(z=-0.9)),
+            joulepath.Obstacle("wall", joulepath.HalfSpace(), at(z=-1.5)),
         ]
     )
     arm = joulepath.Arm(robot=joulepath.load_robot("ur5e"), scene=scene)
     return joulepath.Problem(arm=arm, start=START, goal=GOAL, windings=False, deadline=100.0)
-
-
-def placed(z: float) -> Any:
-    T = np.eye(4)
-    T[2, 3] = z
-    return T
 
 
 @cache
@@ -70,7 +65,7 @@ def result(name: str) -> Any:
         pose = joulepath.Pose.from_rotvec([0.4, -0.2, 0.3], [np.pi, 0.0, 0.0])
         return joulepath.place(
             replace(cycle(), stops=[joulepath.Stop(name="pick", target=pose)]),
-            joulepath.Places([placed(0.01)]),
+            joulepath.Places([at(z=0.01)]),
         )
     return joulepath.plan_cycle(cycle())
 

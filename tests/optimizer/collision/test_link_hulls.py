@@ -12,7 +12,6 @@ from scipy.spatial import ConvexHull
 
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.coal_distance import coal_shape
 from joulepath.optimizer.collision.cores import Core
@@ -22,16 +21,11 @@ from joulepath.optimizer.problem.clouds import Points
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from tests.mesh_folders import meshes
 from tests.optimizer.cells import wander
+from tests.optimizer.placement.cells import at
 
 ROBOT = load_robot("ur5e")
 EXCESS = 2.7e-3 + 1e-4  # m; of the fit beyond the hulls of the meshes, and of its last digit
 SEARCHED = 1e-6  # m; tolerance of Coal's search
-
-
-def at(x: float, y: float, z: float) -> Array:
-    T = np.eye(4)
-    T[:3, 3] = [x, y, z]
-    return T
 
 
 POST = Obstacle("post", Box(np.array([0.1, 0.1, 0.8])), at(0.4, 0.3, 0.4), margin=0.0)

@@ -45,6 +45,7 @@ from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import ROBOT, problem_with
+from tests.optimizer.placement.cells import at
 from tests.selection import long_but
 
 # s: ample, so that a seed and not the machine's load decides what is found
@@ -55,14 +56,6 @@ DENSE = 0.003  # rad between the configurations at which a path is checked
 DOWN = Rotation.from_euler("x", np.pi).as_matrix()
 REPLAY = 1e-4  # s
 FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
-
-
-def at(x: float, y: float, z: float, R: Array | None = None) -> Array:
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    if R is not None:
-        T[:3, :3] = R
-    return T
 
 
 def walls(**boxes: tuple[tuple[float, float, float], tuple[float, float, float]]) -> Scene:

@@ -18,19 +18,14 @@ from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.seeds import estimates
 from joulepath.optimizer.search.state import SearchState
+from tests.optimizer.placement.cells import at
 
 ROBOT = load_robot("panda")
 HOME = np.array([0, -0.785, 0, -2.356, 0, 1.571, 0.785])
 REACHED = np.array([1.2, 0.5, -0.3, -1.9, 0.3, 2.3, 0.6])
 
 
-def placed(x: float, y: float, z: float) -> np.ndarray:
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T
-
-
-WALL = Obstacle("wall", Box(np.array([0.5, 0.04, 0.5])), placed(0.45, 0.2, 0.25), margin=0.0)
+WALL = Obstacle("wall", Box(np.array([0.5, 0.04, 0.5])), at(0.45, 0.2, 0.25), margin=0.0)
 ARM = Arm(robot=ROBOT, scene=Scene([WALL]))
 GOAL = Pose(tcp_pose(ARM, REACHED[None])[0])
 QUICK = 1.1  # s

@@ -8,7 +8,6 @@ import pytest
 
 from joulepath import optimize
 from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_constraint import (
     CLEARANCE_CONSTRAINT,
     ClearanceConstraint,
@@ -29,6 +28,7 @@ from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET
 from tests.optimizer.moves import fixed, problem_with
+from tests.optimizer.placement.cells import at
 
 ROBOT = load_robot("ur5e")
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
@@ -53,12 +53,6 @@ COUNTED_SHARE = (
 )
 # relative tolerance of energies of one motion solved twice
 SAME_ENERGY = 1e-3
-
-
-def at(*xyz: float) -> Array:
-    T = np.eye(4)
-    T[:3, 3] = xyz
-    return T
 
 
 def low_post(margin: float = 0.0) -> Obstacle:
