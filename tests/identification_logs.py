@@ -11,11 +11,11 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-import pinocchio as pin
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.logs.log import EffortMeaning, Log, LogMove
 from joulepath.optimizer.problem.arm import Payload
+from tests.by_pinocchio import torques_of
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
@@ -176,8 +176,7 @@ def rigid_torques(robot: Robot, truth: Truth, q: Array, v: Array, a: Array) -> A
         truth.payload.mass, truth.payload.com, truth.payload.inertia, GRAVITY
     )
     model.armature = np.zeros(model.nv)
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
+    return torques_of(model, q, v, a)
 
 
 def _motions(

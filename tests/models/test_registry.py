@@ -20,6 +20,7 @@ from joulepath.models.registry import load_figures, load_robot, robot_names
 from joulepath.models.robot import Array, Robot
 from joulepath.models.trust import energy_trust
 from joulepath.models.urdf import urdf_of
+from tests.by_pinocchio import flange
 from tests.mesh_folders import SHIPPED
 from tests.mesh_folders import meshes as arm_folder
 
@@ -121,13 +122,6 @@ def craig_flange(q: Array, figures: dict[str, Any]) -> Array:
         )
     T[:3, 3] += figures["flange_origin"]["value"][2] * T[:3, 2]
     return T
-
-
-def flange(robot: Robot, q: Array) -> Array:
-    """T_base_flange (4, 4) by Pinocchio."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
 
 
 def configurations(nq: int, count: int = 200) -> Array:

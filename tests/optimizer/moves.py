@@ -18,6 +18,7 @@ from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
+from tests.by_pinocchio import flange, torques_of
 
 ROBOT = load_robot("ur5e")
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
@@ -70,9 +71,7 @@ def limits(**given: Any) -> Limits:
 
 def tcp_pose(q: Array, T_flange_tcp: Array | None = None) -> Pose:
     """Pose of the TCP at q, by Pinocchio."""
-    data = ROBOT.model.createData()
-    pin.framesForwardKinematics(ROBOT.model, data, q)
-    T = data.oMf[ROBOT.model.getFrameId("flange")].homogeneous
+    T = flange(ROBOT, q)
     return Pose(T if T_flange_tcp is None else T @ T_flange_tcp)
 
 
@@ -92,8 +91,7 @@ def torques(task: Problem, q: Array, v: Array, a: Array) -> Array:
     model = arm.robot.loaded_model(
         load.mass, load.com, load.inertia, arm.gravity, arm.link_mass_scale
     )
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
+    return torques_of(model, q, v, a)
 
 
 def potential(task: Problem, q: Array) -> float:

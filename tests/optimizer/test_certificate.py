@@ -19,6 +19,7 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.certificate import Certificate, Clearance
 from joulepath.optimizer.result.energy import Energy
+from tests.by_pinocchio import flange
 from tests.optimizer.moves import problem_with
 
 # relative; values met exactly on the grid, up to double precision through a few thousand operations
@@ -204,9 +205,7 @@ def test_a_missed_goal_shows(energy: Energy) -> None:
     """
     delta = 1e-3
     spline = quintic(goal=GOAL + np.array([delta, 0, 0, 0, 0, 0]))
-    data = ROBOT.model.createData()
-    pin.framesForwardKinematics(ROBOT.model, data, GOAL)
-    radius = float(np.hypot(*data.oMf[ROBOT.model.getFrameId("flange")].translation[:2]))
+    radius = float(np.hypot(*flange(ROBOT, GOAL)[:2, 3]))
     certificate = certify(problem(), spline, START, GOAL, energy)
     assert certificate.goal_error == pytest.approx(
         (2 * radius * math.sin(delta / 2), delta), rel=1e-6
@@ -231,10 +230,8 @@ def test_pose_targets_are_of_the_tcp(energy: Energy) -> None:
     """A goal pose moved by 2 mm and turned by 3 mrad about the TCP's own z reads just so, tool
     included.
     """
-    data = ROBOT.model.createData()
-    pin.framesForwardKinematics(ROBOT.model, data, GOAL)
     tool = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.2, 1.0), np.array([0.05, 0.0, 0.15]))
-    tcp = data.oMf[ROBOT.model.getFrameId("flange")] * tool
+    tcp = pin.SE3(flange(ROBOT, GOAL)) * tool
     moved = tcp * pin.SE3(pin.rpy.rpyToMatrix(0, 0, 3e-3), np.array([0.0, 2e-3, 0.0]))
     exact = problem(goal=Pose(tcp.homogeneous), T_flange_tcp=tool.homogeneous)
     certificate = certify(exact, quintic(), START, GOAL, energy)

@@ -5,16 +5,16 @@ answers, proofs.
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from joulepath import Arm, Pose, Problem, optimize
 from joulepath.models.registry import load_robot, robot_names
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Robot
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.kinematics.angles import nearest_turn
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from tests.by_pinocchio import flange, torques_of
 from tests.selection import long_but
 
 # m and rad: what an answer may miss its pose by, and a configuration itself
@@ -40,13 +40,6 @@ QUICK = ("ur3e", "ur5e")
 @pytest.fixture(params=long_but(QUICK, robot_names()), scope="module")
 def robot(request: pytest.FixtureRequest) -> Robot:
     return load_robot(request.param)
-
-
-def flange(robot: Robot, q: Array) -> Array:
-    """T_base_flange (4, 4) by Pinocchio."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
 
 
 def test_every_configuration_is_among_those_of_its_pose(robot: Robot) -> None:
@@ -76,10 +69,7 @@ def test_dynamics_are_pinocchios(robot: Robot, count: int) -> None:
     limits = robot.limits
     q = rng.uniform(limits.q_min, limits.q_max, (count, robot.nq))
     v, a = (rng.uniform(-most, most, q.shape) for most in (limits.v_max, limits.a_max))
-    data = robot.model.createData()
-    expected = np.array(
-        [pin.rnea(robot.model, data, *state) for state in zip(q, v, a, strict=True)]
-    )
+    expected = torques_of(robot.model, q, v, a)
     assert np.abs(plant.torques(q, v, a) - expected).max() < TORQUE
 
 

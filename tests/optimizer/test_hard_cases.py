@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from joulepath import Payload, Pose, Problem, optimize
 from joulepath.models.registry import load_robot
+from tests.by_pinocchio import flange
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 
@@ -21,11 +21,7 @@ HAIR = 3e-4
 
 
 def pose(q: np.ndarray) -> Pose:
-    data = ROBOT.model.createData()
-    pin.forwardKinematics(ROBOT.model, data, q)
-    return Pose(
-        pin.updateFramePlacement(ROBOT.model, data, ROBOT.model.getFrameId("flange")).homogeneous
-    )
+    return Pose(flange(ROBOT, q))
 
 
 def varied(seed: int, index: int) -> Problem:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from joulepath.models.from_figures import robot_of
@@ -25,6 +24,7 @@ from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
+from tests.by_pinocchio import torques_of
 from tests.optimizer.dynamics.kernel_states import LOSSY, TORQUE, left_out, places, states
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem, torques
 
@@ -51,8 +51,7 @@ def by_hand(task: Any, q: Array, v: Array, a: Array) -> Array:
     body = arm.payload
     model = arm.robot.loaded_model(body.mass, body.com, body.inertia, arm.gravity)
     model.armature = np.zeros(model.nv)
-    data = model.createData()
-    carried = np.abs([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
+    carried = np.abs(torques_of(model, q, v, a))
     step = v / np.sqrt(v**2 + law.knee**2)
     return np.asarray(
         (law.coulomb + law.load * carried) * step + law.unloaded.torque(v) - law.coulomb * step

@@ -36,6 +36,7 @@ from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from joulepath.optimizer.motion.quadrature import grid, simpson_weights
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm
+from tests.by_pinocchio import torques_of
 from tests.models.own_arm.arms import robot
 from tests.models.own_arm.palletiser import PALLETISER, PLATE, description
 
@@ -63,10 +64,10 @@ def drawn(arm: Arm, solution: Solution) -> float:
     rule.
     """
     model = pin.buildModelFromXML(PALLETISER, mimic=True)
-    data, drives, law = model.createData(), arm.robot.drives, arm.robot.friction
+    drives, law = arm.robot.drives, arm.robot.friction
     curve, t = solution.trajectory.spline.curve, grid(solution.trajectory.spline.duration)
     q, v, a = (curve(t, order) for order in range(3))
-    tau = np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
+    tau = torques_of(model, q, v, a)
     motor = tau + drives.rotor_inertia * a + law.torque(v, tau)
     loss = drives.copper * (motor / drives.torque_constant) ** 2
     power = arm.base_power + (motor * v + loss).sum(axis=1)

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 
@@ -29,6 +28,7 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.solve.methods import METHODS
 from joulepath.optimizer.what_if import what_if
+from tests.by_pinocchio import torques_of
 from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain
 from tests.selection import long_but
@@ -75,11 +75,10 @@ def replayed(asked: Problem, solution: Solution) -> tuple[float, dict[str, Array
     model = arm.robot.loaded_model(
         arm.payload.mass, arm.payload.com, arm.payload.inertia, arm.gravity
     )
-    data = model.createData()
     t = np.linspace(0.0, spline.duration, STEPS)
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
     q, v, a = curve(t), curve(t, 1), curve(t, 2)
-    tau = np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
+    tau = torques_of(model, q, v, a)
     tau_motor = tau + arm.friction_law.torque(v)
     peaks = {
         "v_max": np.abs(v).max(axis=0),

@@ -15,6 +15,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.examples.files import body_examples
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import OutsideLimits
+from tests import by_pinocchio
 from tests.app.problems import checked
 from tests.app.requests import HOME
 
@@ -40,10 +41,7 @@ def path(points: list[list[float]], **fields: Any) -> dict[str, Any]:
 
 
 def flange(q: list[float]) -> pin.SE3:
-    model = load_robot("ur5e").model
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, np.array(q))
-    return data.oMf[model.getFrameId("flange")]
+    return pin.SE3(by_pinocchio.flange(load_robot("ur5e"), np.array(q)))
 
 
 @pytest.mark.parametrize("name", REQUESTS)

@@ -23,6 +23,7 @@ from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_cone import ToolCone
+from tests.by_pinocchio import flange
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem, tcp_pose
 from tests.selection import long_but
@@ -102,9 +103,7 @@ def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
         made = PreparedProblem.of(
             problem(start, goal, robot=robot, payload=Payload(mass=0.5), **given)
         )
-        data = robot.model.createData()
-        pin.framesForwardKinematics(robot.model, data, goal)
-        T = data.oMf[robot.model.getFrameId("flange")].homogeneous
+        T = flange(robot, goal)
         pose = ConeOrientedPose(T[:3, 3], [0, 1, 1], T[:3, :3] @ np.array([0, 1, 1]), half_angle)
         # the chain's ranges are less than a turn
         displacement = goal - start

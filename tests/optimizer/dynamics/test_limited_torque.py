@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from joulepath.models.from_figures import robot_of
@@ -24,6 +23,7 @@ from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import Problem
+from tests.by_pinocchio import torques_of
 from tests.optimizer.dynamics.kernel_states import LOSSY, TORQUE, left_out, states
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
 
@@ -39,8 +39,7 @@ def at_link(task: Problem, q: Array, v: Array, a: Array) -> Array:
     load = task.arm.payload
     model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
     model.armature = np.zeros(model.nv)
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
+    return torques_of(model, q, v, a)
 
 
 def test_the_link_bears_the_bodies_alone() -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from joulepath.models.registry import load_robot
@@ -15,6 +14,7 @@ from joulepath.models.robot import Array, Drives, Electronics
 from joulepath.optimizer.dynamics.losses import breakdown, drawn_power, power_flow, smooth_abs
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.bus import Bus
+from tests.by_pinocchio import torques_of
 
 IDENTITY_TOLERANCE = (
     1e-9  # relative; spectrally accurate quadrature of smooth shaft power leaves rounding only
@@ -33,12 +33,6 @@ LOSSY = replace(
 
 def arm(drives: Drives, electronics: Electronics = ROBOT.electronics) -> Arm:
     return Arm(robot=replace(ROBOT, drives=drives, electronics=electronics))
-
-
-def torques(q: Array, v: Array, a: Array) -> Array:
-    """Rigid body and rotor torques (k, nq) by Pinocchio."""
-    data = ROBOT.model.createData()
-    return np.array([pin.rnea(ROBOT.model, data, *state) for state in zip(q, v, a, strict=True)])
 
 
 def closed_motion(
@@ -66,7 +60,9 @@ def test_parts_add_up_over_a_closed_motion(regeneration: float, amplitude: float
     loss."""
     weights, q, v, a = closed_motion(duration=2.0, amplitude=amplitude)
     electronics = replace(ROBOT.electronics, controller_power=11.0, regeneration=regeneration)
-    energy = breakdown(weights, v, a, torques(q, v, a), 0.0, arm(LOSSY, electronics))
+    energy = breakdown(
+        weights, v, a, torques_of(ROBOT.model, q, v, a), 0.0, arm(LOSSY, electronics)
+    )
     electrical = energy.electrical
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=IDENTITY_TOLERANCE)
     assert electrical.idle == pytest.approx(2.0 * (36.7 + 11.0), rel=HAND_TOLERANCE)
@@ -101,7 +97,11 @@ def test_a_part_that_is_zero_has_no_sign(bus: Bus) -> None:
     off = replace(ROBOT.electronics, idle_power=0.0, controller_power=0.0, regeneration=0.0)
     weights, q, v, a = closed_motion(duration=2.0, amplitude=0.5, samples=40)
     asked = replace(arm(ROBOT.drives, off), bus=bus)
-    for states in ((0.0 * v, a, 0.0 * v), (-0.0 * v, a, -0.0 * v), (v, a, torques(q, v, a))):
+    for states in (
+        (0.0 * v, a, 0.0 * v),
+        (-0.0 * v, a, -0.0 * v),
+        (v, a, torques_of(ROBOT.model, q, v, a)),
+    ):
         energy = breakdown(weights, *states, 0.0, asked)
         parts = {**asdict(energy.electrical), "peak": energy.peak_power, "mean": energy.mean_power}
         parts |= {} if energy.storage is None else asdict(energy.storage)
@@ -182,7 +182,7 @@ def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
                 (1 - regeneration) * width / 2, rel=1e-9
             )  # the sample at zero
     _, q, v, a = closed_motion(duration=2.0, amplitude=0.4, samples=200)
-    tau = torques(q, v, a)
+    tau = torques_of(ROBOT.model, q, v, a)
     exact_loss = power_flow(tau, v, a, LOSSY, ROBOT.friction).inverter
     for width in (1.0, 0.1, 1e-3):
         excess = power_flow(tau, v, a, LOSSY, ROBOT.friction, width).inverter - exact_loss

@@ -8,7 +8,6 @@ from itertools import chain, pairwise, repeat
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from joulepath.models.robot import Array
@@ -22,6 +21,7 @@ from joulepath.optimizer.motion.time_scalings import quintic
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.bus import Bus
+from tests.by_pinocchio import torques_of
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem
 
 VIA = START + np.array([-0.4, 0.3, 0.5, -0.6, 0.8, 0.2])
@@ -62,9 +62,7 @@ def test_agrees_with_pinocchio(interpolation: str) -> None:
     result = evaluate(ARM, motion(interpolation), sample_period=5e-4)
     s = result.samples
     assert s is not None
-    model = rigid_body_model(ARM)
-    data = model.createData()
-    tau = np.array([pin.rnea(model, data, *state) for state in zip(s.q, s.v, s.a, strict=True)])
+    tau = torques_of(rigid_body_model(ARM), s.q, s.v, s.a)
     assert np.abs(s.tau - tau).max() < DYNAMICS
     power = simple_power(ARM, s.v, tau)
     assert s.power == pytest.approx(power, rel=1e-9)

@@ -22,6 +22,7 @@ from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from joulepath.optimizer.problem.tool_cone import ToolCone
+from tests.by_pinocchio import torques_of
 
 ARM = Arm(robot=load_robot("ur5e"))
 # of finite differences over 2e-6 of a cost with corners in its second derivative
@@ -109,8 +110,7 @@ def test_the_columns_give_pinocchios_torques() -> None:
     columns = TorqueColumns(ARM, ("inertials", "rotor"), 7)
     random = np.random.default_rng(3)
     q, v, a = random.uniform(-2, 2, (3, 7, 6))
-    model = ARM.robot.model
-    expected = [pin.rnea(model, model.createData(), *row) for row in zip(q, v, a, strict=True)]
+    expected = torques_of(ARM.robot.model, q, v, a)
     # independent columns are found to 1e-8
     assert np.abs(columns.values(q, v, a) @ columns.dynamics - expected).max() < 1e-6
     assert len(columns.wanted) == 40
@@ -125,7 +125,7 @@ def test_load_friction_is_a_column() -> None:
     v += np.sign(v)  # where the sign of the speed is one
     model = rigid_body_model(loaded)
     model.armature = np.zeros(6)
-    tau = np.array([pin.rnea(model, model.createData(), *row) for row in zip(q, v, a, strict=True)])
+    tau = torques_of(model, q, v, a)
     values = columns.values(q, v, a)
     for name in ("load2", "load3"):
         joint, column = int(name[-1]) - 1, values[:, :, columns.names.index(name)]

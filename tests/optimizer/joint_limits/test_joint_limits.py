@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 import yaml
 
@@ -27,6 +26,7 @@ from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm, Payload
+from tests.by_pinocchio import torques_of
 from tests.models.own_arm.arms import robot
 from tests.models.own_arm.palletiser import ACROSS, UP, joint, link
 from tests.models.own_arm.palletiser import description as palletiser
@@ -62,8 +62,7 @@ def test_the_terms_give_the_torques_of_pinocchio(name: str) -> None:
         + np.einsum("nijk,nj,nk->ni", terms.velocity, v, v)
         + terms.gravity
     )
-    data = model.createData()
-    expected = np.array([pin.rnea(model, data, *each) for each in zip(q, v, a, strict=True)])
+    expected = torques_of(model, q, v, a)
     assert bodies + arm.drives.rotor_inertia * a == pytest.approx(expected, abs=ROUNDING)
 
 

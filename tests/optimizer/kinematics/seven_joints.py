@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.seven.free_turn import FreeTurn
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.redundant_curve import RedundantCurve
+from tests.by_pinocchio import flange as flange
 from tests.selection import long_but
 
 ROBOTS = long_but(["panda", "iiwa14"], ["panda", "iiwa14", "xarm7"])
@@ -26,12 +26,6 @@ def closed_form(robot: Robot) -> RedundantArm:
     found = RedundantArm.of(robot.model)
     assert found is not None
     return found
-
-
-def forward(robot: Robot, q: Array) -> Array:
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
 
 
 def configurations(robot: Robot, count: int, seed: int = 41) -> Array:

@@ -12,6 +12,7 @@ from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.ik_solutions import PrincipalSolution
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
+from tests.by_pinocchio import flange
 
 # largest pose error of a solution [m, rad]
 ACCURACY = 1e-9
@@ -33,13 +34,6 @@ class Solved:
     error: float
     away: float
     twice: bool
-
-
-def flange(robot: Robot, q: Array) -> Array:
-    """Flange pose T_base_flange (4, 4) by Pinocchio."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return np.asarray(data.oMf[robot.model.getFrameId("flange", pin.BODY)].homogeneous)
 
 
 def solved(robot: Robot, q: Array) -> Solved:

@@ -18,7 +18,7 @@ from tests.optimizer.kinematics.seven_joints import (
     away,
     closed_form,
     configurations,
-    forward,
+    flange,
 )
 from tests.selection import long_but
 
@@ -73,9 +73,9 @@ def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
     """
     for q in configurations(robot, 5, seed=47):
         q[joint] = np.clip(off, robot.limits.q_min[joint], robot.limits.q_max[joint])
-        T = forward(robot, q)
+        T = flange(robot, q)
         solutions = required_inverse_kinematics(robot, "goal").solve(T)
-        assert max(np.abs(forward(robot, each.q) - T).max() for each in solutions) < ACCURACY
+        assert max(np.abs(flange(robot, each.q) - T).max() for each in solutions) < ACCURACY
         if joint == 3 and robot.name == "iiwa14":
             # A nearly stretched arm holds its pose on loops so small that rounding hides them.
             curves = arm.self_motions(T, robot.limits)
@@ -104,7 +104,7 @@ def test_a_free_turn_on_a_singularity_is_a_curve(joint: int, step: list[float]) 
         arm = closed_form(robot)
         for q in configurations(robot, 10, seed=49):
             q[joint] = 0.0
-            T = forward(robot, q)
+            T = flange(robot, q)
             turned = q + rng.uniform(-2, 2) * np.array(step)
             curves = arm.self_motions(T)
             assert away(curves, turned) < FOUND
@@ -116,7 +116,7 @@ def test_a_free_turn_on_a_singularity_is_a_curve(joint: int, step: list[float]) 
                         members = curve.at(u[k] + np.linspace(-0.1, 0.1, 9))
                         assert (np.abs(wrapped(members - centre[k])) <= sides[k]).all()
                         assert (
-                            max(np.abs(forward(robot, each) - T).max() for each in members)
+                            max(np.abs(flange(robot, each) - T).max() for each in members)
                             < ACCURACY
                         )
 
@@ -133,7 +133,7 @@ def test_limits_keep_free_turns_within_them() -> None:
             turned = q + rng.uniform(-1, 1) * (most - np.abs(q[[0, 2]])).min() * np.array(
                 [1.0, 0, -1.0, 0, 0, 0, 0]
             )
-            assert away(arm.self_motions(forward(robot, q), robot.limits), turned) < FOUND
+            assert away(arm.self_motions(flange(robot, q), robot.limits), turned) < FOUND
 
 
 def test_boxes_hold_the_configurations_of_a_free_turn(robot: Robot, arm: RedundantArm) -> None:
@@ -144,9 +144,9 @@ def test_boxes_hold_the_configurations_of_a_free_turn(robot: Robot, arm: Redunda
     rng = np.random.default_rng(48)
     for q in configurations(robot, 10, seed=49):
         q[1] = 0.0
-        T = forward(robot, q)
+        T = flange(robot, q)
         turned = q + rng.uniform(-2, 2) * np.array([1.0, 0, -1.0, 0, 0, 0, 0])
-        assert np.abs(forward(robot, turned) - T).max() < ACCURACY
+        assert np.abs(flange(robot, turned) - T).max() < ACCURACY
         held = False
         for curve in arm.self_motions(T):
             if isinstance(curve, FreeTurn):
@@ -162,6 +162,6 @@ def test_boxes_hold_the_configurations_of_a_free_turn(robot: Robot, arm: Redunda
 @pytest.mark.parametrize("name", MISSED)
 def test_configurations_known_to_be_missed_are_nearly_found(name: str) -> None:
     robot, q = load_robot(name), np.array(MISSED[name])
-    answers = required_inverse_kinematics(robot, "goal").solve(forward(robot, q))
+    answers = required_inverse_kinematics(robot, "goal").solve(flange(robot, q))
     curves = list(dict.fromkeys(each.self_motion for each in answers))
     assert FOUND < away(curves, q) < NEARLY_FOUND  # type: ignore[arg-type]

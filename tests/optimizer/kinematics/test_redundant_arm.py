@@ -23,7 +23,7 @@ from tests.optimizer.kinematics.seven_joints import (
     away,
     closed_form,
     configurations,
-    forward,
+    flange,
 )
 from tests.selection import long_but
 
@@ -79,7 +79,7 @@ def test_every_configuration_is_on_a_curve_of_its_pose(
     robot: Robot, arm: RedundantArm, count: int
 ) -> None:
     for q in configurations(robot, count):
-        curves = arm.self_motions(forward(robot, q), robot.limits)
+        curves = arm.self_motions(flange(robot, q), robot.limits)
         assert away(curves, q) < FOUND
         nearest = min(curves, key=lambda each: away([each], q))
         assert nearest.label == arm.label(q)
@@ -88,10 +88,10 @@ def test_every_configuration_is_on_a_curve_of_its_pose(
 def test_every_member_reaches_the_pose(robot: Robot, arm: RedundantArm) -> None:
     rng = np.random.default_rng(42)
     for q in configurations(robot, 20):
-        T = forward(robot, q)
+        T = flange(robot, q)
         for curve in arm.self_motions(T):
             for member in curve.at(parameters(curve, 6, rng)):
-                assert np.abs(forward(robot, member) - T).max() < ACCURACY
+                assert np.abs(flange(robot, member) - T).max() < ACCURACY
 
 
 def newton(robot: Robot, T: Array, q: Array) -> Array | None:
@@ -118,7 +118,7 @@ def test_solutions_of_newtons_method_are_on_a_curve(robot: Robot, arm: Redundant
     """From random starts, without limits: no curve is missed."""
     rng, found = np.random.default_rng(43), 0
     for q in configurations(robot, 5):
-        T = forward(robot, q)
+        T = flange(robot, q)
         curves = arm.self_motions(T)
         for seed in rng.uniform(-np.pi, np.pi, (12, 7)):
             other = newton(robot, T, seed)
@@ -134,7 +134,7 @@ def test_the_nearest_member_is_found_for_configurations_off_the_curve(
     """Also where two branches meet, and the last angle is no guide."""
     rng = np.random.default_rng(47)
     for q in configurations(robot, 6):
-        for curve in arm.self_motions(forward(robot, q), robot.limits):
+        for curve in arm.self_motions(flange(robot, q), robot.limits):
             lower = curve.arcs[0][0]
             beside = curve.at(np.array([lower]))[0] + rng.normal(scale=0.1, size=7)
             members = curve.at(np.concatenate([np.linspace(*arc, 2000) for arc in curve.arcs]))
@@ -145,7 +145,7 @@ def test_the_nearest_member_is_found_for_configurations_off_the_curve(
 def test_boxes_hold_the_curve(robot: Robot, arm: RedundantArm) -> None:
     rng = np.random.default_rng(44)
     for q in configurations(robot, 12):
-        for curve in arm.self_motions(forward(robot, q), robot.limits):
+        for curve in arm.self_motions(flange(robot, q), robot.limits):
             middle = parameters(curve, 3, rng)
             half = rng.uniform(0.0, 0.5, len(middle)) ** 2
             centre, sides = curve.boxes(middle, half)
@@ -159,7 +159,7 @@ def test_boxes_shrink_onto_the_curve(robot: Robot, arm: RedundantArm) -> None:
     """Boxes are of first order, except where a joint turns ever faster next to a singularity."""
     rng, width = np.random.default_rng(45), []
     for q in configurations(robot, 20):
-        for curve in arm.self_motions(forward(robot, q), robot.limits):
+        for curve in arm.self_motions(flange(robot, q), robot.limits):
             middle = parameters(curve, 4, rng)
             width += curve.boxes(middle, np.full(len(middle), 1e-3))[1].max(axis=1).tolist()
     assert np.median(width) < 0.05
@@ -172,7 +172,7 @@ def test_arcs_are_the_parts_within_the_limits(robot: Robot, arm: RedundantArm) -
     limits, rng = robot.limits, np.random.default_rng(46)
     cut, outside = 0, []
     for q in configurations(robot, 20):
-        T = forward(robot, q)
+        T = flange(robot, q)
         kept = [each for each in arm.self_motions(T, limits) if isinstance(each, RedundantCurve)]
         for curve in (each for each in arm.self_motions(T) if isinstance(each, RedundantCurve)):
             arcs = [
@@ -213,7 +213,7 @@ def test_a_curve_with_a_short_part_within_the_limits_gives_a_member() -> None:
     )
     curves = [
         each.self_motion
-        for each in required_inverse_kinematics(panda, "goal").solve(forward(panda, q))
+        for each in required_inverse_kinematics(panda, "goal").solve(flange(panda, q))
     ]
     nearest = [each.at(np.array([each.parameter(q)]))[0] for each in curves if each is not None]
     assert np.abs(wrapped(np.array(nearest) - q)).max(axis=1).min() < FOUND
@@ -255,7 +255,7 @@ def test_a_curve_that_is_outside_the_limits_in_the_middle_is_answered(
     configuration: list[float],
 ) -> None:
     robot, q = load_robot("iiwa14"), np.array(configuration)
-    answers = required_inverse_kinematics(robot, "goal").solve(forward(robot, q))
+    answers = required_inverse_kinematics(robot, "goal").solve(flange(robot, q))
     curves = list(dict.fromkeys(each.self_motion for each in answers))
     assert away(curves, q) < FOUND  # type: ignore[arg-type]
     assert all(

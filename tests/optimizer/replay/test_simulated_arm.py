@@ -35,6 +35,7 @@ from joulepath.optimizer.replay.shapes import unsimulated
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.replay.simulator import mujoco
 from tests.app.forks import run
+from tests.by_pinocchio import torques_of
 from tests.impossible_links import with_impossible_link
 from tests.models.own_arm.arms import RICH_ARM
 from tests.models.own_arm.arms import robot as own_arm
@@ -51,13 +52,6 @@ def states(robot: Robot, count: int = 10) -> tuple[Array, Array, Array]:
     rng = np.random.default_rng(7)
     q, v, a = (rng.uniform(-2.0, 2.0, (count, robot.nq)) for _ in range(3))
     return q, v, a
-
-
-def by_pinocchio(arm: Arm, q: Array, v: Array, a: Array) -> Array:
-    """Torques of rigid bodies and rotors (k, nq) [N·m]."""
-    model = rigid_body_model(arm)
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
 
 
 def loaded(robot: Robot) -> Arm:
@@ -92,7 +86,7 @@ def tcp_position(simulated: SimulatedArm, q: Array) -> Array:
 def test_dynamics_and_poses_are_those_of_pinocchio(name: str) -> None:
     arm = loaded(own_arm(RICH_ARM) if name == "own" else load_robot(name))
     simulated, (q, v, a) = SimulatedArm(arm), states(arm.robot)
-    tau = by_pinocchio(arm, q, v, a)
+    tau = torques_of(rigid_body_model(arm), q, v, a)
     assert (np.abs(simulated.torques(q, v, a) - tau) <= ROUNDING * arm.active_limits.tau_max).all()
     # the third opinion: Featherstone's forward dynamics
     model = rigid_body_model(arm)
@@ -112,7 +106,7 @@ def test_another_payload_needs_no_new_model() -> None:
     for changed in (with_changes(arm, payload=1.4), replace(arm, payload=Payload()), arm):
         simulated.use_figures(changed)
         assert simulated.model is model
-        tau = by_pinocchio(changed, q, v, a)
+        tau = torques_of(rigid_body_model(changed), q, v, a)
         assert (
             np.abs(simulated.torques(q, v, a) - tau) <= ROUNDING * arm.active_limits.tau_max
         ).all()

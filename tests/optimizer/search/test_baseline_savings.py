@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +32,7 @@ from joulepath.optimizer.search.baselines import (
     standing,
     with_savings,
 )
+from tests.by_pinocchio import torques_of
 from tests.optimizer.search.test_baselines import (
     DURATION,
     EXACT,
@@ -54,12 +56,9 @@ def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float
     """Torques and potential energy by Pinocchio, and a path without limits."""
     load = task.arm.payload
     model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
-    data = model.createData()
     return (
-        lambda q, v, a: np.array(
-            [pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]
-        ),
-        lambda q: float(pin.computePotentialEnergy(model, data, q)),
+        partial(torques_of, model),
+        lambda q: float(pin.computePotentialEnergy(model, model.createData(), q)),
         lambda q, v, paths: [[] for _ in q],
     )
 
