@@ -31,6 +31,7 @@ from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.cycle.cycles import HOME, PART, poses
 from tests.optimizer.moves import AMPLE, ROBOT
+from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
 # the package has the function of this name
@@ -148,8 +149,7 @@ def test_routes_come_in_the_order_of_their_bounds_and_none_is_left_out() -> None
     assert values == sorted(values) and leg.least_costs[0, 2] == pytest.approx(values[0])
     for bound, route in routes[::7]:
         q = [leg.start.q[0], *leg.configurations(route), leg.goal.q[2]]
-        run = Run(Problem(arm=ARM, start=q[0], goal=q[-1], passes=q[1:-1], deadline=AMPLE))
-        run.prepare()
+        run = prepared(Problem(arm=ARM, start=q[0], goal=q[-1], passes=q[1:-1], deadline=AMPLE))
         assert run.state.candidates[0].lower_bound == pytest.approx(bound)
 
 

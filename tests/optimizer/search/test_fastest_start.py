@@ -17,11 +17,11 @@ from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.refinement import refine, start_from_fastest
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from tests.optimizer.moves import AMPLE, problem
+from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
 # requests of the benchmark: two motions that a limit on the speed of the TCP holds back, and one
@@ -38,8 +38,7 @@ def refined(given: Problem) -> tuple[SearchState, Candidate]:
     """The search for a problem after the best candidate is refined, without any start from the
     time-optimal motion.
     """
-    run = Run(given)
-    run.prepare()
+    run = prepared(given)
     run.explore()
     best = run.state.best()
     assert best is not None

@@ -21,7 +21,6 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.finishing_time import FINISHING
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import SAMPLES
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import (
@@ -36,6 +35,7 @@ from tests.optimizer.moves import (
     problem,
     tcp_pose,
 )
+from tests.optimizer.search.runs import prepared
 from tests.optimizer.search.test_free_goal import TOOL, angle, rotations
 from tests.selection import long_but
 
@@ -135,8 +135,7 @@ def test_no_sample_is_activated_after_the_deadline() -> None:
     """
     rng, clock = np.random.default_rng(2), CountingClock(0.0)
     starts = AnyOf(tuple(HOME + rng.normal(scale=0.3, size=6) for _ in range(12)))
-    run = Run(problem(starts, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])), clock=clock)
-    run.prepare()
+    run = prepared(problem(starts, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])), clock=clock)
     deferred = [each for each in run.state.candidates if each.deferred]
     assert len(deferred) > 1000
     clock.now += 1e6

@@ -17,9 +17,9 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.least_duration_ends import with_shorter_duration
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import fastest_samples
 from tests.optimizer.moves import AMPLE, fixed
+from tests.optimizer.search.runs import prepared
 
 # m, rad: what the certificate allows at an end
 REACHED = 1e-6
@@ -42,8 +42,7 @@ def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
     helped = 0
     for seed in range(3):
         problem = asked(robot, seed, free)
-        run = Run(problem)
-        run.prepare()
+        run = prepared(problem)
         pose = problem.goal.T if isinstance(problem.goal, Pose) else None
         for candidate in fastest_samples(run.state.candidates)[:4]:
             found = with_shorter_duration(run.state.prepared, candidate)
@@ -81,8 +80,7 @@ def test_a_free_posture_is_no_slower_than_the_answer_of_least_energy() -> None:
 
 def test_few_samples_are_tried_also_where_many_are_open() -> None:
     """Otherwise neighbours on one self-motion were searched for their fastest motions in turn."""
-    run = Run(asked("panda", 0, free=False))
-    run.prepare()
+    run = prepared(asked("panda", 0, free=False))
     candidates = run.state.candidates
     deferred = fastest_samples(candidates)
     for each in candidates:

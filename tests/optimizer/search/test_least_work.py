@@ -23,6 +23,7 @@ from joulepath.optimizer.search.least_work import explore_least_work
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, START, fixed, problem, tcp_pose
+from tests.optimizer.search.runs import prepared
 
 DURATION = 3.0
 # share by which local optima of two searches differ
@@ -31,12 +32,10 @@ LOCAL = 0.02
 
 def run(**given: Any) -> Run:
     """A search that is prepared in no time: how long that takes decides when it must end."""
-    found = Run(
+    return prepared(
         problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given),
         clock=still,
     )
-    found.prepare()
-    return found
 
 
 @cache

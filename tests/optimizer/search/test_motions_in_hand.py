@@ -29,6 +29,7 @@ from joulepath.optimizer.solve.methods.method import Method
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, PAYLOAD, START, fixed, problem
+from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
 # relative: the error of the quadratures that are compared, `state.ENERGY_TOLERANCE`
@@ -64,8 +65,7 @@ def _name(spline: Spline) -> str:
 
 def incumbent_with(*splines: Spline) -> SearchState:
     """The state of a search whose only candidate got these motions, one after the other."""
-    run = Run(problem(), clock=still)
-    run.prepare()
+    run = prepared(problem(), clock=still)
     for spline in splines:
         result = SolveResult(
             SolveStatus.SOLVED, SolveReason.BASELINE, spline=spline, figures=(_name(spline),)

@@ -22,12 +22,11 @@ from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import label_of
 from joulepath.optimizer.search.near_goals import NEAR_GOALS, activate_near_goals
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sampled_ends import nearest_configuration
 from joulepath.optimizer.search.seeds import estimates
+from tests.optimizer.search.runs import explored, prepared
 from tests.selection import long_but
 
 # s: no search comes near it, however busy the machine
@@ -59,16 +58,6 @@ def task(name: str, seed: int, kind: str, **given: Any) -> tuple[Problem, Array]
     return Problem(arm=arm, start=start, goal=poses[kind], deadline=AMPLE, **given), goal
 
 
-def explored(problem: Problem) -> Candidate:
-    """The best candidate before refinement and bounds, which take most of the time of a search."""
-    run = Run(problem)
-    run.prepare()
-    run.explore()
-    best = run.state.best()
-    assert best is not None
-    return best
-
-
 CASES = [
     (name, kind, seed)
     for seed in range(3)
@@ -94,8 +83,7 @@ def test_a_goal_needs_no_more_than_a_configuration_of_it_beside_the_start(
 
 def test_what_is_activated_is_different_and_may_be_solved() -> None:
     problem, _ = task("xarm7", 3, "cone")
-    run = Run(problem)
-    run.prepare()
+    run = prepared(problem)
     state = run.state
     before = len(state.candidates)
     assert activate_near_goals(state.prepared, state.candidates)
@@ -117,8 +105,7 @@ def test_what_is_activated_is_different_and_may_be_solved() -> None:
 
 def test_without_a_free_orientation_nothing_is_activated() -> None:
     problem, goal = task("panda", 0, "about")
-    run = Run(replace(problem, goal=Pose(tcp_pose(problem.arm, goal))))
-    run.prepare()
+    run = prepared(replace(problem, goal=Pose(tcp_pose(problem.arm, goal))))
     assert not activate_near_goals(run.state.prepared, run.state.candidates)
 
 
@@ -137,8 +124,7 @@ def test_a_proposed_goal_is_put_back_beside(name: str) -> None:
     few samples.
     """
     problem, goal = task(name, 4, "about")
-    run, rng = Run(problem), np.random.default_rng(9)
-    run.prepare()
+    run, rng = prepared(problem), np.random.default_rng(9)
     end = next(each.goal for each in run.state.candidates)
     for _ in range(5):
         asked = goal + rng.uniform(-BESIDE, BESIDE, len(goal))
@@ -164,8 +150,7 @@ def test_estimates_count_what_waiting_at_a_goal_draws() -> None:
         duration_min=2.0,
         duration_max=2.0,
     )
-    run = Run(problem)
-    run.prepare()
+    run = prepared(problem)
     some = [each for each in run.state.candidates if each.holdable][:20:4]
     motions = [quintic_spline(each.q_start, each.q_goal, 2.0) for each in some]
     energy = [run.state.prepared.energy(motion).electrical.total for motion in motions]

@@ -16,8 +16,8 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.other_starts import start_beside
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.state import SearchState
+from tests.optimizer.search.runs import prepared
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -33,8 +33,9 @@ def explored(index: int, both: bool, bus: Bus) -> tuple[SearchState, Candidate]:
     arm = Arm(robot=robot, bus=bus)
     start, goal = collision_free(rng, robot), collision_free(rng, robot)
     poses = [Pose(tcp_pose(arm, q)) for q in (start, goal)]
-    run = Run(Problem(arm=arm, start=poses[0] if both else start, goal=poses[1], deadline=AMPLE))
-    run.prepare()
+    run = prepared(
+        Problem(arm=arm, start=poses[0] if both else start, goal=poses[1], deadline=AMPLE)
+    )
     run.explore()
     best = run.state.best()
     assert best is not None

@@ -23,6 +23,7 @@ from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.other_turns import OTHER_TURNS, other_turns
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import estimates_between, expected
+from tests.optimizer.search.runs import explored, prepared
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -47,21 +48,6 @@ def task(**given: Any) -> Problem:
     arm = Arm(robot=load_robot("ur5e"), payload=payload, gravity=hanging, bus=bus, collisions=False)
     goal = ConeOrientedPose(tcp_pose(arm, GOAL)[:3, 3])
     return Problem(**({"arm": arm, "start": START, "goal": goal, "deadline": AMPLE} | given))
-
-
-def prepared(problem: Problem) -> Run:
-    run = Run(problem)
-    run.prepare()
-    return run
-
-
-def explored(problem: Problem) -> Candidate:
-    """The best candidate before refinement and bounds, which take most of the time of a search."""
-    run = prepared(problem)
-    run.explore()
-    best = run.state.best()
-    assert best is not None
-    return best
 
 
 def test_the_other_way_around_is_found_where_it_needs_less() -> None:

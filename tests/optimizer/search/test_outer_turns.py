@@ -18,19 +18,18 @@ from joulepath.optimizer.search.outer_turns import (
     explore_families,
     families_of,
 )
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from tests.optimizer.moves import GOAL, fixed, problem, tcp_pose
+from tests.optimizer.search.runs import prepared
 
 DURATION = 3.0
 
 
-def prepared(**given: Any) -> SearchState:
-    run = Run(
+def asked(**given: Any) -> SearchState:
+    run = prepared(
         problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given)
     )
-    run.prepare()
     return run.state
 
 
@@ -55,7 +54,7 @@ def exploring(
 
 
 def test_families() -> None:
-    state = prepared()
+    state = asked()
     families = families_of(state)
     everyone = [each for each in state.candidates if each.status is not CandidateStatus.INFEASIBLE]
     members = [each for family in families for each in family]
@@ -75,7 +74,7 @@ def test_no_families(given: dict[str, Any]) -> None:
     """Every candidate is tried where bounds rule out enough, a solve takes little, or nothing shall
     be left.
     """
-    state = prepared(**given)
+    state = asked(**given)
     explore_families(state, exploring(state, lambda each: each.lower_bound + 1.0))
     assert not any(each.reason is Reason.FAMILY for each in state.candidates)
 
@@ -84,7 +83,7 @@ def test_best_families_are_solved() -> None:
     """Others are left, and no solved member is worth less than one that its family would have let
     by.
     """
-    state = prepared()
+    state = asked()
     families = families_of(state)
     rank = {each: k for k, family in enumerate(families) for each in family}
     # every family needs a tenth more than the one before
@@ -104,7 +103,7 @@ def test_best_families_are_solved() -> None:
 
 
 def test_what_bounds_rule_out_is_said_to_be() -> None:
-    state = prepared()
+    state = asked()
     explore_families(state, exploring(state, lambda each: each.lower_bound))
     best = state.best()
     assert best is not None
@@ -116,7 +115,7 @@ def test_what_bounds_rule_out_is_said_to_be() -> None:
 
 
 def test_another_member_stands_for_one_that_collides() -> None:
-    state = prepared()
+    state = asked()
     families = families_of(state)
     hindered = max(families, key=len)
     assert len(hindered) > 2
@@ -126,13 +125,13 @@ def test_another_member_stands_for_one_that_collides() -> None:
 
 
 def test_all_are_tried_while_there_is_no_motion() -> None:
-    state = prepared()
+    state = asked()
     explore_families(state, exploring(state, lambda _: None))
     assert all(each.attempt is not None for family in families_of(state) for each in family)
 
 
 def test_once_time_is_over_nothing_is_left_for_its_family() -> None:
-    state = prepared()
+    state = asked()
     state.end = state.end.within(-1.0)
     explore_families(state, lambda: None)
     open_ = [each for family in families_of(state) for each in family]

@@ -28,6 +28,7 @@ from joulepath.optimizer.search.seeds import (
     activate_seeds,
     estimates,
 )
+from tests.optimizer.search.runs import prepared
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -54,15 +55,13 @@ def problem_of(name: str, index: int, both: bool = False) -> Problem:
 
 
 @cache
-def prepared(name: str, index: int, both: bool = False) -> Run:
-    run = Run(problem_of(name, index, both))
-    run.prepare()
-    return run
+def seeded(name: str, index: int, both: bool = False) -> Run:
+    return prepared(problem_of(name, index, both))
 
 
 @pytest.mark.parametrize("name", ["panda", "gen3"])
 def test_estimates_are_above_the_lower_bounds_and_near_the_least_energy(name: str) -> None:
-    run = prepared(name, 1)
+    run = seeded(name, 1)
     known = [each for each in run.state.candidates if each.deferred]
     energy = estimates(run.state.prepared, known)
     assert (energy >= np.array([each.lower_bound for each in known])).all()
@@ -72,8 +71,7 @@ def test_estimates_are_above_the_lower_bounds_and_near_the_least_energy(name: st
 
 def test_estimates_are_of_motions_in_the_time_that_is_asked_for() -> None:
     asked = replace(problem_of("panda", 1), duration_min=SLOW, duration_max=SLOW)
-    run = Run(asked)
-    run.prepare()
+    run = prepared(asked)
     some = run.state.candidates[::9]
     energy = [
         run.state.prepared.energy(quintic_spline(each.q_start, each.q_goal, SLOW)).electrical.total
@@ -104,8 +102,7 @@ def test_of_work_more_is_tried_than_what_the_straight_line_says() -> None:
 
 @pytest.mark.parametrize("both", [False, True], ids=["to a pose", "between poses"])
 def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
-    run = Run(problem_of("panda", 7, both))
-    run.prepare()
+    run = prepared(problem_of("panda", 7, both))
     state = run.state
     before = [each for each in state.candidates if each.deferred]
     assert activate_seeds(state.prepared, state.candidates)
@@ -133,8 +130,7 @@ def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
 
 
 def test_the_next_seeds_follow_until_none_is_left() -> None:
-    run = Run(problem_of("panda", 4))
-    run.prepare()
+    run = prepared(problem_of("panda", 4))
     state, rounds = run.state, 0
     while activate_seeds(state.prepared, state.candidates):
         rounds += 1
@@ -154,12 +150,11 @@ def downwards(name: str, high: list[float], low: list[float], bus: Bus) -> Probl
 
 def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
     """Gravity pays for everything: most pairs are bounded by zero."""
-    run = Run(
+    run = prepared(
         downwards(
             "panda", [0, 0.2, 0, -0.6, 0, 0.8, 0.785], [0, 1.2, 0, -1.6, 0, 2.8, 0.785], Bus()
         )
     )
-    run.prepare()
     state = run.state
     before = [
         each
@@ -175,8 +170,7 @@ def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
 def test_motions_that_give_energy_back_have_seeds_too() -> None:
     bus = Bus(mode="recuperating", efficiency=1.0)
     asked = downwards("iiwa14", [0, 0.2, 0, -0.5, 0, 0.5, 0], [0, 1.4, 0, -1.2, 0, 0.9, 0], bus)
-    run = Run(asked)
-    run.prepare()
+    run = prepared(asked)
     state = run.state
     before = [
         each
@@ -192,7 +186,7 @@ def test_motions_that_give_energy_back_have_seeds_too() -> None:
 def test_an_end_may_slide_onto_a_joint_limit() -> None:
     """The sixth joint of this goal is on its limit: the samples beside it need some percent
     more."""
-    run = prepared("iiwa14", 4)
+    run = seeded("iiwa14", 4)
     answer = optimize(run.problem)
     limits = run.problem.arm.robot.limits
     on_limit = np.minimum(answer.goal.q - limits.q_min, limits.q_max - answer.goal.q)

@@ -17,10 +17,10 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.branch_and_bound import explore
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.state import SearchState
 from tests.optimizer.moves import AMPLE, ROBOT, problem
+from tests.optimizer.search.runs import prepared
 
 # relative; what is promised against the best of many starts on as many control points
 PROMISED = 5e-3
@@ -36,8 +36,7 @@ BEST_DURATION, BEST_ENERGY = 3.977043743, 44.05294296
 
 def explored(**given: Any) -> SearchState:
     """A search whose candidates are solved, but not refined."""
-    run = Run(problem(**given))
-    run.prepare()
+    run = prepared(problem(**given))
     state = run.state
     explore(
         state.prepared,

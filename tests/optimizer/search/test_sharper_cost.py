@@ -14,7 +14,6 @@ from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.sharper_cost import (
     SHARPER_COST,
     SharperCostSettings,
@@ -22,6 +21,7 @@ from joulepath.optimizer.search.sharper_cost import (
 )
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from tests.optimizer.moves import AMPLE, problem
+from tests.optimizer.search.runs import prepared
 
 # request of the benchmark in which a heavy payload descends: 280 J flow, 7 J are drawn on balance
 DESCENT = 13
@@ -31,8 +31,7 @@ SHORTER = 0.97
 def descent() -> Problem:
     """The request, its goal as the configuration that its answer reaches."""
     given = to_problem(OptimizeRequest.model_validate(request(0, DESCENT)[1]), AMPLE)
-    run = Run(given)
-    run.prepare()
+    run = prepared(given)
     nearest = min(run.state.candidates, key=lambda each: each.shortest)
     return replace(given, goal=nearest.q_goal)
 
@@ -60,8 +59,7 @@ def test_a_shorter_duration_needs_no_less_where_little_energy_is_left() -> None:
 def test_only_an_imprecise_cost_is_sharpened(
     given: dict[str, Any], error: float, is_solved: bool
 ) -> None:
-    run = Run(problem(**given))
-    run.prepare()
+    run = prepared(problem(**given))
     run.explore()
     best = run.state.best()
     assert best is not None
@@ -72,15 +70,14 @@ def test_only_an_imprecise_cost_is_sharpened(
 
 def test_sharper_corners_bring_the_cost_near_the_exact_power() -> None:
     """A slow joint against gravity: its friction and its power are close to their corners."""
-    run = Run(descent())
-    run.prepare()
-    prepared, goal = run.state.prepared, run.state.candidates[0].q_goal
-    (smooth,) = duration_intervals(prepared, goal)
-    (sharp,) = duration_intervals(prepared, goal, width=0.1, friction_share=0.15)
+    run = prepared(descent())
+    task, goal = run.state.prepared, run.state.candidates[0].q_goal
+    (smooth,) = duration_intervals(task, goal)
+    (sharp,) = duration_intervals(task, goal, width=0.1, friction_share=0.15)
     state = np.concatenate([goal, np.full(len(goal), 0.01), np.zeros(len(goal))])[None]
-    (smoothed,), _ = prepared.kernel.value(state, smooth.p)
-    (sharper,), _ = prepared.kernel.value(state, sharp.p)
-    (exact,), _ = prepared.kernel.value(
-        state, prepared.parameters(electrical=1.0, width=0.0, friction_share=0.05)
+    (smoothed,), _ = task.kernel.value(state, smooth.p)
+    (sharper,), _ = task.kernel.value(state, sharp.p)
+    (exact,), _ = task.kernel.value(
+        state, task.parameters(electrical=1.0, width=0.0, friction_share=0.05)
     )
     assert abs(sharper - exact) < abs(smoothed - exact) / 2

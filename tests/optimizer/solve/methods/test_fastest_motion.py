@@ -15,18 +15,17 @@ from joulepath.optimizer.solve.methods.duration_intervals import DurationInterva
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, problem
+from tests.optimizer.search.runs import prepared
 
 SPLINE = lasting(time_optimal_spline(ROBOT.limits, START, GOAL), 2.0)
 
 
-def prepared(**given: object) -> Run:
-    run = Run(problem(payload=PAYLOAD, **given))
-    run.prepare()
-    return run
+def asked(**given: object) -> Run:
+    return prepared(problem(payload=PAYLOAD, **given))
 
 
 def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
-    state = prepared().state
+    state = asked().state
     models = state.prepared
 
     def cost(interval: DurationInterval) -> float:
@@ -46,7 +45,7 @@ def test_what_a_method_compares_is_what_its_interval_makes_least() -> None:
 
 def test_a_known_motion_counts_if_it_is_certified() -> None:
     """A polynomial is slower than a known spline, which is then the fastest motion unchanged."""
-    splines, polynomials = prepared().state, prepared(method="lagrange").state
+    splines, polynomials = asked().state, asked(method="lagrange").state
     known = fastest_of(splines, splines.candidates[0])
     candidate = polynomials.candidates[0]
     own = fastest_of(polynomials, candidate)

@@ -23,6 +23,7 @@ from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.passing_spline import PassingSpline
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from tests.optimizer.moves import AMPLE, GOAL, START, fixed, problem
+from tests.optimizer.search.runs import prepared
 
 # tolerance of a spline at the time of a pass [rad]
 ON_PASS = 1e-9
@@ -78,14 +79,12 @@ def test_a_motion_that_misses_a_pass_is_not_certified() -> None:
     found = Run(through(q)).solution()
     missed = q.copy()
     missed[1, 3] += 2e-6
-    run = Run(through(missed))
-    run.prepare()
+    run = prepared(through(missed))
     candidate, spline = run.state.candidates[0], found.trajectory.spline
     certificate = run.state.certified(candidate, spline, run.state.prepared.energy(spline))
     assert 1e-6 < certificate.pass_error < 2.1e-6 and not certificate.valid
     # a motion through the passes in another order is not valid either
-    turned = Run(through(q[[0, 2, 1, 3]]))
-    turned.prepare()
+    turned = prepared(through(q[[0, 2, 1, 3]]))
     with pytest.raises(NoTrajectory):
         Run(through(missed)).as_it_is(spline)
     assert Run(through(q)).as_it_is(spline).energy.electrical.total == found.energy.electrical.total

@@ -1,0 +1,25 @@
+"""Searches up to a stage."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.search.candidates import Candidate
+from joulepath.optimizer.search.run import Run
+
+
+def prepared(problem: Problem, **options: Any) -> Run:
+    """A search whose candidates are found and bounded."""
+    run = Run(problem, **options)
+    run.prepare()
+    return run
+
+
+def explored(problem: Problem) -> Candidate:
+    """The best candidate before refinement and bounds, which take most of the time of a search."""
+    run = prepared(problem)
+    run.explore()
+    best = run.state.best()
+    assert best is not None
+    return best
