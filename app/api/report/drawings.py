@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Self
 from xml.sax.saxutils import escape
 
 from joulepath.app.api.report.numbers import digits
@@ -109,6 +110,13 @@ class Bar:
     energy: float
     ends: tuple[float, float] | None = None
     dot: float | None = None
+
+    @classmethod
+    def of(cls, name: str, electrical: Mapping[str, Any], dot: float | None = None) -> Self:
+        """The bar of the electrical energy of an answer."""
+        known = electrical.get("interval")
+        ends = None if known is None else (known["p5"], known["p95"])
+        return cls(name, electrical["total"], ends, dot)
 
 
 def drawn_bars(bars: Sequence[Bar]) -> str:

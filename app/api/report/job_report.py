@@ -57,7 +57,9 @@ def job_report(bundle: Bundle) -> Report:
         parts=parts_of(electrical),
         course_title="Energy of each move",
         course_note="in the order of the table, in J, with its interval",
-        course=drawn_bars([_bar(row) for row in rows]),
+        course=drawn_bars(
+            [Bar.of(str(row["index"] + 1), row["answer"]["energy"]["electrical"]) for row in rows]
+        ),
         costs=cost_table(bundle, money),
         currency=money.currency,
         costs_note=f"A round is all moves of the table once. {costs_note(money)}",
@@ -138,12 +140,6 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
             )
         ),
     )
-
-
-def _bar(row: Json) -> Bar:
-    known = row["answer"]["energy"]["electrical"].get("interval")
-    ends = None if known is None else (known["p5"], known["p95"])
-    return Bar(str(row["index"] + 1), _joules(row), ends=ends)
 
 
 def _proven(rows: list[Json]) -> str:

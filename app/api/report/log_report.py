@@ -136,14 +136,9 @@ def _bars(total: Json) -> tuple[Rival, ...]:
 
 
 def _bar(number: int, part: Json) -> Bar:
-    electrical, found = part["energy"]["electrical"], measured(part)
-    known = electrical.get("interval")
-    return Bar(
-        str(number),
-        electrical["total"],
-        ends=None if known is None else (known["p5"], known["p95"]),
-        dot=None if found is None else found[1],
-    )
+    found = measured(part)
+    dot = None if found is None else found[1]
+    return Bar.of(str(number), part["energy"]["electrical"], dot)
 
 
 def _compared(answer: Json) -> str:

@@ -67,7 +67,9 @@ def placement_report(bundle: Bundle) -> Report:
         if several
         else "each leg as wide as its time and as high as its mean power, with its joules; filled "
         "with a part in hand. Below, the power from the supply",
-        course=drawn_bars([_bar(k, row) for k, row in enumerate(best, 1)])
+        course=drawn_bars(
+            [Bar.of(str(k), row["answer"]["energy"]["electrical"]) for k, row in enumerate(best, 1)]
+        )
         if several
         else drawn(course_of(of_cycle(bundle, best[0]), programs[0])),
         costs=cost_table(whole, money),
@@ -198,16 +200,6 @@ def _moved(value: float, coordinate: str) -> str:
     if coordinate == "yaw":
         return f"{degrees(value):+.0f}°".replace("-", "−")
     return f"{1e3 * value:+.0f} mm".replace("-", "−")
-
-
-def _bar(number: int, row: Json) -> Bar:
-    electrical = row["answer"]["energy"]["electrical"]
-    known = electrical.get("interval")
-    return Bar(
-        str(number),
-        electrical["total"],
-        ends=None if known is None else (known["p5"], known["p95"]),
-    )
 
 
 def _table(answer: Json) -> Table:

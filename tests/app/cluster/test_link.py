@@ -10,7 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -29,18 +29,9 @@ from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.exceptions import OutsideLimits
 from joulepath.optimizer.progress import Told
+from tests.app.engine.bench import LONG, until
 from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId
 from tests.app.live import ROOT, alive, free_port
-
-PATIENCE = 120.0
-"""What a busy machine may take for anything below [s]; no test waits for it to pass."""
-LONG = 1000.0
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE):
-        while not condition():
-            await asyncio.sleep(0.01)
 
 
 def machine(scheduler: str, workers: int = 1) -> Worker:
