@@ -26,7 +26,7 @@ from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import ToolPath
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import HOME
-from tests.optimizer.cycle.test_optimize_cycle import assert_true
+from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.selection import long_but
 
@@ -87,8 +87,7 @@ def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_angles_are_chosen_for_the_whole_cycle(free_start: bool, free_goal: bool) -> None:
     start, goal = free(FROM) if free_start else down(FROM), free(TO) if free_goal else down(TO)
     asked, given = seam(start, goal), plan_cycle(seam(down(FROM), down(TO)))
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert found.status == "feasible"
     # a bound over all angles holds for these, too
     assert 0 < found.lower_bound <= given.energy.electrical.total
@@ -184,8 +183,7 @@ def assert_reached(found: CycleSolution, arm: Arm, name: str, at: Any, tilt: flo
 @pytest.mark.parametrize("windings", [False, True])
 def test_orientations_at_stops_are_chosen_for_the_whole_cycle(windings: bool) -> None:
     asked = free_stops(windings=windings)
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert found.status == "feasible" and found.complete
     assert_reached(found, asked.arm, "pick", (0.5, -0.2, 0.1))
     assert_reached(found, asked.arm, "place", (0.3, 0.4, 0.3), TILT)

@@ -16,7 +16,7 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.stops import Stop
-from tests.optimizer.cycle.test_optimize_cycle import assert_true
+from tests.optimizer.cycle.test_optimize_cycle import planned
 from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 
@@ -50,8 +50,7 @@ def cycle_of(robot: str) -> tuple[Cycle, Array]:
 )
 def test_no_posture_beside_those_of_a_cycle_needs_less(robot: str, stops: int) -> None:
     asked, _ = cycle_of(robot)
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert found.status == "feasible"
     least, at = found.energy.electrical.total, [move.solution.goal.q for move in found.moves[:-1]]
     assert [move.solution.goal.target for move in found.moves] == [0, 0, 0]

@@ -22,7 +22,7 @@ from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.errors import PathInfeasible, StopInCollision
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
-from tests.optimizer.cycle.test_optimize_cycle import assert_true
+from tests.optimizer.cycle.test_optimize_cycle import planned
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 
 INTO = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.08)
@@ -42,8 +42,7 @@ def one_stop(**given: Any) -> Cycle:
 
 def test_the_tool_comes_and_leaves_straight() -> None:
     asked = with_lines(pick_and_place(1, 2, windings=False))
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert [move.planned.tool_path is not None for move in found.moves] == [
         False,
         True,
@@ -111,8 +110,7 @@ def test_a_cycle_with_lines_takes_a_given_time() -> None:
     asked = with_lines(pick_and_place(1, 2, windings=False))
     duration = 1.3 * plan_cycle(asked).duration
     timed = replace(asked, duration_min=duration, duration_max=duration)
-    found = plan_cycle(timed)
-    assert_true(timed, found)
+    found = planned(timed)
     assert found.duration == pytest.approx(duration)
     assert all(each.saving > 0 for each in found.baselines if each.within_limits)
 
@@ -130,8 +128,7 @@ def test_what_is_grasped_is_no_obstacle_on_the_lines() -> None:
     lines = {"approach": INTO, "retreat": OUT}
     held = replace(stop, dwell=0.1, payload=None, obstacles_ignored=["part"], **lines)
     asked = Cycle(arm=arm, start=HOME, stops=[held], windings=False, deadline=AMPLE)
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    planned(asked)
     with pytest.raises(StopInCollision):
         plan_cycle(replace(asked, stops=[replace(held, obstacles_ignored=[])]))
     with pytest.raises(StopInCollision):

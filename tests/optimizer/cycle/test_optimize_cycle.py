@@ -74,6 +74,13 @@ def assert_true(asked: Cycle, found: CycleSolution) -> None:
             assert electrical.total <= baseline.electrical * (1 + ROUNDING)
 
 
+def planned(asked: Cycle) -> CycleSolution:
+    """The answer to a cycle, with what every cycle promises."""
+    found = plan_cycle(asked)
+    assert_true(asked, found)
+    return found
+
+
 def energy_of(asked: Cycle, k: int, start: Array, goal: Array) -> float:
     """Energy [J] of move k between joint positions, by `optimize`."""
     problem = Problem(arm=asked.arms[k], start=start, goal=goal, windings=False, deadline=AMPLE)
@@ -86,8 +93,7 @@ def test_it_is_the_least_of_all_chains(seed: int) -> None:
     asked = pick_and_place(seed, 3, windings=False)
     only = BranchFilter(elbow="up", wrist="no_flip" if seed % 2 else None)
     asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     layers = [layer.q for layer in list(layers_of(asked).values())]
     goals = [*layers[1:], layers[0]]
     known = {
@@ -112,8 +118,7 @@ def test_it_is_the_least_of_all_chains(seed: int) -> None:
 )
 def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> None:
     asked = pick_and_place(seed, count)
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert found.status == "optimal"
     names = {"move_by_move", "controller_default", "ruckig_slowed", "straight"}
     assert {each.name for each in found.baselines} == names
@@ -215,8 +220,7 @@ def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> N
         windings=False,
         deadline=AMPLE,
     )
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     for start in layers_of(asked)["start"].q:
         fixed = plan_cycle(replace(asked, start=start))
         assert found.energy.electrical.total <= fixed.energy.electrical.total * (1 + CONVERGED)
@@ -233,8 +237,7 @@ def test_one_of_several_targets_is_chosen_for_the_whole_cycle() -> None:
         windings=False,
         deadline=AMPLE,
     )
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     singles = [
         plan_cycle(
             replace(asked, stops=[replace(stops[0], target=target), stops[1]])
@@ -262,8 +265,7 @@ def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others
         Stop(name="b", target=Pose(tcp_pose(arm, q[1]))),
     ]
     asked = Cycle(arm=arm, start=q[0] * 0.9, stops=stops, deadline=AMPLE)
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert found.status == "feasible"
     assert found.lower_bound > 0.3 * found.energy.electrical.total
     rng, layers = np.random.default_rng(5), list(layers_of(asked).values())[1:]

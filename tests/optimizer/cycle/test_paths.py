@@ -29,7 +29,7 @@ from joulepath.optimizer.problem.tool_path import ToolPath
 from joulepath.optimizer.search.errors import PathInfeasible
 from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place
 from tests.optimizer.cycle.test_lines import INTO
-from tests.optimizer.cycle.test_optimize_cycle import assert_true
+from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 
 FREE = Arm(robot=ROBOT, collisions=False)
@@ -60,8 +60,7 @@ def test_the_tool_follows_the_path_and_rests_at_its_ends() -> None:
         glue(dwell=0.2, payload=PART),
         Stop(name="away", target=down(0.1, 0.5, 0.3), payload=Payload()),
     )
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert found.order == ["glue", "away"]
     path = found.moves[1]
     assert (path.planned.kind, path.planned.start, path.planned.goal) == (
@@ -122,8 +121,7 @@ def test_lines_lead_to_a_path_and_from_it_in_a_given_time() -> None:
     asked = a_cycle(
         glue(approach=INTO, retreat=replace(INTO, distance=0.05), branch=BranchFilter("left", "up"))
     )
-    free = plan_cycle(asked)
-    assert_true(asked, free)
+    free = planned(asked)
     assert [move.planned.kind for move in free.moves] == ["move", "line", "path", "line", "move"]
     duration = 1.2 * free.duration
     timed = plan_cycle(replace(asked, duration_min=duration, duration_max=duration))

@@ -34,7 +34,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
-from tests.optimizer.cycle.test_optimize_cycle import assert_true
+from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned
 from tests.optimizer.moves import AMPLE, fixed, torques
 from tests.selection import long_but
 
@@ -151,8 +151,7 @@ def test_brakes_make_waiting_cheap() -> None:
     asked = in_time(
         replace(ASKED, hold="brakes", brake_delay=0.1, brake_power=1.0), 3.0 * free().duration
     )
-    braked = plan_cycle(asked)
-    assert_true(asked, braked)
+    braked = planned(asked)
     (waiting,) = (move for move in braked.moves if move.wait > 0)
     # where it dwells on its brakes already, a wait draws nothing but their power
     assert waiting.planned.dwell > 0.1 and waiting.wait_energy == pytest.approx(
@@ -296,8 +295,7 @@ def test_it_waits_where_it_is_told_to(place: str) -> None:
     asked = in_time(
         replace(ASKED, hold="brakes", brake_power=1.0, wait=place), 2.0 * free().duration
     )
-    found = plan_cycle(asked)
-    assert_true(asked, found)
+    found = planned(asked)
     assert [move.planned.goal for move in found.moves if move.wait > 0] == [place]
 
 
@@ -343,8 +341,7 @@ def test_time_that_cannot_be_shared_leaves_simpler_cycles(
         monkeypatch.setattr(PairSolver, "solve_in", fails)
     for factor, name in ((LONGER, "same_factor"), (SHORTER, "fastest_then_wait")):
         asked = in_time(ASKED, duration_of(factor))
-        found = plan_cycle(asked)
-        assert_true(asked, found)
+        found = planned(asked)
         assert found.status == "feasible"
         assert found.duration == pytest.approx(asked.duration_max, rel=ROUNDING)
         (taken,) = (each for each in found.baselines if each.name == name)
