@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import InvalidProblem, NoTrajectory
+from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.cycle import Cycle
@@ -22,6 +22,7 @@ from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import AMPLE
 from tests.optimizer.test_tool_path import ARM, HOME, poses_of
 from tests.optimizer.tool_paths import along, moved
+from tests.refusals import refusal_of
 from tests.selection import long_but
 
 # relative: speeds by differences of positions 1/4000 of the motion apart
@@ -145,6 +146,5 @@ def test_a_cycle_holds_it_in_a_given_time() -> None:
     ids=str,
 )
 def test_a_wrong_speed_names_its_field(path: dict[str, float], arm: object) -> None:
-    with pytest.raises(InvalidProblem) as refusal:
+    with refusal_of("path.speed"):
         along(moved([0.0, 0.3, 0.0]), path=ToolPath(**path), arm=arm)  # type: ignore[arg-type]
-    assert refusal.value.field == "path.speed"

@@ -15,7 +15,6 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.collision.coal_distance import _lower_bound, coal_shape
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.pair_arrays import PairArrays
-from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.scene import (
     Attachment,
@@ -30,6 +29,7 @@ from joulepath.optimizer.problem.scene import (
 from tests.optimizer.cells import LOADS, arm_in_cell
 from tests.optimizer.collision.numpy_distances import NumpyDistances
 from tests.optimizer.moves import ROBOT
+from tests.refusals import refusal_of
 from tests.selection import long_but
 
 AGREEMENT = 1e-9  # m; closed forms against Coal's, and its iterations ended at 1e-12
@@ -183,12 +183,10 @@ def test_what_touches_by_design_is_not_compared(touches: tuple[str, ...]) -> Non
 
 def test_what_touches_must_be_a_link() -> None:
     part = capsule_between(np.zeros(3), np.array([0, 0, 0.1]), 0.03, ["wrist_3", "table"])
-    with pytest.raises(InvalidProblem, match="links of the robot") as refused:
+    with refusal_of("tool.capsules.1.touches", match="links of the robot"):
         Arm(robot=ROBOT, tool=[capsule_between(np.zeros(3), np.ones(3), 0.03), part])
-    assert refused.value.field == "tool.capsules.1.touches"
-    with pytest.raises(InvalidProblem) as refused:
+    with refusal_of("payload.touches"):
         Arm(robot=ROBOT, payload=Payload(shape=part))
-    assert refused.value.field == "payload.touches"
 
 
 @pytest.mark.parametrize("capsules", [0, 1])

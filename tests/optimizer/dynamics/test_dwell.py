@@ -14,7 +14,6 @@ import pytest
 
 from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, linear_dwells
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
-from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
@@ -23,6 +22,7 @@ from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import DurationTooShort
 from tests.optimizer.moves import ROBOT, fixed, problem
+from tests.refusals import refusal_of
 from tests.selection import long_but
 
 BY_HAND = 1e-12  # relative; a few operations
@@ -204,9 +204,8 @@ def test_equal_ends_just_wait() -> None:
 def test_a_motion_has_to_fit() -> None:
     with pytest.raises(DurationTooShort):
         optimize(problem(START, GOAL, dwell=Dwell(0.2)))
-    with pytest.raises(InvalidProblem) as caught:
+    with refusal_of("duration"):
         problem(START, GOAL, dwell=Dwell(1.0), duration_min=1.1)
-    assert caught.value.field == "duration"
     task = problem(START, GOAL, dwell=Dwell(1.0), duration_max=3.0)
     assert task.duration_max == 1.0
     assert replace(task, duration_max=0.9).duration_max == 0.9
@@ -223,6 +222,5 @@ def test_a_motion_has_to_fit() -> None:
     ],
 )
 def test_a_cycle_that_cannot_be_is_refused(given: dict[str, Any], field: str) -> None:
-    with pytest.raises(InvalidProblem) as caught:
+    with refusal_of(field):
         Dwell(**given)
-    assert caught.value.field == field

@@ -31,6 +31,7 @@ from tests.models.own_arm.arms import robot
 from tests.models.own_arm.palletiser import ACROSS, UP, joint, link
 from tests.models.own_arm.palletiser import description as palletiser
 from tests.optimizer.joint_limits.attack import torque_ratios, worst_ratio
+from tests.refusals import refusal_of
 
 HOME, REST = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.zeros((2, 6))
 PENDULUM = (
@@ -195,6 +196,5 @@ def test_an_arm_of_eight_joints_is_refused() -> None:
 
 
 def test_an_arm_with_followers_is_refused() -> None:
-    with pytest.raises(InvalidProblem, match="follow others") as raised:
+    with refusal_of("robot", match="follow others"):
         joint_limits(Arm(robot=robot(palletiser())))
-    assert raised.value.field == "robot"

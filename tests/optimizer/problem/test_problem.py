@@ -19,6 +19,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, tcp_pose
+from tests.refusals import refusal_of
 
 ROTATED = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([0.4, 0.1, 0.5])).homogeneous
 
@@ -203,9 +204,8 @@ def test_nothing_can_be_changed_afterwards() -> None:
     ids=["shape", "scaled", "mirrored", "sheared", "nan", "shuffled", "text"],
 )
 def test_a_pose_must_be_rigid(T: Array) -> None:
-    with pytest.raises(InvalidProblem) as refusal:
+    with refusal_of("pose"):
         Pose(T)
-    assert refusal.value.field == "pose"
 
 
 def test_a_pose_must_be_homogeneous() -> None:
@@ -239,9 +239,8 @@ def test_a_payload_must_be_a_body(given: dict[str, Any], field: str) -> None:
     """Positive mass, principal moments of inertia that some distribution of mass has, and a
     symmetric tensor.
     """
-    with pytest.raises(InvalidProblem) as refusal:
+    with refusal_of(field):
         Payload(**given)
-    assert refusal.value.field == field
 
 
 def test_bodies_on_the_border_are_bodies() -> None:
