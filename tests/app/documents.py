@@ -12,5 +12,4 @@ from joulepath.app.main import create_app
 @cache
 def open_document() -> dict[str, Any]:
     """As it is served; nobody changes it."""
-    document: dict[str, Any] = json.loads(json.dumps(create_app().openapi()))
-    return document
+    return json.loads(json.dumps(create_app().openapi()))

@@ -106,8 +106,7 @@ def run(
 
 
 def _number(told: socket.socket) -> int:
-    number: int = NUMBER.unpack(told.recv(NUMBER.size))[0]
-    return number
+    return NUMBER.unpack(told.recv(NUMBER.size))[0]
 
 
 @functools.cache

@@ -50,8 +50,7 @@ def shown(client: Any, path: str, limit: int = 1000) -> dict[str, Any]:
     answer = client.get(f"{path}?limit={limit}")
     assert answer.status_code == 200, answer.text
     JobDetail.model_validate_json(answer.content)
-    content: dict[str, Any] = answer.json()
-    return content
+    return answer.json()
 
 
 def ended(client: Any, path: str) -> dict[str, Any]:

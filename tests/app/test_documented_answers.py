@@ -122,8 +122,7 @@ SHOWN = {
 
 def answer_to(server: Server, request: str, changes: dict[str, Any]) -> dict[str, Any]:
     body = json.loads((ROOT / f"examples/{request}.json").read_text())
-    answered: dict[str, Any] = server.post(f"/{request.split('/')[0]}", body | changes).json()
-    return answered
+    return server.post(f"/{request.split('/')[0]}", body | changes).json()
 
 
 def stated(page: str, pattern: str) -> float:

@@ -27,8 +27,7 @@ def pose(position: list[float]) -> dict[str, Any]:
 
 def example(name: str) -> dict[str, Any]:
     """The body of a shipped example."""
-    content: dict[str, Any] = json.loads((EXAMPLES / f"{name}.json").read_text())
-    return content
+    return json.loads((EXAMPLES / f"{name}.json").read_text())
 
 
 def free_about(end: dict[str, Any], axis: list[float] | None) -> dict[str, Any]:

@@ -37,8 +37,7 @@ def answered(task: RequestTask) -> Json:
     content = OptimizeAnswer.of(
         request, "id", optimize(to_problem(request, 10.0)), arm_fields(request)
     )
-    answer: Json = orjson.loads(json_document(content))
-    return answer
+    return orjson.loads(json_document(content))
 
 
 def found(task: RequestTask, answer: Json) -> list[str]:

@@ -34,8 +34,7 @@ def nginx(name: str) -> list[dict[str, Any]]:
     """The directives of a file; what is unknown, or at a wrong place, is an error."""
     parsed = crossplane.parse(str(DEPLOY / "nginx" / name), check_ctx=False)
     assert parsed["errors"] == []
-    directives: list[dict[str, Any]] = parsed["config"][0]["parsed"]
-    return directives
+    return parsed["config"][0]["parsed"]
 
 
 def inside(block: list[dict[str, Any]], name: str) -> list[list[str]]:
@@ -75,8 +74,7 @@ def test_nginx_replaces_what_a_client_says_of_itself(tls: list[dict[str, Any]]) 
 
 @pytest.fixture(scope="module")
 def compose() -> dict[str, Any]:
-    content: dict[str, Any] = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
-    return content
+    return yaml.safe_load((DEPLOY / "compose.yaml").read_text())
 
 
 def test_compose_names_what_there_is(compose: dict[str, Any]) -> None:

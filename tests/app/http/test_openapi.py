@@ -20,8 +20,7 @@ from joulepath.app.settings import Settings
 
 @pytest.fixture(scope="module")
 def document(client: TestClient) -> dict[str, Any]:
-    content: dict[str, Any] = client.get("/openapi.json").json()
-    return content
+    return client.get("/openapi.json").json()
 
 
 def properties(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -162,8 +161,7 @@ def test_version_is_the_projects(document: dict[str, Any]) -> None:
 @pytest.fixture(scope="module")
 def short(client: TestClient) -> dict[str, Any]:
     """The document that the page `/docs` opens."""
-    content: dict[str, Any] = client.get("/docs/openapi.json").json()
-    return content
+    return client.get("/docs/openapi.json").json()
 
 
 def test_tags_are_in_the_order_of_the_work(short: dict[str, Any]) -> None:

@@ -30,8 +30,7 @@ def advised(client: TestClient, **body: Any) -> Json:
     answer = client.post("/advice", json=body)
     assert answer.status_code == 200, answer.text
     model_of(AdviceAnswer).model_validate_json(answer.content)
-    content: Json = answer.json()
-    return content
+    return answer.json()
 
 
 def energy(client: TestClient, path: str, body: Json) -> float:

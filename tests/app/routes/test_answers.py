@@ -31,10 +31,7 @@ TWO_POSES = EXAMPLES["joint_to_pose"]
 
 @pytest.fixture(scope="module")
 def everything(client: TestClient) -> dict[str, Any]:
-    content: dict[str, Any] = client.post(
-        "/optimize", json=TWO_POSES | {"candidates": "all"}
-    ).json()
-    return content
+    return client.post("/optimize", json=TWO_POSES | {"candidates": "all"}).json()
 
 
 @pytest.mark.parametrize(

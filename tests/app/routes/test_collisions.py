@@ -51,8 +51,7 @@ def answered(
 ) -> dict[str, Any]:
     answer = client.post(path, json=request)
     assert answer.status_code == 200, answer.text
-    content: dict[str, Any] = answer.json()
-    return content
+    return answer.json()
 
 
 def least_distance(request: dict[str, Any], spline: dict[str, Any]) -> float:

@@ -31,8 +31,7 @@ def compared(client: TestClient, **given: Any) -> dict[str, Any]:
     answer = client.post("/compare", json=MOVE | {"deadline": PATIENCE} | given)
     assert answer.status_code == 200, answer.text
     model_of(CompareAnswer).model_validate_json(answer.content)
-    table: dict[str, Any] = answer.json()
-    return table
+    return answer.json()
 
 
 @pytest.mark.parametrize(

@@ -43,8 +43,7 @@ def answered(client: TestClient, asked: dict[str, Any]) -> dict[str, Any]:
     reply = client.post("/cycle", json=asked)
     assert reply.status_code == 200, reply.text
     model_of(CycleAnswer).model_validate_json(reply.content)
-    content: dict[str, Any] = reply.json()
-    return content
+    return reply.json()
 
 
 @pytest.fixture(scope="module")

@@ -40,8 +40,7 @@ def answered(client: TestClient, body: dict[str, Any]) -> dict[str, Any]:
 
 
 def total(content: dict[str, Any]) -> float:
-    value: float = content["energy"]["electrical"]["total"]
-    return value
+    return content["energy"]["electrical"]["total"]
 
 
 @pytest.mark.long

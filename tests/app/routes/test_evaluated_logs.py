@@ -89,8 +89,7 @@ def evaluated(client: TestClient, body: bytes, **query: str) -> dict[str, Any]:
     answer = client.post("/evaluate", content=body, headers=CSV, params=query)
     assert answer.status_code == 200, answer.text
     model_of(EvaluateAnswer).model_validate_json(answer.content)
-    content: dict[str, Any] = answer.json()
-    return content
+    return answer.json()
 
 
 @pytest.fixture(scope="module")

@@ -28,8 +28,7 @@ def found(client: TestClient) -> dict[str, Any]:
     answer = client.post("/excitation", json=SHORT)
     assert answer.status_code == 200, answer.text
     model_of(ExcitationAnswer).model_validate_json(answer.content)
-    content: dict[str, Any] = answer.json()
-    return content
+    return answer.json()
 
 
 def test_the_motion_rests_at_its_ends_and_keeps_its_limits(found: dict[str, Any]) -> None:

@@ -52,10 +52,7 @@ ROUND = {
 
 @pytest.fixture(scope="module")
 def answer(client: TestClient) -> Json:
-    found: Json = client.post(
-        "/optimize", json=move(payload=LOAD, scene={"obstacles": [BOX]})
-    ).json()
-    return found
+    return client.post("/optimize", json=move(payload=LOAD, scene={"obstacles": [BOX]})).json()
 
 
 def export(client: TestClient, format: str, answer: Any, **fields: Any) -> Any:

@@ -18,8 +18,7 @@ BOX = {"name": "box", "shape": "box", "size": [0.1, 0.1, 0.1]}
 def solutions(client: TestClient, **changes: Any) -> list[dict[str, Any]]:
     answer = client.post("/ik", json=EXAMPLE | changes)
     assert answer.status_code == 200, answer.text
-    found: list[dict[str, Any]] = answer.json()["solutions"]
-    return found
+    return answer.json()["solutions"]
 
 
 def test_each_solution_names_what_is_nearest(client: TestClient) -> None:

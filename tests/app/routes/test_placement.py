@@ -59,8 +59,7 @@ def placed(client: TestClient, body: Json) -> Json:
     answer = client.post("/placement", json=body)
     assert answer.status_code == 200, answer.text
     model_of(PlacementAnswer).model_validate_json(answer.content)
-    content: Json = answer.json()
-    return content
+    return answer.json()
 
 
 @pytest.fixture(scope="module")

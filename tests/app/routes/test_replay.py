@@ -30,8 +30,7 @@ def replayed(client: TestClient, **body: Any) -> dict[str, Any]:
     answer = client.post("/replay", json=COARSE | body)
     assert answer.status_code == 200, answer.text
     model_of(ReplayAnswer).model_validate_json(answer.content)
-    content: dict[str, Any] = answer.json()
-    return content
+    return answer.json()
 
 
 def agrees(motion: dict[str, Any]) -> None:
@@ -46,8 +45,7 @@ def agrees(motion: dict[str, Any]) -> None:
 @pytest.fixture(scope="module")
 def loaded(client: TestClient) -> dict[str, Any]:
     """An answer with a payload and askew."""
-    content: dict[str, Any] = client.post("/optimize", json=LOADED).json()
-    return content
+    return client.post("/optimize", json=LOADED).json()
 
 
 def test_a_kept_answer_knows_its_arm(client: TestClient, loaded: dict[str, Any]) -> None:

@@ -57,8 +57,7 @@ def log(client: TestClient) -> str:
     body = csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3))
     answer = client.post("/logs", content=body, params={"name": "morning"}, headers=CSV)
     assert answer.status_code == 201, answer.text
-    id: str = answer.json()["id"]
-    return id
+    return answer.json()["id"]
 
 
 def test_a_job_is_summed_and_listed(page: bytes) -> None:

@@ -58,8 +58,7 @@ def shown(client: Any, path: str) -> dict[str, Any]:
     answer = client.get(path)
     assert answer.status_code == 200, answer.text
     Study.model_validate_json(answer.content)
-    content: dict[str, Any] = answer.json()
-    return content
+    return answer.json()
 
 
 @pytest.fixture(scope="module")

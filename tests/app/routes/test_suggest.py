@@ -138,8 +138,7 @@ def test_the_best_motion_to_a_pose_is_hard_to_beat(client: TestClient) -> None:
 
 
 def suggested_energy(client: TestClient, path: str, number: int) -> float:
-    energy: float = client.get(f"{path}/iterations/{number}").json()["energy"]
-    return energy
+    return client.get(f"{path}/iterations/{number}").json()["energy"]
 
 
 def test_a_branch_that_was_asked_for_is_opened(client: TestClient) -> None:
