@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.dynamics.losses import breakdown
@@ -20,7 +19,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.certificate import Certificate, Clearance
 from joulepath.optimizer.result.energy import Energy
 from tests.by_pinocchio import flange
-from tests.optimizer.moves import problem_with
+from tests.optimizer.moves import GOAL, ROBOT, START, problem_with
 
 # relative; values met exactly on the grid, up to double precision through a few thousand operations
 ROUNDING = 1e-9
@@ -33,9 +32,6 @@ BETWEEN = 5e-5
 # relative; Simpson on 1 ms against Gauss on other panels, both with corners of |x| inside intervals
 QUADRATURE = 1e-5
 
-ROBOT = load_robot("ur5e")
-START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
-GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
 TRAVEL = np.abs(GOAL - START)
 PAYLOAD = Payload(
     mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003])

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from joulepath import Payload, Pose, Problem, optimize
-from joulepath.models.registry import load_robot
 from tests.by_pinocchio import flange
-from tests.optimizer.moves import problem_with
+from tests.optimizer.moves import ROBOT, problem_with
 from tests.selection import long_but
 
-ROBOT = load_robot("ur5e")
 # of a baseline's energy against ours where it is the answer itself: both are quadratures, and where
 # switches of two joints fall within microseconds, the spline that stands for the motion is slower
 # by that hair

@@ -11,7 +11,6 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.coal_distance import coal_shape
 from joulepath.optimizer.collision.cores import Core
@@ -21,9 +20,9 @@ from joulepath.optimizer.problem.clouds import Points
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from tests.mesh_folders import meshes
 from tests.optimizer.cells import wander
+from tests.optimizer.moves import ROBOT
 from tests.optimizer.placement.cells import at
 
-ROBOT = load_robot("ur5e")
 EXCESS = 2.7e-3 + 1e-4  # m; of the fit beyond the hulls of the meshes, and of its last digit
 SEARCHED = 1e-6  # m; tolerance of Coal's search
 

@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.inverse_dynamics import SymbolicPayload, inverse_dynamics
+from tests.optimizer.moves import ROBOT
 
 STATES = 1000
 TORQUE_TOLERANCE = 1e-9  # N·m; both recursions round at about 1e-13 of torques of some 500 N·m
@@ -19,8 +19,6 @@ TORQUE_TOLERANCE = 1e-9  # N·m; both recursions round at about 1e-13 of torques
 DERIVATIVE_TOLERANCE = 1e-7
 
 Load = tuple[float, Array, Array]  # mass, com, inertia
-
-ROBOT = load_robot("ur5e")
 
 
 def random_payload(rng: np.random.Generator) -> Load:

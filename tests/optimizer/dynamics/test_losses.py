@@ -9,19 +9,18 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Drives, Electronics
 from joulepath.optimizer.dynamics.losses import breakdown, drawn_power, power_flow, smooth_abs
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.bus import Bus
 from tests.by_pinocchio import torques_of
+from tests.optimizer.moves import ROBOT
 
 IDENTITY_TOLERANCE = (
     1e-9  # relative; spectrally accurate quadrature of smooth shaft power leaves rounding only
 )
 HAND_TOLERANCE = 1e-12  # relative; a few operations in double precision
 
-ROBOT = load_robot("ur5e")
 # the UR5e's inverter loss is unknown and zero: give it one, so that its terms are seen
 LOSSY = replace(
     ROBOT.drives,

@@ -4,7 +4,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.forward import joint_placements
 from joulepath.optimizer.kinematics.path_constraints import (
@@ -12,8 +11,8 @@ from joulepath.optimizer.kinematics.path_constraints import (
     PointSpeedConstraint,
     ToolConeConstraint,
 )
+from tests.optimizer.moves import ROBOT
 
-ROBOT = load_robot("ur5e")
 PLACEMENTS = joint_placements(ROBOT.model)
 AXIS = np.array([0.6, 0.0, 0.8])
 DIRECTION = np.array([0.0, 0.28, -0.96])

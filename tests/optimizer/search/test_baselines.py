@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import ruckig
 
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.motion.ruckig_motion import time_optimal
 from joulepath.optimizer.motion.time_scalings import (
@@ -22,7 +21,7 @@ from joulepath.optimizer.search.baselines import (
     guesses,
     nearest,
 )
-from tests.optimizer.moves import problem_with
+from tests.optimizer.moves import GOAL, ROBOT, START, problem_with
 
 EXACT = 1e-12  # relative; closed forms in double precision
 # rad; Ruckig solves its phases from polynomial roots and accepts a position within 1e-8 of the
@@ -30,10 +29,7 @@ EXACT = 1e-12  # relative; closed forms in double precision
 RUCKIG_POSITION = 1e-7
 RATE = 1e-9  # relative; Ruckig's states are cubic polynomials evaluated in double precision
 
-ROBOT = load_robot("ur5e")
 NAMES = ["trapezoid", "quintic", "ruckig", "ruckig_slowed", "straight", "controller_default"]
-START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
-GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
 DURATION = 1.3
 PANEL_NODES = 6
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from joulepath import optimize
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.collision.clearance_constraint import (
     CLEARANCE_CONSTRAINT,
     ClearanceConstraint,
@@ -27,10 +26,9 @@ from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 from joulepath.optimizer.solve.nlp.working_set_qp import WORKING_SET
-from tests.optimizer.moves import fixed, problem_with
+from tests.optimizer.moves import ROBOT, fixed, problem_with
 from tests.optimizer.placement.cells import at
 
-ROBOT = load_robot("ur5e")
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([1.8, -1.1, 1.9, -2.4, -1.57, 0.4])
 # point of the flange on the motion from HOME to GOAL without obstacles [m]
