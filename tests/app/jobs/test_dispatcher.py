@@ -41,8 +41,8 @@ def answer(name: str) -> TaskResult:
 class Work:
     """An executor whose work the test ends."""
 
-    def __init__(self, name: str, slots: int) -> None:
-        self.name, self.slots, self.free = name, slots, asyncio.Event()
+    def __init__(self, name: str) -> None:
+        self.name, self.slots, self.free = name, 1, asyncio.Event()
         self.begun: list[int] = []
         self.stopped: list[int] = []
         self.stoppable: list[bool] = []
@@ -74,10 +74,10 @@ class Work:
 class Service:
     """A dispatcher with work of its own, on a clock of its own."""
 
-    def __init__(self, name: str, store: Store, workers: int = 1) -> None:
-        settings = Settings(workers=workers, job_workers=workers)
+    def __init__(self, name: str, store: Store) -> None:
+        settings = Settings()
         self.moved = timedelta(0)
-        self.work = Work(name, workers)
+        self.work = Work(name)
         self.dispatcher = Dispatcher(store, self.work, settings, lambda: now() + self.moved)
         self.jobs = Jobs(store, self.dispatcher, settings)
 
@@ -157,8 +157,7 @@ async def test_a_long_request_is_not_taken_over(store: Store) -> None:
     await second.dispatcher.stop()
 
 
-async def test_a_request_that_kills_three_workers_fails(store: Store) -> None:
-    service = Service("only", store)
+async def test_a_request_that_kills_three_workers_fails(store: Store, service: Service) -> None:
     service.work.errors = [WorkerLost(), WorkerLost(), WorkerLost()]
     service.work.free.set()
     job_id = await sent(service)
@@ -172,11 +171,9 @@ async def test_a_request_that_kills_three_workers_fails(store: Store) -> None:
     await until(lambda: is_done(service, job_id))
     (only,) = await requests(store, job_id)
     assert (only.state, only.attempt, only.problem) == ("done", 4, None)
-    await service.dispatcher.stop()
 
 
-async def test_a_caller_may_take_its_worker_twice(store: Store) -> None:
-    service = Service("only", store)
+async def test_a_caller_may_take_its_worker_twice(store: Store, service: Service) -> None:
     service.work.errors = [Preempted(), Preempted()]
     service.work.free.set()
     job_id = await sent(service)
@@ -185,7 +182,6 @@ async def test_a_caller_may_take_its_worker_twice(store: Store) -> None:
     (only,) = await requests(store, job_id)
     assert (only.state, only.attempt) == ("done", 1)
     assert service.work.stoppable == [True, True, False]
-    await service.dispatcher.stop()
 
 
 async def test_cancelling_stops_what_runs_here_and_elsewhere(store: Store) -> None:
@@ -205,8 +201,7 @@ async def test_cancelling_stops_what_runs_here_and_elsewhere(store: Store) -> No
     await elsewhere.dispatcher.stop()
 
 
-async def test_deleting_stops_what_runs(store: Store) -> None:
-    service = Service("only", store)
+async def test_deleting_stops_what_runs(service: Service) -> None:
     job_id = await sent(service, 2)
     service.dispatcher.start()
     await until(lambda: service.work.begun == [0])
@@ -215,11 +210,10 @@ async def test_deleting_stops_what_runs(store: Store) -> None:
     another = await sent(service)
     service.work.free.set()
     await until(lambda: is_done(service, another))
-    await service.dispatcher.stop()
 
 
-async def test_a_stop_gives_everything_back(store: Store) -> None:
-    service = Service("only", store, workers=2)
+async def test_a_stop_gives_everything_back(store: Store, service: Service) -> None:
+    service.work.slots = 2
     job_id = await sent(service, 9)
     service.dispatcher.start()
     await until(lambda: len(service.work.begun) == 2)
@@ -229,19 +223,18 @@ async def test_a_stop_gives_everything_back(store: Store) -> None:
     assert {(each.state, each.leased_by, each.deaths) for each in found} == {("waiting", None, 0)}
 
 
-async def test_an_unforeseen_error_ends_no_job(store: Store) -> None:
-    service = Service("only", store)
+async def test_an_unforeseen_error_ends_no_job(store: Store, service: Service) -> None:
     service.work.errors = [ZeroDivisionError()]
     service.work.free.set()
     job_id = await sent(service, 3)
     service.dispatcher.start()
     await until(lambda: is_done(service, job_id))
     assert [each.state for each in await requests(store, job_id)] == ["failed", "done", "done"]
-    await service.dispatcher.stop()
 
 
-async def test_outcomes_outlive_a_database_that_fails(tmp_path: Path, store: Store) -> None:
-    service = Service("only", store)
+async def test_outcomes_outlive_a_database_that_fails(
+    tmp_path: Path, store: Store, service: Service
+) -> None:
     job_id = await sent(service)
     service.dispatcher.start()
     await until(lambda: service.work.begun == [0])
@@ -255,7 +248,6 @@ async def test_outcomes_outlive_a_database_that_fails(tmp_path: Path, store: Sto
     store._engine = engine
     await until(lambda: is_done(service, job_id))
     assert (await requests(store, job_id))[0].state == "done"
-    await service.dispatcher.stop()
 
 
 def test_a_holder_is_gone_once_its_process_is() -> None:

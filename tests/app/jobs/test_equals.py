@@ -48,8 +48,8 @@ def asks(
     return NewRequest(kind, BODY, deadline, Meaning(version=version, digest=digest, robot="ur5e"))
 
 
-def service_of(store: Store, workers: int = 1) -> Service:
-    service = Service("only", store, workers)
+@pytest.fixture
+def service(service: Service) -> Service:
     service.work.answer = computed
     return service
 
@@ -73,8 +73,10 @@ async def document(service: Service, job_id: str, number: int) -> Any:
     return orjson.loads(unpacked(body))
 
 
-async def test_one_is_computed_and_the_others_get_its_answer(store: Store) -> None:
-    service = service_of(store, workers=2)
+async def test_one_is_computed_and_the_others_get_its_answer(
+    store: Store, service: Service
+) -> None:
+    service.work.slots = 2
     service.dispatcher.start()
     first = await send(service, *[asks()] * 20, asks("b"), asks(deadline=99.0))
     await until(lambda: sorted(service.work.begun) == [0, 20])
@@ -96,29 +98,24 @@ async def test_one_is_computed_and_the_others_get_its_answer(store: Store) -> No
     await done(service, asks(), owner="somebody")
     await done(service, asks(version="another"), NewRequest("optimize", BODY, 10.0))
     assert len(service.work.begun) == 5
-    await service.dispatcher.stop()
 
 
-async def test_more_time_may_find_a_better_answer(store: Store) -> None:
-    service = service_of(store)
+async def test_more_time_may_find_a_better_answer(service: Service) -> None:
     service.work.answer = partial(computed, status="feasible")
     service.work.free.set()
     service.dispatcher.start()
     await done(service, asks(), asks(deadline=20.0), asks(deadline=5.0))
     assert service.work.begun == [0, 1]
-    await service.dispatcher.stop()
 
 
-async def test_answers_that_refer_to_others_stay_in_their_job(store: Store) -> None:
+async def test_answers_that_refer_to_others_stay_in_their_job(service: Service) -> None:
     """Those that they refer to are deleted with it."""
-    service = service_of(store)
     service.work.free.set()
     service.dispatcher.start()
     await done(service, asks(kind="cycle"), asks(kind="cycle"))
     assert service.work.begun == [0]
     await done(service, asks(kind="cycle"))
     assert service.work.begun == [0, 0]
-    await service.dispatcher.stop()
 
 
 @pytest.mark.parametrize(
@@ -126,9 +123,9 @@ async def test_answers_that_refer_to_others_stay_in_their_job(store: Store) -> N
     [(OutsideLimits("start", "elbow_joint", 9.0, -1.0, 1.0), [0]), (InternalError(), [0, 1])],
 )
 async def test_only_a_request_that_is_wrong_fails_for_all(
-    error: Exception, begun: list[int], store: Store
+    error: Exception, begun: list[int], service: Service
 ) -> None:
-    service = service_of(store, workers=2)
+    service.work.slots = 2
     service.work.errors = [error]
     service.work.free.set()
     service.dispatcher.start()
@@ -139,11 +136,9 @@ async def test_only_a_request_that_is_wrong_fails_for_all(
     assert [each.problem and each.problem["instance"] for each in failed] == [
         f"{job_id}.{each.number}" for each in failed
     ]
-    await service.dispatcher.stop()
 
 
-async def test_one_that_waits_for_another_can_be_cancelled(store: Store) -> None:
-    service = service_of(store)
+async def test_one_that_waits_for_another_can_be_cancelled(store: Store, service: Service) -> None:
     first = await send(service, asks())
     service.dispatcher.start()
     await until(lambda: service.work.begun == [0])
@@ -160,11 +155,9 @@ async def test_one_that_waits_for_another_can_be_cancelled(store: Store) -> None
     assert [each.state for each in await requests(store, third)] == ["done"], (
         "it is computed in its place"
     )
-    await service.dispatcher.stop()
 
 
-async def test_a_job_that_is_deleted_takes_its_answers_with_it(store: Store) -> None:
-    service = service_of(store)
+async def test_a_job_that_is_deleted_takes_its_answers_with_it(service: Service) -> None:
     service.work.free.set()
     service.dispatcher.start()
     first, _ = await done(service, asks())
@@ -173,4 +166,3 @@ async def test_a_job_that_is_deleted_takes_its_answers_with_it(store: Store) -> 
     assert (await document(service, second, 0))["request"] == f"{second}.0", "it has a copy"
     await done(service, asks())
     assert service.work.begun == [0, 0]
-    await service.dispatcher.stop()

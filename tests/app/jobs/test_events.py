@@ -66,11 +66,12 @@ async def test_readers_at_the_same_place_share_one_read(store: Store) -> None:
     await service.dispatcher.stop()
 
 
-async def test_a_quiet_stream_has_comments(monkeypatch: pytest.MonkeyPatch, store: Store) -> None:
+async def test_a_quiet_stream_has_comments(
+    monkeypatch: pytest.MonkeyPatch, store: Store, service: Service
+) -> None:
     monkeypatch.setattr(events, "STREAM", replace(events.STREAM, pause=0.0))
     monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, look=0.0))
     monkeypatch.setattr(events, "EVENTS", replace(events.EVENTS, gather=0.0))
-    service = Service("only", store)
     found = events_after(store, service.dispatcher, await sent(service), 0)
     assert [await anext(found), await anext(found)] == [
         b'event: state\ndata: {"state": "waiting"}\nid: 1\n\n',

@@ -34,8 +34,7 @@ TRIED = {"solved": 1, "share": None}
 """Progress within a request that has tried one candidate."""
 
 
-async def test_progress_within_a_long_request_is_an_event(store: Store) -> None:
-    service = Service("only", store)
+async def test_progress_within_a_long_request_is_an_event(store: Store, service: Service) -> None:
     job_id = await sent(service, kind="cycle")
 
     async def reports() -> list[dict[str, Any]]:
@@ -68,12 +67,10 @@ async def test_progress_within_a_long_request_is_an_event(store: Store) -> None:
     await until(lambda: is_done(service, job_id))
     found = await reports()
     assert len(found) == 3, "what is no news is no event, and the end has none"
-    await service.dispatcher.stop()
 
 
-async def test_time_left_of_an_identification(store: Store) -> None:
+async def test_time_left_of_an_identification(store: Store, service: Service) -> None:
     """From its fits: before the first one has ended, nothing is said."""
-    service = Service("only", store)
     job_id = await sent(service, kind=IDENTIFY)
 
     async def told() -> list[tuple[float | None, float | None]]:
@@ -101,12 +98,10 @@ async def test_time_left_of_an_identification(store: Store) -> None:
     assert left[1:] == (pytest.approx(60, rel=0.1), pytest.approx(10, rel=0.1))
     service.work.free.set()
     await until(lambda: is_done(service, job_id))
-    await service.dispatcher.stop()
 
 
-async def test_jobs_wait_until_there_is_a_slot(store: Store) -> None:
+async def test_jobs_wait_until_there_is_a_slot(store: Store, service: Service) -> None:
     """As for a cluster that cannot be reached, and for machines that come and go."""
-    service = Service("only", store)
     service.work.slots = 0
     job_id = await sent(service, 3)
     service.dispatcher.start()
@@ -129,16 +124,13 @@ async def test_jobs_wait_until_there_is_a_slot(store: Store) -> None:
     await until(lambda: is_done(service, job_id))
     states = [(each.state, each.problem) for each in await requests(store, job_id)]
     assert states == [("done", None)] * 3, "a lost cluster is no failure"
-    await service.dispatcher.stop()
 
 
-async def test_nobody_listens_to_short_requests(store: Store) -> None:
-    service = Service("only", store)
+async def test_nobody_listens_to_short_requests(service: Service) -> None:
     await sent(service)
     service.dispatcher.start()
     await until(lambda: service.work.begun == [0])
     assert service.work.tell is no_listener
-    await service.dispatcher.stop()
 
 
 class Runner:
