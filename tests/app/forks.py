@@ -106,7 +106,8 @@ def run(
 
 
 def _number(told: socket.socket) -> int:
-    return NUMBER.unpack(told.recv(NUMBER.size))[0]
+    number: int = NUMBER.unpack(told.recv(NUMBER.size))[0]
+    return number
 
 
 @functools.cache
