@@ -7,7 +7,6 @@ from typing import Any, Protocol, Self
 
 from joulepath.app.answers.envelope import AnswerFigures, MotionAnswer
 from joulepath.app.convert.arm_fields import arm_fields
-from joulepath.app.convert.candidates import chosen
 from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.unlikely_units import unlikely_units
@@ -63,9 +62,12 @@ class OptimizeAnswer(SolvedMotion, MotionAnswer):
             solution: the certified solution.
             arm: figures of the arm, from `arm_fields`.
         """
-        motion = vars(solution.solved_motion()) | {
-            "candidates": chosen(solution.candidates, request.candidates)
-        }
+        listed = [
+            each
+            for each in solution.candidates
+            if request.candidates == "all" or (request.candidates == "computed" and each.tried)
+        ]
+        motion = vars(solution.solved_motion()) | {"candidates": listed}
         return cls(
             request=request_id,
             robot=request.robot,
