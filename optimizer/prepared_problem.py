@@ -101,6 +101,10 @@ class PreparedProblem(Plant):
         assert models is None or models.arm is problem.arm
         return cls(problem.arm, problem, ArmModels(problem.arm) if models is None else models)
 
+    def beside(self, problem: Problem) -> PreparedProblem:
+        """Another problem of the same arm, with the same models."""
+        return PreparedProblem.of(problem, self.models)
+
     @cached_property
     def kernel(self) -> Kernel:
         """Compiled functions of the robot."""

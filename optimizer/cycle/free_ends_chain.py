@@ -117,10 +117,7 @@ class FreeEndsChain:
     ) -> None:
         self.cycle, self.legs, self.covered = cycle, legs, covered
         self.layers = [legs[0].start, *(leg.goal for leg in legs)]
-        self.bounds = [
-            LeastBound(PreparedProblem.of(leg.prepared.freed(), leg.prepared.models))
-            for leg in legs
-        ]
+        self.bounds = [LeastBound(leg.prepared.beside(leg.prepared.freed())) for leg in legs]
         self.quick = dict[int, SingleJointBound]()
         self.costs = [self._costs(k) for k in range(len(legs))]
         # pairs of cells of two layers with the bound of their displacement

@@ -172,7 +172,7 @@ class Leg:
         target = self.start.ends[self.start.end[s]].target
         if target not in self._by_target:
             problem = replace(self.prepared.problem, start=self.start.q[s], goal=self.goal.q[g])
-            self._by_target[target] = PreparedProblem.of(problem, self.prepared.models)
+            self._by_target[target] = self.prepared.beside(problem)
         return self._by_target[target]
 
     def trace_of(self, problem: Problem) -> Trace | None:

@@ -187,7 +187,7 @@ class PassingLeg(Leg):
             goal=self.goal.q[g],
             passes=self.passes(s, g),
         )
-        return PreparedProblem.of(problem, self.prepared.models)
+        return self.prepared.beside(problem)
 
 
 def _travel_bounds(

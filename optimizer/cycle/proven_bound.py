@@ -88,7 +88,7 @@ def _bound_of_free_poses(leg: Leg, enough: float, deadline: Deadline) -> float:
     axis.
     """
     problem, start, goal = leg.prepared.freed(), leg.start, leg.goal
-    prepared = PreparedProblem.of(problem, leg.prepared.models)
+    prepared = leg.prepared.beside(problem)
     if start.free_pose is not None and goal.free_pose is not None:
         return bound_between_free_ends(prepared, start.free_pose, goal.free_pose, deadline, enough)
     if goal.free_pose is not None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from joulepath.optimizer.motion.spline import lasting, sampled
-from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.attempts import solve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.refinement import refine
@@ -41,7 +40,7 @@ def start_from_free_duration(state: SearchState, best: Candidate) -> None:
     if duration is None or not _applies(state):
         return
     free = replace(state.problem, duration_min=None, duration_max=None)
-    prepared = PreparedProblem.of(free, state.prepared.models)
+    prepared = state.prepared.beside(free)
     other = SearchState(prepared, state.end, longest=state.longest)
     twin = Candidate(best.start, best.goal, best.q_start, best.q_goal)
     # among other candidates, a candidate is solved coarsely first, as without a duration

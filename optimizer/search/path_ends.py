@@ -114,8 +114,7 @@ def bound_beside(
     """
     start, goal = prepared.problem.start, prepared.problem.goal
     if isinstance(start, ConeOrientedPose) and isinstance(goal, ConeOrientedPose):
-        known = prepared.freed(start=followed[0].q_start)
-        both_free = PreparedProblem.of(known, prepared.models)
+        both_free = prepared.beside(prepared.freed(start=followed[0].q_start))
         return bound_between_free_ends(both_free, start, goal, deadline, enough)
     if isinstance(start, ConeOrientedPose):
         return _bound_to_free(
@@ -127,7 +126,7 @@ def bound_beside(
     problem = prepared.freed()
     if isinstance(goal, ConeOrientedPose):
         return _bound_to_free(problem, followed[0].goal, deadline, enough)
-    free = PreparedProblem.of(problem, prepared.models)
+    free = prepared.beside(problem)
     starts, _ = ends(free, "start")
     candidates = pairs(free, starts, ends(free, "goal")[0])
     bound(free, candidates)

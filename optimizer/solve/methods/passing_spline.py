@@ -23,7 +23,6 @@ from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import SAMPLING, Spline, lasting, sampled
 from joulepath.optimizer.motion.through_samples import spline_through
-from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.guess import Guess
@@ -167,7 +166,7 @@ class PassingSpline(SqpMethod):
         interval = replace(self.interval, t_min=DURATIONS.least, t_max=DURATIONS.longest)
         results = list[SolveResult]()
         for a, b in pairwise(self._configurations):
-            part = PreparedProblem.of(replace(problem, start=a, goal=b), self.prepared.models)
+            part = self.prepared.beside(replace(problem, start=a, goal=b))
             results.append(FreeSpline(SolveContext(part, a, b, self.deadline, interval)).solve())
             if results[-1].spline is None:
                 break
