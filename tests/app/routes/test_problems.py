@@ -222,7 +222,7 @@ def test_internal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise RuntimeError("caller-secret")
 
-    monkeypatch.setattr("joulepath.app.api.ik.route.deadline_of", fail)
+    monkeypatch.setattr("joulepath.app.api.shared.reply.deadline_of", fail)
     pose = {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}
     answer = client.post("/ik", json={"pose": pose})
     refused(answer, InternalError)
