@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
@@ -15,13 +15,12 @@ from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.placement.box_bound import box_bound
 from joulepath.optimizer.placement.checked_places import CheckedPlaces
 from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts
-from joulepath.optimizer.placement.known_places import KnownPlaces
 from joulepath.optimizer.placement.nearby_energy import NearbyEnergy
 from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.refinement import PATTERN, Box, refined
 from joulepath.optimizer.placement.region_bound import region_bound
 from joulepath.optimizer.placement.rounds import Reason, Round, Rounds
-from joulepath.optimizer.placement.space import Place, Space
+from joulepath.optimizer.placement.space import Key, Place, Space
 from joulepath.optimizer.placement.tolerances import tolerances
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell
 
@@ -94,7 +93,7 @@ class PlacementSearch:
         )
         self.checked = CheckedPlaces(self.rounds, self.box, self.spacing)
         self._times = list[float]()
-        self._places = KnownPlaces(self.box.scale)
+        self._memo: dict[Key, Round] = {}
         self._known = KnownMotions()
         self.best: Round | None = None
         self.nominal: Round
@@ -143,30 +142,32 @@ class PlacementSearch:
         """Least energy found [J]; inf without one."""
         return np.inf if self.best is None or self.best.energy is None else self.best.energy
 
-    @property
-    def _most(self) -> float:
-        """Energy up to which a place may become the best one [J]."""
-        return self._least + SEARCH.near_best * abs(self._least)
-
     def _promises(self, found: Round) -> bool:
         """Whether a place may need little more energy than the best one.
 
-        Its bound is scaled by the least ratio of energy to bound among the computed places.
+        The bound is scaled by the least ratio of energy to bound among the computed places.
         """
-        ratios = self._places.ratios
-        return found.bound is None or ratios is None or ratios[0] * found.bound <= self._most
+        most = self._least + SEARCH.near_best * abs(self._least)
+        ratios = [
+            each.energy / each.bound
+            for each in self._memo.values()
+            if each.energy is not None and each.bound is not None and each.bound > 0
+        ]
+        return found.bound is None or not ratios or min(ratios) * found.bound <= most
 
     def _solved(self, place: Place, end: Deadline, compared: bool = False) -> Round:
         """The rounds at a place, known ones or new ones; the best are kept."""
         end_if_stopped()
-        before = self._places.recall(place)
-        if before is not None:
-            return before
-        end = end if compared else self._usual(end)
+        key = place.key
+        if key in self._memo:
+            return self._memo[key]
+        if not compared and self._times:
+            usual = SEARCH.usual_times * float(np.mean(self._times))
+            end = end.within(max(SEARCH.least_time, usual))
         known, began = KnownMotions(), self.clock()
         found = self.rounds.solved(place, end, known, compared)
         if found.is_decided:
-            self._places.keep(found, self.checked.bound_of(place))
+            self._memo[key] = found.summary
         # a place out of reach takes no time, and says nothing of others
         if found.energy is not None:
             self._times.append(self.clock() - began)
@@ -174,29 +175,6 @@ class PlacementSearch:
             self.best, self._known = found, known
             self.tell(Improved(found.energy, self.duration(found), self.lower_bound))
         return found
-
-    def _usual(self, end: Deadline) -> Deadline:
-        """Deadline of the cycles at one place."""
-        if not self._times:
-            return end
-        usual = SEARCH.usual_times * float(np.mean(self._times))
-        return end.within(max(SEARCH.least_time, usual))
-
-    def _solved_nearby(self, known: Round, end: Deadline) -> Round:
-        """Rounds at a place of the map that cannot be the best one, and whose bound is known.
-
-        They go through the configurations at the nearest known place. Where these need more above
-        the bound than elsewhere, or come near the least energy, the place is computed as others.
-        """
-        near, ratios = self._places.nearest(known.place), self._places.ratios
-        cycles = None if near is None else self.rounds.nearby(known.place, near.visited)
-        if cycles is not None and known.bound is not None and ratios is not None:
-            end_if_stopped()
-            found = self.rounds.solved(known.place, self._usual(end), KnownMotions(), cycles=cycles)
-            if found.energy is not None and self._most < found.energy <= ratios[1] * known.bound:
-                # the bound of these cycles holds for their configurations alone
-                return replace(found, bound=known.bound)
-        return self._solved(known.place, end)
 
     def duration(self, found: Round) -> float:
         """Duration of the cycles at a place, times their weights [s]."""
@@ -235,11 +213,7 @@ class PlacementSearch:
             if only_better and not self._promises(self.map[k]):
                 continue
             bound = self.map[k].bound
-            found = (
-                self._solved(self.points[k], end)
-                if only_better
-                else self._solved_nearby(self.map[k], end)
-            )
+            found = self._solved(self.points[k], end)
             self.map[k] = found.summary
             if not found.is_decided:
                 self.map[k] = Round(self.points[k], bound=bound)
@@ -269,9 +243,11 @@ class PlacementSearch:
     def _starts(self) -> Iterator[Round]:
         """Places to refine from: the best one, then others far from all before."""
         taken = list[Place]()
-        for each in self._places.by_energy:
+        found = [each for each in self._memo.values() if each.energy is not None]
+        for each in sorted(found, key=lambda each: each.energy or 0.0):
             assert each.energy is not None
-            if len(taken) >= 2 * SEARCH.starts or each.energy > self._most:
+            most = self._least + SEARCH.near_best * abs(self._least)
+            if len(taken) >= 2 * SEARCH.starts or each.energy > most:
                 return
             if any(self._is_near(each.place, other) for other in taken):
                 continue

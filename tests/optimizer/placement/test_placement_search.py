@@ -59,68 +59,16 @@ class GivenRounds(Rounds):
         return None
 
 
-class NearbyRounds(GivenRounds):
-    """Rounds with nearby cycles everywhere, which need `ratio` times the bound of their place."""
-
-    ratio = RATIO
-    nearby_places: list[Place]
-
-    def __init__(self, space: Space, clock: Clock) -> None:
-        super().__init__(space, clock)
-        self.nearby_places = []
-
-    def solved(
-        self,
-        place: Place,
-        end: Deadline,
-        known: KnownMotions,
-        compared: bool = False,
-        cycles: Sequence[Cycle] | None = None,
-    ) -> Round:
-        if cycles is None:
-            return super().solved(place, end, known, compared)
-        self.nearby_places.append(place)
-        energy = self.ratio * bound_at(place.x)
-        # the bound of cycles through given configurations does not hold for others
-        return Round(place, energy=energy, bound=energy)
-
-    def nearby(self, place: Place, near: Sequence[Visited]) -> list[Cycle] | None:
-        return []
-
-
-class DearNearbyRounds(NearbyRounds):
-    """Nearby cycles need more above the bound than the best cycles of any place."""
-
-    ratio = 1.1 * RATIO
-
-
-def searched(rounds: type[Rounds], monkeypatch: pytest.MonkeyPatch) -> PlacementSearch:
-    """A search on a map of nine places that has ended."""
+def test_a_place_between_those_of_the_map_is_found_by_its_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     region = Region(x=(-0.25, 0.25), y=(-0.25, 0.25))
     placement = Placement(
         cycles=[WeightedCycle(two_stops())], moved=[Moved(region)], resolution=0.25
     )
-    monkeypatch.setattr(placement_search, "Rounds", rounds)
+    monkeypatch.setattr(placement_search, "Rounds", GivenRounds)
     search = PlacementSearch(placement, still, no_listener)
     search.run()
-    return search
-
-
-@pytest.mark.parametrize("rounds", [NearbyRounds, DearNearbyRounds])
-def test_the_map_is_filled_through_nearby_configurations_unless_they_seem_poor(
-    rounds: type[NearbyRounds], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    search = searched(rounds, monkeypatch)
-    assert isinstance(search.rounds, rounds) and search.rounds.nearby_places
-    for each in search.map:
-        bound = bound_at(each.place.x)
-        assert each.energy == pytest.approx(RATIO * bound) and each.bound == bound
-
-
-def test_a_place_between_those_of_the_map_is_found_by_its_bound(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    search = searched(GivenRounds, monkeypatch)
     assert search.best is not None and search.best.energy is not None
     least = min(each.energy for each in search.map if each.energy is not None)
     assert search.best.energy < 0.92 * least
