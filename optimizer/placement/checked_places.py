@@ -58,6 +58,11 @@ class CheckedPlaces:
             self._memo[place.key] = found
         return self._memo[place.key]
 
+    def bound_of(self, place: Place) -> float | None:
+        """The lower bound [J] at a checked place; None without one."""
+        known = self._memo.get(place.key)
+        return None if known is None else known.bound
+
     def least_bounds(self, starts: Sequence[Round], end: Deadline) -> Iterator[Round]:
         """Local minima of the bound, from the start of least bound to that of the greatest.
 
