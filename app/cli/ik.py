@@ -36,7 +36,7 @@ def ik(
     output: Path | None,
     wanted: Literal["json", "csv"],
 ) -> None:
-    """Finds all arm configurations at a pose.
+    """Finds all arm configurations that reach a pose.
 
     FILE is the JSON of `POST /ik`, or - for standard input. The answer is JSON, or a CSV with the
     columns q1, q2, … [rad] and one line per configuration, readable by `joulepath evaluate`. If

@@ -98,8 +98,9 @@ def layers_of(cycle: Cycle, models: ModelsOfArms | None = None) -> dict[str, Lay
         JoulepathError: the errors of `layer_of`.
     """
     models = ModelsOfArms() if models is None else models
-    at_start = cycle.start, cycle.branch, cycle.windings
-    layers = {START: layer_of(cycle, models, START, "start", *at_start)}
+    layers = {
+        START: layer_of(cycle, models, START, "start", cycle.start, cycle.branch, cycle.windings)
+    }
     for k, stop in enumerate(cycle.stops):
         layers |= zip(stop.places, layers_of_stop(cycle, models, k), strict=True)
     return layers
@@ -121,8 +122,9 @@ def layers_of_stop(cycle: Cycle, models: ModelsOfArms, k: int) -> list[Layer]:
     stop = cycle.stops[k]
     # joints may move far along a path, so all full turns count until the path has been followed
     windings = cycle.windings or stop.path is not None
-    asked = stop.entry, f"stops.{k}.target", stop.target, stop.branch, windings
-    at = layer_of(cycle, models, *asked)
+    at = layer_of(
+        cycle, models, stop.entry, f"stops.{k}.target", stop.target, stop.branch, windings
+    )
     layers, kept = {stop.entry: at}, np.ones(len(at.q), dtype=bool)
     for path in _prescribed_paths(stop):
         origin = layers[path.origin]

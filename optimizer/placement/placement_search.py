@@ -94,8 +94,6 @@ class PlacementSearch:
         self.checked = CheckedPlaces(self.rounds, self.box, self.spacing)
         self._times = list[float]()
         self._memo: dict[Key, Round] = {}
-        # energies over the bounds by which their places were checked
-        self._ratios = list[float]()
         self._known = KnownMotions()
         self.best: Round | None = None
         self.nominal: Round
@@ -151,8 +149,13 @@ class PlacementSearch:
         computed places.
         """
         most = self._least + SEARCH.near_best * abs(self._least)
-        ratio = min(self._ratios, default=None)
-        return found.bound is None or ratio is None or ratio * found.bound <= most
+        bounds = [
+            (each.energy, self.checked.bound_of(each.place))
+            for each in self._memo.values()
+            if each.energy is not None
+        ]
+        ratios = [energy / bound for energy, bound in bounds if bound is not None and bound > 0]
+        return found.bound is None or not ratios or min(ratios) * found.bound <= most
 
     def _solved(self, place: Place, end: Deadline, compared: bool = False) -> Round:
         """The rounds at a place, known ones or new ones; the best are kept."""
@@ -170,9 +173,6 @@ class PlacementSearch:
         # a place out of reach takes no time, and says nothing of others
         if found.energy is not None:
             self._times.append(self.clock() - began)
-            bound = self.checked.bound_of(place)
-            if bound is not None and bound > 0:
-                self._ratios.append(found.energy / bound)
         if found.energy is not None and found.energy < self._least:
             self.best, self._known = found, known
             self.tell(Improved(found.energy, self.duration(found), self.lower_bound))

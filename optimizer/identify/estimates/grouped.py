@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,8 +35,8 @@ class RankSettings:
     """Eigenvalue of the normal matrix of columns of unit length, up to which a combination of
     columns counts as zero [1]."""
     least_part: float = 1e-3
-    """Smallest part of a column in such a combination, at which the rows do not determine the
-    column's unknown [1]."""
+    """Coefficient of a column in such a combination of unit length, above which the rows do not
+    determine the unknown of the column [1]."""
 
 
 RANK = RankSettings()
@@ -114,29 +115,29 @@ def solve_bounded(gram: Array, moment: Array, lower: Array, rank: RankSettings =
     return np.asarray(np.maximum(bounded.x / scale, np.where(np.isfinite(scale), lower, -np.inf)))
 
 
+class LeaveOneOut(NamedTuple):
+    """Solutions without one of G groups at a time."""
+
+    estimates: Array
+    """Estimates (G, p)."""
+    undetermined: Mask
+    """Parameters (p,) that the rows without some group do not determine."""
+
+
 def leave_one_out(
     grouped: GroupedEquations, found: Array, free: Mask, prior: Array | None = None
-) -> Array:
-    """Estimates (G, p) without one group at a time; arguments as of `left_out`."""
-    return left_out(grouped, found, free, prior)[0]
-
-
-def left_out(
-    grouped: GroupedEquations, found: Array, free: Mask, prior: Array | None = None
-) -> tuple[Array, Mask]:
-    """Estimates without one group at a time, and whose spread they do not tell.
+) -> LeaveOneOut:
+    """Estimate the parameters without one group at a time.
 
     Args:
         grouped: normal equations of the G groups.
         found: estimate (p,) from all groups.
         free: estimated parameters (p,); all others keep the value of `found`.
         prior: precision (p, p) of a Gaussian prior around the estimate's prior mean.
-
-    Returns:
-        Estimates (G, p), and the parameters (p,) that the rows without some group do not determine.
     """
     total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
-    estimates, unknown = np.tile(found, (len(grouped.gram), 1)), np.zeros(len(found), dtype=bool)
+    estimates = np.tile(found, (len(grouped.gram), 1))
+    undetermined = np.zeros(len(found), dtype=bool)
     at = np.flatnonzero(free)
     # a prior leaves no column zero
     of_free = total[np.ix_(at, at)]
@@ -148,11 +149,11 @@ def left_out(
             values, vectors = np.linalg.eigh(rest)
             zero = values <= RANK.eigenvalue_tolerance * values.max(initial=0.0)
             step = vectors @ (vectors.T @ pull / np.where(zero, np.inf, values))
-            unknown[at] |= np.linalg.norm(vectors[:, zero], axis=1) > RANK.least_part
+            undetermined[at] |= np.linalg.norm(vectors[:, zero], axis=1) > RANK.least_part
         else:
             step = np.linalg.solve(rest, pull)
         estimates[k, at] += step / scale
-    return estimates, unknown
+    return LeaveOneOut(estimates, undetermined)
 
 
 def residual_replicates(grouped: GroupedEquations, found: Array, free: Mask, prior: Array) -> Array:

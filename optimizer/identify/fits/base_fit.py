@@ -142,16 +142,16 @@ class BaseTerms:
         judged = judged & np.array(
             [term != "offset" and not term.startswith(COUPLED) for term, _ in self.names]
         )
+        absurd = impossible(self.names, value)
+        sd = np.where(absurd, np.inf, sd)
         with np.errstate(divide="ignore", invalid="ignore"):
             relative = np.where(value != 0, sd / np.abs(value), np.inf)
         doubted = judged & (relative > DETERMINED.max_relative_sd)
         reasons = [""] * len(value)
-        for k in np.flatnonzero(judged).tolist():
-            if impossible(self.names[k], float(value[k])):
-                doubted[k], relative[k], reasons[k] = True, np.inf, IMPOSSIBLE.format(value[k])
-            elif doubted[k]:
-                reasons[k] = reason_of(float(value[k]), float(sd[k]))
-        remarks = remarks_of(self.names, reasons, lifted, sd, self.own, self.own_sd)
+        for k in np.flatnonzero(doubted).tolist():
+            reason = reason_of(float(value[k]), float(sd[k]))
+            reasons[k] = IMPOSSIBLE.format(value[k]) if absurd[k] else reason
+        remarks = remarks_of(reasons, lifted, sd, self.own, self.own_sd)
         left = np.flatnonzero(doubted & (np.array(remarks) == ""))
         worst = int(left[np.argmax(relative[left])]) if len(left) else None
         return Doubts(tuple(reasons), tuple(remarks), worst)
@@ -244,10 +244,10 @@ def _hold_undetermined(
         inside = (value > lower)[free]
         gradient = gram @ value[free] - moment
         solution = unbounded(part, value[free], inside, ~inside, gradient)
-        lifted, sd, unknown = own.copy(), np.zeros(len(own)), np.zeros(len(own), dtype=bool)
+        lifted, sd, undetermined = own.copy(), np.zeros(len(own)), np.zeros(len(own), dtype=bool)
         lifted[free], sd[free] = solution.value, solution.sd
-        unknown[free] = solution.unknown
-        doubts = terms.doubts(value, lifted, sd, free & (judged | unknown))
+        undetermined[free] = solution.undetermined
+        doubts = terms.doubts(value, lifted, sd, free & (judged | undetermined))
         if doubts.worst is None:
             break
         free[doubts.worst], reasons[doubts.worst] = False, doubts.reasons[doubts.worst]

@@ -72,7 +72,9 @@ def fit_wrench(
     found = Estimate(
         names=tuple((LINK + part, joint) for joint in range(robot.nq) for part in LINKS),
         value=value,
-        replicates=leave_one_out(grouped, value, np.ones(len(own), dtype=bool), precision),
+        replicates=leave_one_out(
+            grouped, value, np.ones(len(own), dtype=bool), precision
+        ).estimates,
         reasons=("",) * len(own),
         prior_covariance=root @ root.T,
     )

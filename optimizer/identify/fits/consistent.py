@@ -32,8 +32,8 @@ class ConsistentSettings:
     """Smallest eigenvalue of a pseudo-inertia, so that no body is without mass or extent
     [kg, kg·m²]."""
     max_step_fraction: float = 0.95
-    """Largest step over that to the boundary of the cone [1]. Longer steps, such as the solver's
-    own 0.99, may end beside the boundary, far from the solution."""
+    """Largest step as a share of the distance to the boundary of the cone [1]. With the solver's
+    default of 0.99, iterates may stall near the boundary, far from the solution."""
 
 
 CONSISTENT = ConsistentSettings()
@@ -80,7 +80,7 @@ def solve_consistent(gram: Array, moment: Array, bodies: int, lower: Array) -> A
     if solution.status not in solved:
         raise InvalidProblem(
             "inertials",
-            f"These logs tell no consistent links, as the solver ended with {solution.status}: "
-            "keep the inertials, or log more motions.",
+            "No links with positive masses and inertias fit these logs: the solver ended with "
+            f"{solution.status}. Keep the inertials, or log more motions.",
         )
     return np.asarray(solution.x) * scale

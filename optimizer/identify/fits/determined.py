@@ -17,7 +17,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
     column_lengths,
     jackknife,
-    left_out,
+    leave_one_out,
 )
 from joulepath.optimizer.identify.fits.block import SCALE
 
@@ -32,10 +32,10 @@ class DeterminedSettings:
     """Largest standard deviation of a figure over that before the logs, at which the logs tell
     something of it [1]: half of the variance."""
     least_scale: float = 0.2
-    """Smallest factor on the rigid torque that is a torque constant's [1]; the own constants are
-    right within some ten per cent."""
+    """Smallest plausible factor on the robot's own torque constants [1], whose errors are some
+    tens of per cent at most."""
     most_load: float = 0.999
-    """Largest load friction [1], with which an arm still moves."""
+    """Largest plausible load friction [1]; a drive with a load friction of 1 does not move."""
     rejecting_sds: float = 4.0
     """Distance of a rejected own value from the estimate, in standard deviations [1]."""
 
@@ -84,13 +84,13 @@ class Unbounded:
     """Values (p,): the own bound of an unknown is lifted, and all other bounds hold."""
     replicates: Array
     """Values (G, p) without one group each, around the bounded values."""
-    unknown: Mask
+    undetermined: Mask
     """Unknowns (p,) that the logs without some group do not determine."""
 
     @property
     def sd(self) -> Array:
-        """Standard deviations (p,), infinite if the spread of the replicates does not tell them."""
-        return np.where(self.unknown, np.inf, np.sqrt(np.diag(jackknife(self.replicates))))
+        """Standard deviations (p,), infinite for undetermined unknowns."""
+        return np.where(self.undetermined, np.inf, np.sqrt(np.diag(jackknife(self.replicates))))
 
 
 def unbounded(
@@ -111,7 +111,7 @@ def unbounded(
         gradient: gradient (p,) of the sum of squares at the solution.
         prior: precision (p, p) of a prior.
     """
-    lifted, (replicates, unknown) = value.copy(), left_out(grouped, value, inside, prior)
+    lifted, (replicates, undetermined) = value.copy(), leave_one_out(grouped, value, inside, prior)
     total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
     for k in np.flatnonzero(bounded):
         free = inside.copy()
@@ -124,16 +124,18 @@ def unbounded(
         moved = value.copy()
         moved[at] += step
         lifted[k] = moved[k]
-        without, not_told = left_out(grouped, moved, free, prior)
-        replicates[:, k], unknown[k] = value[k] + without[:, k] - moved[k], not_told[k]
-    return Unbounded(lifted, replicates, unknown)
+        without = leave_one_out(grouped, moved, free, prior)
+        replicates[:, k] = value[k] + without.estimates[:, k] - moved[k]
+        undetermined[k] = without.undetermined[k]
+    return Unbounded(lifted, replicates, undetermined)
 
 
-def impossible(name: Name, value: float) -> bool:
-    """Whether no drive has such a factor on its torque, or such load friction."""
-    if name[0] == SCALE:
-        return value < DETERMINED.least_scale
-    return name[0] == "load" and value > DETERMINED.most_load
+def impossible(names: Sequence[Name], value: Array) -> Mask:
+    """Terms (p,) whose values (p,) no drive has: too small a factor on its torque, or a load
+    friction under which it does not move."""
+    term = np.array([name[0] for name in names])
+    too_small = (term == SCALE) & (value < DETERMINED.least_scale)
+    return np.asarray(too_small | ((term == "load") & (value > DETERMINED.most_load)))
 
 
 def rejections(value: Array, sd: Array, own: Array) -> Array:
@@ -144,20 +146,14 @@ def rejections(value: Array, sd: Array, own: Array) -> Array:
 
 
 def remarks_of(
-    names: Sequence[Name],
-    reasons: Sequence[str],
-    value: Array,
-    sd: Array,
-    own: Array,
-    own_sd: Array,
+    reasons: Sequence[str], value: Array, sd: Array, own: Array, own_sd: Array
 ) -> list[str]:
     """Why the robot's own values of doubted terms are not kept; empty for all other terms.
 
     Args:
-        names: names (p,) of the terms; an impossible estimate replaces nothing.
         reasons: reasons (p,) for a doubt, or empty.
         value: estimates (p,) without bounds; those beyond a bound, 0, are no source.
-        sd: standard deviations (p,) of the estimates.
+        sd: standard deviations (p,) of the estimates; infinite for estimates that replace nothing.
         own: the robot's own values (p,).
         own_sd: their standard deviations (p,); 0 for values that are kept unless they are rejected.
     """
@@ -165,8 +161,6 @@ def remarks_of(
     better = (value > 0) & (sd <= DETERMINED.max_sd_ratio * own_sd) & (own_sd > 0)
     remarks = [""] * len(reasons)
     for k, reason in enumerate(reasons):
-        if impossible(names[k], float(value[k])):
-            continue
         if reason and rejected[k]:
             remarks[k] = REJECTED.format(reason, own[k], rejected[k])
         elif reason and better[k]:

@@ -167,7 +167,7 @@ def fit_payload(
                     right, error, np.ones_like(error), Clusters(of_row, clusters.count)
                 )
         body = value[links : links + PARAMETERS_PER_BODY]
-    replicates = leave_one_out(grouped, value, np.ones(len(value), dtype=bool), prior)
+    replicates = leave_one_out(grouped, value, np.ones(len(value), dtype=bool), prior).estimates
     inverse = np.linalg.inv(gram)
     first = slice(links, links + MOMENTS)
     spread = jackknife(replicates[:, first]) + (inverse @ prior @ inverse)[first, first]

@@ -224,7 +224,7 @@ def fit_power(
     replicates = residual_replicates(grouped, value, free, prior.precision)
     return PowerFit(
         value=value,
-        without_cluster=leave_one_out(grouped, value, free, prior.precision),
+        without_cluster=leave_one_out(grouped, value, free, prior.precision).estimates,
         row_replicates=replicates,
         prior_covariance=posterior @ prior.precision @ posterior,
         covariance_increase=_covariance_increase(

@@ -121,5 +121,5 @@ def _fit_rate(
         found = found + step
         if np.abs(step).max() < TEMPERATURE.step_tolerance:
             break
-    spread = jackknife(leave_one_out(grouped, step, np.ones(2, dtype=bool)))
+    spread = jackknife(leave_one_out(grouped, step, np.ones(2, dtype=bool)).estimates)
     return float(found[1]), float(np.sqrt(spread[1, 1]))

@@ -252,14 +252,14 @@ def doubts_of(
     """Doubts about the fitted terms of a block; none about held terms, and about terms that are no
     figures.
     """
-    found = dict[Name, Doubt]()
+    found, absurd = dict[Name, Doubt](), impossible(block.names, value)
     for k, name in enumerate(block.names):
         term, inside = name[0], value[k] > block.lower[k] and value[k] != 0
         relative = float(sd[k] / abs(value[k])) if inside else np.inf
         size = relative / (TORQUE_FIT.max_scale_sd if term == SCALE else DETERMINED.max_relative_sd)
         if name in held or term in block.nuisances:
             found[name] = Doubt("", 0.0)
-        elif impossible(name, float(value[k])):
+        elif absurd[k]:
             found[name] = Doubt(IMPOSSIBLE.format(value[k]), np.inf)
         elif term == "load" and not value[k] >= TORQUE_FIT.min_load_sds * sd[k] > 0:
             found[name] = Doubt(LITTLE_LOAD.format(TORQUE_FIT.min_load_sds), np.inf)
@@ -286,7 +286,8 @@ def remarks_on(
         np.array([known[name] for name in block.names]) for known in (block.own, block.own_sd)
     )
     reasons = [doubts[name].reason for name in block.names]
-    found = remarks_of(block.names, reasons, value, sd, own, own_sd)
+    sd = np.where(impossible(block.names, value), np.inf, sd)
+    found = remarks_of(reasons, value, sd, own, own_sd)
     return dict(zip(block.names, found, strict=True))
 
 

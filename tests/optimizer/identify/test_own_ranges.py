@@ -59,14 +59,11 @@ def test_an_own_value_is_kept_unless_it_is_rejected_or_the_logs_know_it_better()
     own_sd = np.array([1.5, 1.2, 0.4, 1.5, 0.0])
     value = np.array([1.0, 1.0, -2.1, -0.5, 1.0])
     assert DETERMINED.max_sd_ratio == 0.7 and DETERMINED.rejecting_sds == 4.0
-    names = [("coulomb", joint) for joint in range(5)]
-    better, as_poor, rejected, beyond, unknown = remarks_of(
-        names, [reason] * 5, value, sd, own, own_sd
-    )
+    better, as_poor, rejected, beyond, unknown = remarks_of([reason] * 5, value, sd, own, own_sd)
     assert better.startswith(reason) and "known even less" in better
     assert rejected.startswith(reason) and "standard deviations away" in rejected
     assert (as_poor, beyond, unknown) == ("", "", "")
-    assert remarks_of(names, [""] * 5, value, sd, own, own_sd) == [""] * 5
+    assert remarks_of([""] * 5, value, sd, own, own_sd) == [""] * 5
 
 
 def test_engineering_defaults_are_known_less_well_than_figures_with_a_source() -> None:

@@ -50,7 +50,7 @@ def _estimates(seed: int) -> tuple[Array, Array, Array]:
     return (
         found - true,
         jackknife(residual_replicates(grouped, found, free, prior)) + by_prior,
-        jackknife(leave_one_out(grouped, found, free, prior)) + by_prior,
+        jackknife(leave_one_out(grouped, found, free, prior).estimates) + by_prior,
     )
 
 
