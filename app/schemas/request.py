@@ -138,7 +138,7 @@ class Branch(Request):
 
 
 class Holding(Request):
-    """Holding of the arm during a wait: by the motors or by the brakes."""
+    """How the arm is held during a wait: by the motors or by the brakes."""
 
     hold: Literal["motors", "brakes"] = described(
         "`motors`: the motors hold the arm during the wait. `brakes`: the motors hold it for "
@@ -165,7 +165,7 @@ class Holding(Request):
 
 
 class Dwell(Holding):
-    """The wait at the goal: its end, and the holding of the arm until then."""
+    """The wait at the goal: when it ends, and whether motors or brakes hold the arm."""
 
     time: Seconds = described(
         "Time from the start of the motion until the arm is needed again. The motion takes no "

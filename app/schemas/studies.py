@@ -72,7 +72,7 @@ class StudyPage(Query):
 
 
 class OptimizeStep(Request):
-    """An iteration by optimisation of a motion."""
+    """An iteration that optimises a motion."""
 
     optimize: OptimizeRequest = described(
         "A body of `POST /optimize`. The defaults of `robot`, `figures` and `objective` are the "
@@ -83,7 +83,7 @@ class OptimizeStep(Request):
 
 
 class EvaluateStep(Request):
-    """An iteration by evaluation of a given motion."""
+    """An iteration that evaluates a given motion."""
 
     evaluate: EvaluateRequest = described(
         "A body of `POST /evaluate`. The defaults of `robot` and `figures` are the values of the "

@@ -54,7 +54,7 @@ class PlacementAnswer(SolvedPlacement, Answer):
     """The placement of least energy: best place, nominal place and the map of the region."""
 
     best: PlacedCycles
-    """The found place of least energy; its energy never exceeds the one at the nominal place."""
+    """The best place found. It never needs more energy than the nominal place."""
     nominal: PlacedCycles | None
     """The nominal place; null if its cycles are infeasible."""
     warnings: list[str]
