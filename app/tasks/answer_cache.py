@@ -60,13 +60,18 @@ class AnswerCache:
         `compute` has `deadline` [s], and its errors are raised. `is_heard`: a client listens to its
         events.
         """
-        known = await self.find(asked, request_id)
-        if known is not None:
-            return known
         if asked is None or self.by_passed or is_heard:
-            return await compute(deadline)
-        result, is_anothers = await self.in_flight.result(asked, compute)
-        return replace(result, age=0).for_request(request_id) if is_anothers else result
+            known = await self.find(asked, request_id)
+            return await compute(deadline) if known is None else known
+
+        async def find_or_compute(left: float) -> TaskResult:
+            return await self._find(asked) or await compute(left)
+
+        # an equal request that ends between a look at the store and the computation is not missed
+        result, is_anothers = await self.in_flight.result(asked, find_or_compute)
+        if result.age is None and not is_anothers:
+            return result
+        return replace(result, age=result.age or 0).for_request(request_id)
 
     async def motions(self, cell: str | None) -> dict[str, bytes]:
         """Known motions of a cell by their keys; none for an unknown cell.

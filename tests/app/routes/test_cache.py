@@ -23,8 +23,10 @@ from joulepath.app.store.cache import Asked
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
 from joulepath.app.store.tables import CachedAnswer
+from joulepath.app.tasks import answer_cache
 from joulepath.app.tasks.answer_cache import AnswerCache
 from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.in_flight import InFlight
 from joulepath.app.tasks.read_body import HeldBody
 from tests.app.job_clients import ended
 from tests.app.requests import HOME, NEAR, move
@@ -244,7 +246,11 @@ def test_studies_have_what_was_answered_and_answer_what_comes(recorded: TestClie
     assert is_hit(again) and without_paths(again.json()) == without_paths(fresh), "the last one"
 
 
-def test_equal_requests_at_the_same_time_are_computed_once(recorded: TestClient) -> None:
+def test_equal_requests_at_the_same_time_are_computed_once(
+    recorded: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # a busy machine may read the store slowly
+    monkeypatch.setattr(answer_cache, "PATIENCE", 60.0)
     body = move(payload=load(0.13))
     with ThreadPoolExecutor(4) as pool:
         answers = list(pool.map(lambda _: sent(recorded, body, **KNOWN), range(4)))
@@ -252,3 +258,34 @@ def test_equal_requests_at_the_same_time_are_computed_once(recorded: TestClient)
     assert len({answer.json()["request"] for answer in answers}) == 4
     assert len({answer.json()["id"] for answer in answers}) == 1
     assert len({orjson.dumps(without_paths(answer.json())) for answer in answers}) == 1
+
+
+async def test_an_equal_request_that_ends_after_a_look_at_the_store_is_not_missed(
+    store: Store,
+) -> None:
+    asked, computed, in_flight = Asked("key", 1.0), list[float](), InFlight()
+    looked, goes_on = asyncio.Event(), asyncio.Event()
+
+    class Late(AnswerCache):
+        """Goes on from its look at the store, which finds nothing, only when it is told to."""
+
+        async def _find(self, asked: Asked | None) -> TaskResult | None:
+            known = await super()._find(asked)
+            looked.set()
+            await goes_on.wait()
+            return known
+
+    async def compute(left: float) -> TaskResult:
+        computed.append(left)
+        return await keep_answer(store, Settings(), "optimize", result(1, "optimal"), None, asked)
+
+    late, other = (kind(store, None, False, in_flight) for kind in (Late, AnswerCache))
+    begun = asyncio.create_task(late.answer(asked, "late", 1.0, compute, False))
+    await looked.wait()
+    equal = asyncio.create_task(other.answer(asked, "other", 1.0, compute, False))
+    # it either ends, or waits for the first
+    await asyncio.wait({equal}, timeout=0.5)
+    goes_on.set()
+    found = [await begun, await equal]
+    assert len(computed) == 1
+    assert found[0].kept_as == found[1].kept_as
