@@ -4,9 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from joulepath.optimizer.exceptions import NoTrajectory
+from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
+from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
+from joulepath.optimizer.search.state import SearchState
+
+
+def no_motion(state: SearchState) -> NoTrajectory | DeadlineExceeded:
+    """The error of a search that ended without a motion: the deadline, if it ended the search.
+
+    A collision is reported after the deadline, too: it names what to move.
+    """
+    is_open = any(each.status is CandidateStatus.UNVISITED for each in state.candidates)
+    collides = any(each.attempt and each.attempt.collision for each in state.candidates)
+    if is_open or (state.deadline.passed and not collides):
+        return state.too_late()
+    return no_trajectory(state.candidates)
 
 
 def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:

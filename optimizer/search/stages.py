@@ -10,7 +10,6 @@ from joulepath.optimizer.deadline import DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import free_goal, self_motions
 from joulepath.optimizer.search.answer import answer
@@ -22,7 +21,7 @@ from joulepath.optimizer.search.exploration import explore
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from joulepath.optimizer.search.free_members import bounded
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
-from joulepath.optimizer.search.no_trajectory import no_trajectory
+from joulepath.optimizer.search.no_trajectory import no_motion
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.path_ends import path_candidates
@@ -209,9 +208,7 @@ def search(state: SearchState) -> Solution:
         stage(state)
     if state.answer is not None:
         return state.answer
-    if any(candidate.status is CandidateStatus.UNVISITED for candidate in state.candidates):
-        raise state.too_late()
-    raise no_trajectory(state.candidates)
+    raise no_motion(state)
 
 
 def solve_related(state: SearchState, problem: Problem, share: float = 1.0) -> FoundMotion | None:

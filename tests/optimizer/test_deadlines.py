@@ -34,11 +34,14 @@ from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Mesh, Obstacle, Scene
+from joulepath.optimizer.result.candidates import CandidateStatus
+from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.finishing_time import finishing_time
 from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
+from tests.optimizer.search.runs import prepared
 from tests.selection import long_but
 
 # time of the work of a call on one core [s]
@@ -282,3 +285,15 @@ def test_a_computation_that_is_stopped_ends_at_its_next_look() -> None:
 def test_no_handler_of_errors_catches_a_stop() -> None:
     with stoppable(lambda: True), pytest.raises(Stopped), suppress(Exception):
         checkpoint()
+
+
+def test_a_deadline_that_ends_the_search_for_the_fastest_motion_is_named() -> None:
+    """The only candidate failed before: a longer deadline helps, and no other limit does."""
+    clock = WorkClock()
+    run = prepared(problem(duration_max=100.0, deadline=10.0), clock=clock)
+    (candidate,) = run.state.candidates
+    candidate.settle(CandidateStatus.FAILED, Reason.METHOD)
+    clock.now = 11.0
+    with pytest.raises(DeadlineExceeded) as caught:
+        run.search()
+    assert caught.value.candidate_counts["failed"] == 1
