@@ -10,6 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.presentation import bounds_in_words
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.arrays import frozen, per_joint
 from joulepath.optimizer.problem.uncoupled import check_uncoupled
@@ -91,9 +92,9 @@ class ExcitationProblem:
             if not least <= getattr(self, name) <= most:
                 raise InvalidProblem(name, f"{name} must lie between {least:g} and {most:g}.")
         if self.period > self.sample_period * MOTION_LIMITS.max_samples:
-            least = self.period / MOTION_LIMITS.max_samples
+            least = bounds_in_words.least(self.period / MOTION_LIMITS.max_samples)
             raise InvalidProblem(
-                "sample_period", f"sample_period must be at least {least:.2g} s for this period."
+                "sample_period", f"sample_period must be at least {least} s for this period."
             )
         if not self.parts or not set(self.parts) <= set(get_args(Part)):
             raise InvalidProblem(

@@ -12,6 +12,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
+from joulepath.optimizer.presentation import bounds_in_words
 from joulepath.optimizer.problem.arrays import frozen, per_joint, rigid_transform
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.names import first_taken
@@ -302,7 +303,7 @@ class Arm:
                     f"limits.{public}",
                     f"limits.{public} may only tighten the robot's: "
                     f"{self.robot.joint_names[joint]} "
-                    f"allows at most {most[joint]:.6g}.",
+                    f"allows at most {bounds_in_words.most(most[joint])}.",
                 )
         if limits.q_min.shape != robot.q_min.shape or limits.q_max.shape != robot.q_max.shape:
             raise InvalidProblem(

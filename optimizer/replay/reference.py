@@ -11,6 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.motion.spline import Spline, sample
+from joulepath.optimizer.presentation import bounds_in_words
 
 Course = Callable[[Array], tuple[Array, Array, Array]]
 """A motion as a function of time: q [rad], v [rad/s], a [rad/s²], (k, nq) each, at times (k,)
@@ -62,7 +63,7 @@ def reference(course: Course, duration: float, step: float) -> Reference:
         raise InvalidProblem(
             "step",
             f"The motion takes {count} steps, of at most {TIME_GRID.max_steps}: give a step of at "
-            f"least {duration / TIME_GRID.max_steps:.3g} s.",
+            f"least {bounds_in_words.least(duration / TIME_GRID.max_steps)} s.",
         )
     t = np.linspace(0.0, duration, count + 1)
     q, v, a = course(t)

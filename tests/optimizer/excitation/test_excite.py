@@ -4,12 +4,14 @@ deviations are right.
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, OutsideLimits
 from joulepath.optimizer.excitation import excite as module
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
@@ -37,6 +39,13 @@ def found() -> Excitation:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "EXCITATION", module.ExcitationSettings(max_evaluations=80))
         return excite(ExcitationProblem(arm=ARM, starts=1, deadline=np.inf))
+
+
+def test_the_least_sample_period_that_a_refusal_names_is_accepted() -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        ExcitationProblem(arm=ARM, period=50.1, sample_period=1e-4)
+    named = float(re.findall(r"[0-9.]+(?= s )", str(refusal.value))[-1])
+    ExcitationProblem(arm=ARM, period=50.1, sample_period=named)
 
 
 def test_the_series_is_at_rest_at_its_ends_and_the_spline_is_the_series(found: Excitation) -> None:

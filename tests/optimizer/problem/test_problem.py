@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.prepared_problem import PreparedProblem
@@ -149,6 +150,17 @@ def test_limits_may_be_the_robots_own_and_the_ends_on_them() -> None:
     at_limit = np.where(np.arange(6) % 2 == 0, ROBOT.limits.q_max, ROBOT.limits.q_min)
     task = problem(goal=at_limit, limits=limits(v_max=ROBOT.limits.v_max * (1 + 1e-10)))
     assert (np.asarray(task.goal) == at_limit).all()
+
+
+def test_a_limit_that_a_refusal_names_is_accepted() -> None:
+    """Two thirds of pi rad/s are 2.09440 when rounded, which is above the limit."""
+    robot = load_robot("ur10e")
+    wide = replace(robot.limits, v_max=np.full(6, 3.0))
+    with pytest.raises(InvalidProblem) as refusal:
+        Arm(robot=robot, limits=wide)
+    named = float(str(refusal.value).rstrip(".").split()[-1])
+    assert named == pytest.approx(robot.limits.v_max.min(), rel=1e-5)
+    Arm(robot=robot, limits=replace(wide, v_max=np.full(6, named)))
 
 
 def test_positions_at_a_printed_limit_are_at_the_limit() -> None:

@@ -5,6 +5,7 @@ savings, memory.
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,7 +18,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
@@ -26,7 +27,7 @@ from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
-from joulepath.optimizer.replay.reference import TIME_GRID, course_of
+from joulepath.optimizer.replay.reference import TIME_GRID, course_of, reference
 from joulepath.optimizer.replay.replay import replay
 from joulepath.optimizer.replay.replay_result import Replay
 from joulepath.optimizer.result.solution import Solution
@@ -269,6 +270,13 @@ def test_friction_that_grows_with_the_load() -> None:
 def test_a_motion_of_too_many_steps_is_refused() -> None:
     with refusal_of("step", match=f"of at most {TIME_GRID.max_steps}"):
         replay(quintic(ARM, duration=300.0), step=1e-5)
+
+
+def test_the_least_step_that_a_refusal_names_is_accepted() -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        reference(lambda t: (t, t, t), duration=300.001, step=1e-5)
+    named = float(re.findall(r"[0-9.]+(?= s)", str(refusal.value))[-1])
+    reference(lambda t: (t, t, t), duration=300.001, step=named)
 
 
 def test_the_deadline_ends_a_replay() -> None:
