@@ -100,15 +100,17 @@ class UnsupportedMediaType(ServiceError):
     status = 415
     title = "Unsupported media type"
     remedy = (
-        "JSON is `application/json`; the CSV of `POST /evaluate` and `POST /logs` is `text/csv`. "
+        "JSON is `application/json`; the CSV of `POST /evaluate` and `POST /logs` is `text/csv`, "
+        "and a bag of ROS 2 for `POST /logs` is `application/octet-stream`. "
         "`text/plain`, a form, and no header at all are read as JSON, too, where a path takes "
         "JSON. The body is the document itself: `curl --data-binary @file`, not `curl -F "
         "file=@file`."
     )
     detail = (
         "The header Content-Type declares something else than this path takes: send JSON as "
-        "application/json, and to POST /evaluate also CSV as text/csv, to POST /logs CSV only. The "
-        "body is the document itself, not a form with a file."
+        "application/json, and to POST /evaluate also CSV as text/csv; to POST /logs CSV as "
+        "text/csv, or a bag of ROS 2 as application/octet-stream. The body is the document itself, "
+        "not a form with a file."
     )
 
 

@@ -80,8 +80,8 @@ async def add(
     client: ServiceClient,
 ) -> LogDetail:
     """Adds a log of one arm for the identification of its friction, rotors and powers: a CSV file,
-    plain or compressed with gzip. The columns follow RTDE, ROS `JointState`, this service, or the
-    names in `columns`."""
+    plain or compressed with gzip, or a bag of ROS 2. The columns of a CSV file follow
+    RTDE, ROS `JointState`, this service, or the names in `columns`."""
     declared = media_type(request.headers)
     if declared not in _TAKEN:
         raise UnsupportedMediaType

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from starlette.testclient import TestClient
 
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import UnsupportedMediaType
+from joulepath.app.http.validation_messages import told
 from joulepath.app.schemas import names
 from tests.app.problems import checked
 from tests.app.requests import HOME, move
@@ -171,6 +173,43 @@ def test_what_is_declared_as_something_else_is_told_so(
         )
         assert answer.status_code == 415
         checked(UnsupportedMediaType, answer.content)
+
+
+def test_a_bag_may_be_sent_as_the_refusal_of_another_type_says(client: TestClient) -> None:
+    """A bag of ROS 2 is no CSV, and its own type is refused: the type that is named is taken."""
+    refusal = client.post(
+        "/logs", content=b"\x89MCAP", headers={"content-type": "application/mcap"}
+    )
+    named = "application/octet-stream"
+    assert refusal.status_code == 415 and named in refusal.json()["detail"]
+    read = client.post("/logs", content=b"\x89MCAP", headers={"content-type": named})
+    assert read.status_code != 415, read.text
+
+
+def test_every_pattern_of_a_text_is_told_in_words(client: TestClient) -> None:
+    patterns = {
+        each["pattern"] for each in objects(client.get("/openapi.json").json()) if "pattern" in each
+    }
+    assert len(patterns) > 1
+    for pattern in patterns:
+        error = {
+            "type": "string_pattern_mismatch",
+            "msg": "",
+            "loc": (),
+            "ctx": {"pattern": pattern},
+        }
+        (entry,) = told(error, ("body",))
+        assert entry["msg"], pattern
+
+
+def objects(document: Any) -> Iterator[dict[str, Any]]:
+    """All objects of a JSON document."""
+    if isinstance(document, dict):
+        yield document
+        document = list(document.values())
+    if isinstance(document, list):
+        for each in document:
+            yield from objects(each)
 
 
 def test_names_only_the_first_of_many_errors(client: TestClient) -> None:
