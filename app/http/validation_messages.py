@@ -12,14 +12,16 @@ from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from joulepath.app.api.export.request import CONTROLLER, PREFIX, SIGNAL
 from joulepath.app.api.robots.request import NAME_PATTERN
 from joulepath.app.convert.json_text import EMPTY, PLAIN_NAME
 from joulepath.app.exceptions.base import FieldError
-from joulepath.app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD
+from joulepath.app.schemas.common import ID_PATTERN, KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD
 from joulepath.app.schemas.common import Request as RequestModel
 from joulepath.app.schemas.names import nearest
 from joulepath.app.schemas.queries import PAGE_PATTERN
 from joulepath.app.schemas.shapes import BASE64
+from joulepath.app.schemas.studies import KEY_PATTERN
 
 _OBJECT = "Give a JSON object: names and values in braces"
 _MESSAGES = {
@@ -42,6 +44,11 @@ _PATTERNS = {
     NO_CONTROLS: "Leave out line breaks, tabs and other control characters",
     NAME_PATTERN.pattern: "Use small letters, digits, `-` and `_`; begin with a letter or a digit",
     PAGE_PATTERN: "Give the value of `next` of the previous page",
+    ID_PATTERN: "Give an id as the service gave it: 36 small letters, digits and `-`",
+    KEY_PATTERN: "Use letters, digits and signs of ASCII, without blanks",
+    PREFIX: "Use letters, digits, `_`, `/`, `.` and `-`",
+    CONTROLLER: "Give names of letters, digits and `_`, separated by `/`; none begins with a digit",
+    SIGNAL: "Use up to 32 letters, digits and `_`; begin with a letter",
 }
 
 

@@ -329,7 +329,8 @@ BasePose = Annotated[
 
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])
 
-FiguresId = Annotated[str, Field(pattern=r"^[0-9a-f-]{36}$")]
+ID_PATTERN = r"^[0-9a-f-]{36}$"
+FiguresId = Annotated[str, Field(pattern=ID_PATTERN)]
 RobotName = Annotated[str, Field(min_length=1, max_length=LENGTHS.robot)]
 
 

@@ -25,7 +25,8 @@ from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.result.energy import Objective
 
-IdempotencyKey = Annotated[str, Field(min_length=1, max_length=LENGTHS.key, pattern=r"^[!-~]+$")]
+KEY_PATTERN = r"^[!-~]+$"
+IdempotencyKey = Annotated[str, Field(min_length=1, max_length=LENGTHS.key, pattern=KEY_PATTERN)]
 
 
 class StudyRequest(Request):

@@ -15,6 +15,8 @@ from joulepath.optimizer.export.ros_messages import Encoding
 
 Period = Annotated[float, Field(ge=1e-4, le=1.0)]
 PREFIX = r"^[A-Za-z0-9_/.-]*$"
+CONTROLLER = r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$"
+SIGNAL = r"^[A-Za-z][A-Za-z0-9_]{0,31}$"
 ENCODING = "`yaml` or `json`. Null: `json` if the header `Accept` asks for it, else `yaml`."
 
 
@@ -106,7 +108,7 @@ class Ros2Options(MoveitOptions):
         default="joint_trajectory_controller",
         min_length=1,
         max_length=128,
-        pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$",
+        pattern=CONTROLLER,
     )
 
 
@@ -163,7 +165,7 @@ class RapidOptions(PointsOptions):
         None,
         "doGripper",
         default=None,
-        pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$",
+        pattern=SIGNAL,
     )
 
 
