@@ -58,11 +58,16 @@ def media_type(headers: Headers) -> str:
 
 
 class JsonRoute(APIRoute):
-    """The class of routes with JSON bodies: `APIRouter(route_class=JsonRoute)`."""
+    """The class of routes with JSON bodies: `APIRouter(route_class=JsonRoute)`.
+
+    A route without one, such as that of an upload, gets its request as it arrives.
+    """
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """FastAPI's handler for a strict request."""
         handler = super().get_route_handler()
+        if self.body_field is None:
+            return handler
 
         async def strict(request: Request) -> Response:
             # Only a request with an unread body may be replaced.

@@ -23,12 +23,13 @@ from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import AnswerInUse, StoreUnavailable, UnknownAnswer
 from joulepath.app.http.handlers import result_response
+from joulepath.app.http.json_route import JsonRoute
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import ANSWER_ID
 from joulepath.app.store import answers
 from joulepath.app.store.tables import Answer
 
-router = APIRouter(prefix="/answers", tags=["results"])
+router = APIRouter(prefix="/answers", tags=["results"], route_class=JsonRoute)
 
 AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_ID])]
 

@@ -35,6 +35,7 @@ from joulepath.app.exceptions.stored import (
     UnknownLog,
 )
 from joulepath.app.http.handlers import result_response
+from joulepath.app.http.json_route import JsonRoute
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import IDENTIFICATION_ID
 from joulepath.app.schemas.naming import NewName
@@ -45,7 +46,7 @@ from joulepath.app.store.tables import Figures, Job, JobRequest
 from joulepath.app.tasks.job_body import job_of_one
 from joulepath.app.tasks.job_request import IDENTIFY, RESIDUALS
 
-router = APIRouter(prefix="/identifications", tags=["logs"])
+router = APIRouter(prefix="/identifications", tags=["logs"], route_class=JsonRoute)
 
 IdentificationId = Annotated[
     str, Path(description="The identification's id.", examples=[IDENTIFICATION_ID])

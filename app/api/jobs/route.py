@@ -36,7 +36,7 @@ from joulepath.app.exceptions.stored import (
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout, UnsupportedMediaType
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
-from joulepath.app.http.json_route import UNDECLARED, media_type
+from joulepath.app.http.json_route import UNDECLARED, JsonRoute, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON
 from joulepath.app.jobs.answers import as_csv, as_lines, detail, summary
@@ -50,7 +50,7 @@ from joulepath.app.tasks.job_body import JobBodyTask, Validated
 from joulepath.app.tasks.job_request import IDENTIFY
 from joulepath.optimizer.exceptions import DeadlineExceeded
 
-router = APIRouter(prefix="/jobs", tags=["jobs"])
+router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=JsonRoute)
 
 JobId = Annotated[str, Path(description="The job's id.", examples=[JOB_ID])]
 LastEventId = Annotated[

@@ -27,7 +27,7 @@ from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import StoreUnavailable, TooManyLogs, UnknownLog
 from joulepath.app.exceptions.transport import UnsupportedMediaType
-from joulepath.app.http.json_route import UNDECLARED, media_type
+from joulepath.app.http.json_route import UNDECLARED, JsonRoute, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import LOG_ID
 from joulepath.app.schemas.naming import NewName
@@ -36,7 +36,7 @@ from joulepath.app.store.tables import StoredLog, new_id, now
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 
-router = APIRouter(prefix="/logs", tags=["logs"])
+router = APIRouter(prefix="/logs", tags=["logs"], route_class=JsonRoute)
 
 LogId = Annotated[str, Path(description="The log's id.", examples=[LOG_ID])]
 _TAKEN = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -173,6 +174,26 @@ def test_what_is_declared_as_something_else_is_told_so(
         )
         assert answer.status_code == 415
         checked(UnsupportedMediaType, answer.content)
+
+
+@pytest.mark.parametrize("content_type", [None, "application/x-www-form-urlencoded", "text/plain"])
+def test_every_json_body_is_read_strictly_as_common_clients_declare_it(
+    client: TestClient, content_type: str | None
+) -> None:
+    """No type, that of `curl -d`, and plain text are JSON on every path; a name occurs once."""
+    headers = {} if content_type is None else {"content-type": content_type}
+    paths = client.get("/openapi.json").json()["paths"]
+    taking_json = [
+        (method, re.sub(r"{\w+}", "any", path))
+        for path, operations in paths.items()
+        for method, operation in operations.items()
+        if "application/json" in operation.get("requestBody", {"content": {}})["content"]
+    ]
+    assert ("patch", "/answers/any") in taking_json
+    for method, path in taking_json:
+        answer = client.request(method, path, content=b'{"name": 1, "name": 2}', headers=headers)
+        assert answer.status_code == 422, (method, path, answer.text)
+        assert "given twice" in answer.json()["errors"][0]["msg"], (method, path, answer.text)
 
 
 def test_a_bag_may_be_sent_as_the_refusal_of_another_type_says(client: TestClient) -> None:
