@@ -92,9 +92,9 @@ class ExcitationProblem:
             if not least <= getattr(self, name) <= most:
                 raise InvalidProblem(name, f"{name} must lie between {least:g} and {most:g}.")
         if self.period > self.sample_period * MOTION_LIMITS.max_samples:
-            least = bounds_in_words.least(self.period / MOTION_LIMITS.max_samples)
+            enough = bounds_in_words.least(self.period / MOTION_LIMITS.max_samples)
             raise InvalidProblem(
-                "sample_period", f"sample_period must be at least {least} s for this period."
+                "sample_period", f"sample_period must be at least {enough} s for this period."
             )
         if not self.parts or not set(self.parts) <= set(get_args(Part)):
             raise InvalidProblem(
