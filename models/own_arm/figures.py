@@ -238,17 +238,18 @@ def _checked_limits(description: Description, chain: Chain) -> dict[str, Any]:
         ("torque", description.torque, chain.tau_max, "effort"),
     ):
         missing = [
-            joint
+            (joint, value)
             for joint, value in zip(chain.joints, of_urdf, strict=True)
-            if given is None and not value > 0
+            if given is None and not 0 < value <= PLAUSIBLE.most
         ]
-        for joint in missing:
+        for joint, value in missing:
+            has = (
+                f"a limit `{part}` of {value:g} in the URDF, above {PLAUSIBLE.most:g}"
+                if value > 0
+                else f"no limit `{part}` above 0 in the URDF"
+            )
             with problems.noted():
-                refuse(
-                    field,
-                    f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or "
-                    f"give `{field}`.",
-                )
+                refuse(field, f"Joint {joint!r} has {has}: correct it, or give `{field}`.")
         with problems.noted():
             values = tuple(of_urdf) if given is None else given
             found[field] = None if missing else per_joint(field, values, chain.joints)

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.coupling import Coupling
-from joulepath.models.own_arm.description import PLAUSIBLE, Description, Problems
+from joulepath.models.own_arm.description import Description, Problems
 from joulepath.models.own_arm.estimated_masses import Estimate, add_inertials
 from joulepath.models.own_arm.followers import (
     coupled_ranges,
@@ -20,18 +20,24 @@ from joulepath.models.own_arm.followers import (
     left_behind,
     with_followers,
 )
+from joulepath.models.own_arm.joint_checks import (
+    check_held,
+    check_place,
+    check_range,
+    check_rest,
+    check_turning,
+)
 from joulepath.models.own_arm.joint_facts import JointFacts
 from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import (
     CHAIN,
-    TURNING,
+    FIXED,
     UrdfTree,
     is_coarse,
     joint_axis,
     joint_end,
     joint_limit,
-    joint_range,
     listed,
     name_of,
     parsed_urdf,
@@ -43,7 +49,6 @@ from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 ROS_BASE = "base_link"
-FIXED = "fixed"
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
                 )
     for name in given:
         with problems.noted():
-            _check_held(tree, name)
+            check_held(tree, name)
     problems.raise_any()
     path = tree.path(base, description.tip)
     others = _others(tree, path) if isinstance(locked, str) else given
@@ -123,14 +128,15 @@ def chain_of(description: Description, checkpoint: Checkpoint = unwatched) -> Ch
         )
     for joint in tree.joints.values():
         with problems.noted():
-            _check_place(joint)
+            check_place(joint)
     for joint in moving:
         with problems.noted():
-            _check_moving(joint)
+            check_turning(joint, moving, locked == "others")
+            check_range(joint)
     with problems.noted():
         coupling = coupling_of_joints(moving)
     with problems.noted():
-        _check_rest(tree, moving, held)
+        check_rest(tree, moving, held)
     names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
     carried = [element for element in root.findall("link") if tree.carrier(name_of(element), names)]
     for element in carried:
@@ -167,84 +173,6 @@ def _others(tree: UrdfTree, path: list[Element]) -> dict[str, float]:
         lower, upper = (joint_limit(joint, each) for each in ("lower", "upper"))
         held[name] = min(max(0.0, lower), upper) if bounded and lower < upper else 0.0
     return held
-
-
-def _check_held(tree: UrdfTree, name: str) -> None:
-    """Raises InvalidArm unless a joint exists that has one position."""
-    if name not in tree.joints:
-        refuse(
-            "locked",
-            f"There is no joint {name!r} in the URDF: its joints are {listed(tree.joints)}.",
-        )
-    kind = tree.joints[name].get("type")
-    if kind in ("floating", "planar"):
-        refuse(
-            "locked",
-            f"Joint {name!r} is {kind}: no single position holds it. Make it fixed instead.",
-        )
-
-
-def _check_place(joint: Element) -> None:
-    """Raises InvalidArm for numbers of a joint that Pinocchio would not read."""
-    where = f"Joint {name_of(joint)!r} has an <origin>"
-    for part in ("xyz", "rpy"):
-        numbers(joint.find("origin"), part, where, ZERO)
-    if joint.get("type") != FIXED:
-        joint_axis(joint)
-
-
-def _check_moving(joint: Element) -> None:
-    """Raises InvalidArm unless a moving joint is revolute and has limits, or those of another."""
-    name, kind = name_of(joint), str(joint.get("type"))[: PLAUSIBLE.name]
-    if kind not in TURNING:
-        held = "Give its position in `locked`" if kind == "prismatic" else "Make it fixed"
-        refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move. {held}.")
-    if joint.find("mimic") is not None:
-        return
-    limit = joint.find("limit")
-    if kind == "revolute" and (
-        limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib
-    ):
-        refuse(
-            "urdf",
-            f"Joint {name!r} has no <limit> with `lower` and `upper`: add them, or make it "
-            "continuous.",
-        )
-    if kind == "revolute" and not joint_limit(joint, "lower") < joint_limit(joint, "upper"):
-        refuse(
-            "urdf",
-            f"Joint {name!r} cannot move, its lower limit being no less than the upper: exchange "
-            "them, or make it fixed.",
-        )
-    lower, upper, *_ = joint_range(joint)
-    if not lower < upper:
-        refuse(
-            "urdf",
-            f"Joint {name!r} cannot move: its soft limits are exchanged, or beyond its <limit>.",
-        )
-
-
-def _check_rest(tree: UrdfTree, moving: list[Element], locked: Mapping[str, float]) -> None:
-    """Raises InvalidArm if joints beside the chain move."""
-    names = {name_of(joint): k for k, joint in enumerate(moving, start=1)}
-    loose = [
-        name
-        for name, joint in tree.joints.items()
-        if not (name in names or name in locked or joint.get("type") == FIXED)
-        and tree.carrier(joint_end(joint, "parent"), names)
-    ]
-    if len(loose) == 1:
-        refuse(
-            "locked",
-            f"Joint {loose[0]!r} moves a link beside those to the tip: give its position in "
-            '`locked`, or "others" to hold it at zero.',
-        )
-    if loose:
-        refuse(
-            "locked",
-            f"Joints move links beside those to the tip: {listed(loose)}. Give their positions in "
-            '`locked`, or "others" to hold them all at zero.',
-        )
 
 
 def _merged(

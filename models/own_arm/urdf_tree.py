@@ -38,6 +38,7 @@ REPEATED = ("visual", "collision")
 """Elements that a link may have several times; of others, the first one is read."""
 
 TURNING = ("revolute", "continuous")
+FIXED = "fixed"
 CONTINUOUS = 2 * math.pi
 """Range of a continuous joint to either side [rad]: one turn."""
 

@@ -12,7 +12,7 @@ from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.models.own_arm.description import Collision, Drives, Electronics, InvalidArm, Motion
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.registry import load_robot
-from tests.models.own_arm.arms import HELD, RICH, RICH_ARM, refused
+from tests.models.own_arm.arms import HELD, RICH, RICH_ARM, refused, robot
 
 
 def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
@@ -36,6 +36,15 @@ BALL_JOINT = (
 LOOP = change('link="forearm"/><child link="wrist"', 'link="finger"/><child link="wrist"')
 
 
+NO_RANGE, EXCHANGED = 'lower="0" upper="0"', 'lower="2.5" upper="-2"'
+
+
+ON_A_RAIL, ON_A_PLATE = (
+    {"base": "world"} | change('"fixed_1" type="fixed"', f'"fixed_1" type="{kind}"')
+    for kind in ("prismatic", "planar")
+)
+
+
 WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "is not XML", {"urdf": "<robot"}),
     ("urdf", "root element", {"urdf": "<sdf/>"}),
@@ -52,12 +61,20 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
     (
         "urdf",
+        "'finger' is prismatic.*in `locked`, with those of the joints that \"others\" holds",
+        {"tip": "finger", "locked": "others"},
+    ),
+    ("urdf", "'fixed_1' is prismatic.*in `locked`, or name 'pedestal' as `base`", ON_A_RAIL),
+    ("urdf", "'fixed_1' is planar.*: make it fixed, or name 'pedestal' as `base`", ON_A_PLATE),
+    (
+        "urdf",
         "'twist' mimics itself",
         change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="twist"/>'),
     ),
     ("urdf", "'elbow' has no <limit>", change('lower="-2" upper="2.5" ', "")),
-    ("urdf", "'elbow' cannot move", change('lower="-2" upper="2.5"', 'lower="1" upper="1"')),
-    ("urdf", "`upper` that is no finite number", change('upper="2.5"', 'upper="inf"')),
+    ("urdf", "'elbow' cannot.*: write its range", change('lower="-2" upper="2.5"', NO_RANGE)),
+    ("urdf", "'elbow' cannot.*: exchange", change('lower="-2" upper="2.5"', EXCHANGED)),
+    ("urdf", "`upper` that is no finite number, but 'inf'", change('upper="2.5"', 'upper="inf"')),
     ("urdf", "Two links.*: hand. Give", change('name="wrist"', 'name="hand"')),
     ("urdf", "Two joints.*: pan. Give", change('"twist"', '"pan"')),
     ("urdf", r"but 'a\\u200b'", change('"twist"', '"a\u200b"')),
@@ -114,7 +131,11 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
         "'elbow' has a position limit of 180 rad",
         change('lower="-2" upper="2.5"', 'lower="-180" upper="180"'),
     ),
-    ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
+    (
+        "velocity",
+        "'elbow' has a limit `velocity` of 1e\\+30 in the URDF.* or give `velocity`",
+        change('velocity="2.5"', 'velocity="1e30"'),
+    ),
     ("urdf", "without the attribute `iyz`", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
     (
         "urdf",
@@ -130,6 +151,12 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
 @pytest.mark.parametrize(("field", "words", "changes"), WRONG, ids=[words for _, words, _ in WRONG])
 def test_what_makes_no_robot_is_named(field: str, words: str, changes: dict[str, Any]) -> None:
     refused(field, words, dataclasses.replace(RICH_ARM, **changes))
+
+
+@pytest.mark.parametrize("changes", [ON_A_RAIL, ON_A_PLATE], ids=["rail", "plate"])
+def test_a_base_beyond_a_sliding_joint_makes_a_robot(changes: dict[str, Any]) -> None:
+    arm = robot(dataclasses.replace(RICH_ARM, **changes | {"base": "pedestal"}))
+    assert arm.joint_names == robot(RICH_ARM).joint_names
 
 
 def test_what_is_hardly_real_is_remarked() -> None:
