@@ -36,7 +36,7 @@ class Estimate:
         found = list[str]()
         if self.links:
             found.append(
-                f"Masses of links without <inertial> are estimated: {listed(self.links)}, "
+                f"Masses that the URDF lacks are estimated: {listed(self.links)}, "
                 f"{self.mass:.4g} kg in all. Inertias are those of the convex hulls of their "
                 "shapes, of even density."
             )
@@ -51,7 +51,7 @@ class Estimate:
 def add_inertials(
     root: Element, moving: Sequence[str], description: Description, checkpoint: Checkpoint
 ) -> Estimate:
-    """Adds an <inertial> to every moving link with a shape but without one, and replaces masses.
+    """Adds an <inertial> to every moving link with a shape but without a mass, and replaces masses.
 
     Args:
         root: the URDF; it is changed.
@@ -74,13 +74,18 @@ def add_inertials(
     for name in moving:
         checkpoint()
         inertial = elements[name].find("inertial")
-        if inertial is not None:
+        if inertial is not None and _mass(inertial, name) > 0:
             known += _replaced(inertial, by_link.get(name), name)
             continue
         body = _body(elements[name], description.meshes or {}, checkpoint)
         if body is not None:
+            if inertial is not None:
+                # exporters write zeros for a body whose mass nobody entered
+                elements[name].remove(inertial)
             factor = by_link[name] / body.mass if name in by_link else density or RULES.density
             estimated[name] = pin.Inertia(factor * body.mass, body.lever, factor * body.inertia)
+        elif inertial is not None:
+            _replaced(inertial, by_link.get(name), name)
         elif name in by_link:
             raise InvalidArm(
                 "masses",
@@ -100,8 +105,8 @@ def _refuse_without_effect(description: Description, known: float) -> None:
     if not known > 0:
         raise InvalidArm(
             "meshes",
-            "No moving link has an <inertial>, or a shape that can be read: give the mesh files, "
-            "or an <inertial> in the URDF.",
+            "No moving link has an <inertial> with a mass, or a shape that can be read: give the "
+            "mesh files, or an <inertial> in the URDF.",
         )
     has = f"Every link with a shape has an <inertial>, {known:.4g} kg in all"
     if description.density is not None:
@@ -122,10 +127,14 @@ def _scale(given: Any, known: float, estimated: float) -> float:
     return float((given - known) / estimated)
 
 
+def _mass(inertial: Element, name: str) -> float:
+    """The mass [kg] of the <inertial> of a link. Raises InvalidArm."""
+    return number(inertial.find("mass"), "value", f"The <inertial> of link {name!r} has a <mass>")
+
+
 def _replaced(inertial: Element, mass: float | None, name: str) -> float:
     """The mass [kg] of an <inertial>, after its replacement by another one, if any."""
-    element = inertial.find("mass")
-    own = number(element, "value", f"The <inertial> of link {name!r} has a <mass>")
+    element, own = inertial.find("mass"), _mass(inertial, name)
     if mass is None or element is None:
         return own
     element.set("value", repr(mass))

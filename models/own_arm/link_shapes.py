@@ -28,6 +28,13 @@ from joulepath.models.uploads.limits import LIMITS, Checkpoint
 
 MOST_POINTS = 128
 """Most points of a hull: with more, distances take longer than those of a few capsules."""
+SOLIDS = {
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "box": {"size": 3},
+}
+"""Lengths of the shapes other than meshes, each with its count of numbers."""
 Rows = list[list[float]]
 """Capsules: both ends of the axis and the radius [m], as in the figures of a robot."""
 Around = tuple[Array, float]
@@ -126,25 +133,29 @@ class LinkShapes:
 
     def _around(self, geometry: Element, where: str) -> Around | None:
         """The capsule around a shape, in its frame; None for an unknown or missing shape."""
-        for kind in ("sphere", "cylinder", "capsule", "box", "mesh"):
+        if (mesh := geometry.find("mesh")) is not None:
+            return self._around_mesh(mesh, f"{where} a <mesh>")
+        for kind, parts in SOLIDS.items():
             element = geometry.find(kind)
             if element is None:
                 continue
             what = f"{where} a <{kind}>"
-            if kind == "mesh":
-                return self._around_mesh(element, what)
-            if kind == "box" and not numbers(element, "size", what).any():
+            given = {part: numbers(element, part, what, count=n) for part, n in parts.items()}
+            if not np.concatenate([*given.values()]).any():
                 # a placeholder: the link has other shapes, or the capsule from joint to joint
-                self.unknown.append("box of no size")
+                self.unknown.append(f"{kind} of no size")
                 return None
+            for part, lengths in given.items():
+                with _of_field("urdf"):
+                    check_lengths(f"{what}, whose `{part}`", lengths)
             if kind == "box":
-                sides = _lengths(element, "size", what, 3) / 2
+                sides = given["size"] / 2
                 longest = int(np.argmax(sides))
                 axis = np.eye(3)[longest] * sides[longest]
                 return np.array([-axis, axis]), float(np.linalg.norm(np.delete(sides, longest)))
-            half = 0.0 if kind == "sphere" else float(_lengths(element, "length", what)[0]) / 2
-            axis = np.array([0.0, 0.0, half])
-            return np.array([-axis, axis]), float(_lengths(element, "radius", what)[0])
+            half = given.get("length", np.zeros(1)) / 2
+            axis = np.array([0.0, 0.0, half[0]])
+            return np.array([-axis, axis]), float(given["radius"][0])
         self.unknown.extend([each.tag for each in geometry][:1])
         return None
 
@@ -199,14 +210,6 @@ def check_near(name: str, rows: Rows) -> None:
             "urdf",
             f"The shape of link {name!r} is farther than {PLAUSIBLE.length:g} m from its joint.",
         )
-
-
-def _lengths(element: Element, part: str, where: str, count: int = 1) -> Array:
-    """Lengths (count,) [m] in an attribute of a shape. Raises InvalidArm for implausible ones."""
-    found = numbers(element, part, where, count=count)
-    with _of_field("urdf"):
-        check_lengths(f"{where}, whose `{part}`", found)
-    return found
 
 
 @contextmanager

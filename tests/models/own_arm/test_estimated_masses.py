@@ -11,6 +11,7 @@ import pytest
 
 from joulepath.models.own_arm.description import Description
 from joulepath.models.own_arm.figures import own_figures
+from joulepath.models.own_arm.robot_xml import TENSOR
 from joulepath.models.possible_inertia import nearest_possible_inertia
 from tests.models.own_arm.arms import BLOCK, PLAIN, SHAPE, obj, refused, robot
 
@@ -59,6 +60,23 @@ def test_a_total_mass_is_met_by_the_sum_of_all_links() -> None:
     half = replace(PLAIN, urdf=re.sub(r"<inertial>.*?</inertial>", "", BOXED, count=1, flags=re.S))
     assert [each.mass for each in bodies(replace(half, masses=9.0))] == pytest.approx([7.0, 2.0])
     refused("masses", "a total must be above this", replace(half, masses=1.5))
+
+
+def test_a_mass_of_zero_is_none() -> None:
+    """Exporters write zeros for bodies whose mass nobody entered."""
+    zeros = "".join(f' {part}="0"' for part in TENSOR)
+    inertial = f'<inertial><mass value="0"/><inertia{zeros}/></inertial>'
+    empty = replace(PLAIN, urdf=re.sub(r"<inertial>.*?</inertial>", inertial, BOXED, flags=re.S))
+    refused("urdf", "give `masses`, or `density`", empty)
+    for given in ({"density": 1000.0}, {"masses": 10.0}, {"masses": {"forearm": 1.0}}):
+        bare = own_figures("mine", replace(BARE, **given))
+        assert own_figures("mine", replace(empty, **given)) == bare
+    # without a shape, the mass alone is replaced
+    shapeless = replace(empty, urdf=re.sub(r"<visual>.*?</visual>", "", empty.urdf, flags=re.S))
+    assert bodies(replace(shapeless, masses={"forearm": 2.5}))[1].mass == 2.5
+    refused(
+        "urdf", "'forearm', with what is fixed to it, has no mass", replace(shapeless, density=9.0)
+    )
 
 
 def test_what_has_no_effect_is_refused() -> None:

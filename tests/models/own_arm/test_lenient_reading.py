@@ -140,13 +140,22 @@ def test_a_plain_description_has_no_problem(description: Description) -> None:
     assert own_figures("mine", description)[0]["kinematics"]
 
 
-def test_a_box_of_no_size_is_no_shape() -> None:
+@pytest.mark.parametrize(
+    ("kind", "sizes"),
+    [
+        ("box", 'size="0 0 0"'),
+        ("sphere", 'radius="0"'),
+        ("cylinder", 'radius="0.0" length="0.0"'),
+        ("capsule", 'radius="0" length="0"'),
+    ],
+)
+def test_what_has_no_size_is_no_shape(kind: str, sizes: str) -> None:
     """A placeholder of some files. The link has the capsule of a link without shapes."""
     none = PLAIN.urdf.replace(f"<geometry>{SHAPE}</geometry>", "<geometry/>")
-    empty = PLAIN.urdf.replace(SHAPE, '<box size="0 0 0"/>')
+    empty = PLAIN.urdf.replace(SHAPE, f"<{kind} {sizes}/>")
     figures, warnings = own_figures("mine", replace(PLAIN, urdf=empty))
     assert figures == own_figures("mine", replace(PLAIN, urdf=none))[0]
-    assert "Shapes that are not read count as nothing: box of no size." in warnings
+    assert f"Shapes that are not read count as nothing: {kind} of no size." in warnings
 
 
 def test_a_mesh_of_a_package_is_found_by_the_end_of_its_path() -> None:
