@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
 from joulepath.models.robot import Array
@@ -17,6 +18,8 @@ from joulepath.models.uploads.limits import LIMITS, Checkpoint, UnreadableFile
 from joulepath.models.uploads.mesh_text import MeshSize
 from joulepath.models.uploads.xml_tree import xml_tree
 
+FACES = ("triangles", "trifans", "tristrips", "polylist", "polygons")
+"""Elements of a mesh with faces."""
 LEAST_AXIS = 1e-12
 """Length of an axis of rotation below which nothing turns."""
 
@@ -77,7 +80,7 @@ class _Document:
                 yield points @ T[:3, :3].T + T[:3, 3]
 
     def _counted(self, geometry: Element) -> Array:
-        """Corners (n, 3) of a geometry, in its own units."""
+        """Corners (n, 3) of the faces of a geometry, in its own units."""
         name = geometry.get("id", "")
         if name not in self._points:
             self._points[name] = self._read(geometry)
@@ -86,26 +89,50 @@ class _Document:
         return self._points[name]
 
     def _read(self, geometry: Element) -> Array:
-        places = [
+        inputs = [
             each
             for each in geometry.iterfind("mesh/vertices/input")
             if each.get("semantic") == "POSITION"
         ]
-        if not places:
+        if not inputs:
             return np.zeros((0, 3))
-        source = self._named(places[0].get("source"))
+        source = self._named(inputs[0].get("source"))
         accessor = source.find("technique_common/accessor")
         stride = 3 if accessor is None else int(_floats(accessor.get("stride", "3"), 1)[0])
         values = _floats(source.findtext("float_array") or "")
         if stride < 3 or len(values) % stride:
             raise UnreadableFile("has corners of fewer than three coordinates.")
-        return np.asarray(values.reshape(-1, stride)[:, :3])
+        places = values.reshape(-1, stride)[:, :3]
+        # Parts of one body may share the corners of all.
+        used = _used(geometry, len(places))
+        return places[used] if len(used) else places
 
     def _named(self, url: str | None) -> Element:
         name = (url or "").removeprefix("#")
         if name not in self._by_id:
             raise UnreadableFile(f"names an element {name[:100]!r} that it does not have.")
         return self._by_id[name]
+
+
+def _used(geometry: Element, count: int) -> npt.NDArray[np.int64]:
+    """Numbers, below `count`, of the corners that the faces of a geometry have; none without a
+    face. Raises UnreadableFile.
+    """
+    found = [np.zeros(0)]
+    for faces in geometry.iterfind("mesh/*"):
+        if faces.tag not in FACES:
+            continue
+        offsets = [
+            (int(_floats(each.get("offset", "0"), 1)[0]), each.get("semantic"))
+            for each in faces.iterfind("input")
+        ]
+        of_corners = next((k for k, semantic in offsets if semantic == "VERTEX"), 0)
+        step = max((k for k, _ in offsets), default=0) + 1
+        found += [_floats(each.text or "")[of_corners::step] for each in faces.iter("p")]
+    used = np.unique(np.concatenate(found))
+    if len(used) and not (used[0] >= 0 and used[-1] < count):
+        raise UnreadableFile("has faces at corners that it does not have.")
+    return used.astype(np.int64)
 
 
 def _transform(part: Element) -> Array:

@@ -21,7 +21,8 @@ def xml_tree(
     """
     counted = _Counted()
     try:
-        data = text.encode()
+        # expat wants the declaration first, and some exporters write an empty line before it
+        data = text.lstrip().encode()
         if len(data) > most:
             raise UnreadableFile(f"has more than {most >> 20} MiB.")
         for begin in range(0, len(data), LIMITS.xml_piece):

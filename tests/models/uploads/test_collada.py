@@ -52,9 +52,40 @@ def test_geometries_used_twice_and_nodes_of_a_library() -> None:
 
 
 @pytest.mark.parametrize(
+    "faces",
+    [
+        '<triangles count="1"><input semantic="NORMAL" offset="0"/>'
+        '<input semantic="VERTEX" offset="1"/><p>9 0  9 1  9 3</p></triangles>',
+        '<polylist count="1"><input semantic="VERTEX" offset="0"/>'
+        '<input semantic="TEXCOORD" offset="2"/><vcount>3</vcount><p>0 7 7 1 7 7 3 7 7</p>'
+        "</polylist>",
+        '<polygons count="2"><input semantic="VERTEX" offset="0"/><p>0 1</p>'
+        "<ph><p>1 3</p><h>2</h></ph></polygons>",
+    ],
+    ids=["triangles", "polylist", "polygons"],
+)
+def test_corners_without_a_face_do_not_count(faces: str) -> None:
+    """Parts of one body may share the corners of all."""
+    content = file_of(INSTANCE).replace(b"</mesh>", f"{faces}</mesh>".encode())
+    found = collada_corners(content, MeshSize(), unwatched)
+    assert found == pytest.approx(CORNERS[[0, 1, 3]] * 1e-3)
+
+
+def test_an_empty_line_before_the_declaration_has_no_effect() -> None:
+    content = file_of(INSTANCE)
+    spaced = b"  \n" + content.removeprefix("\ufeff".encode())
+    found = collada_corners(spaced, MeshSize(), unwatched)
+    assert np.array_equal(found, collada_corners(content, MeshSize(), unwatched))
+
+
+@pytest.mark.parametrize(
     ("content", "cause"),
     [
         (b"<robot/>", "no COLLADA"),
+        (
+            file_of(INSTANCE).replace(b"</mesh>", b"<triangles><p>0 1 4</p></triangles></mesh>"),
+            "faces at corners",
+        ),
         (b"<COLLADA><", "not XML"),
         (file_of("<node><instance_geometry url='#other'/></node>"), "'other'"),
         (file_of("<node><matrix>1 2</matrix></node>"), "16 numbers"),
