@@ -20,7 +20,12 @@ from joulepath.models.own_arm.description import (
     Motion,
 )
 from joulepath.models.own_arm.mesh_files import in_folder, in_zip
-from joulepath.models.own_arm.xacro_file import SUFFIX, expanded, package_folders
+from joulepath.models.own_arm.xacro_file import (
+    SUFFIX,
+    expanded,
+    package_folders,
+    repositories,
+)
 
 # no conversion of types, no unknown fields
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -59,7 +64,8 @@ def read_description(path: Path) -> Description:
         raise InvalidArm(
             "urdf", f"There is no file {urdf}: give the path of the URDF, relative to {path.name}."
         )
-    folders = [*_folder_of_packages(path.parent, folder), *package_folders(urdf)]
+    given = _folder_of_packages(path.parent, folder)
+    folders = [*given, *package_folders(urdf)]
     if urdf.suffix == SUFFIX:
         text = expanded(urdf, _arguments(arguments), folders)
     else:
@@ -72,9 +78,8 @@ def read_description(path: Path) -> Description:
                 f"There is no file {srdf}: give the path of the SRDF, relative to {path.name}.",
             )
         found = replace(found, srdf=srdf.read_text(encoding="utf-8", errors="replace"))
-    return replace(
-        found, urdf=text, meshes=_meshes(path.parent, place, [urdf.parent, *folders], text)
-    )
+    near = [urdf.parent, *folders, *(each for one in given for each in repositories(one))]
+    return replace(found, urdf=text, meshes=_meshes(path.parent, place, near, text))
 
 
 def _arguments(given: Any) -> dict[str, str]:

@@ -78,7 +78,11 @@ class UrdfTree:
         """The tree of a <robot>. Raises InvalidArm for repeated names, loops or several roots."""
         links, joints = (_named(robot, kind) for kind in ("link", "joint"))
         if not links:
-            refuse("urdf", "The URDF has no <link>.")
+            refuse(
+                "urdf",
+                "The URDF has no <link>. A file of macros alone makes no arm: name the one that "
+                "uses them.",
+            )
         above, problems = dict[str, Element](), Problems()
         for name, joint in joints.items():
             with problems.noted():

@@ -6,6 +6,7 @@ expanded, never files in a request to the service.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -46,9 +47,11 @@ def expanded(path: Path, arguments: Mapping[str, str], folders: Sequence[Path]) 
     try:
         return str(xacro.process_file(str(path), mappings=dict(arguments)).toxml())
     except Exception as error:  # xacro and the expressions of the file raise many kinds
+        missing = isinstance(error.__context__, packages.PackageNotFoundError)
+        cause = error.__context__ if missing else error
         raise InvalidArm(
             "urdf",
-            f"xacro does not expand {path.name}: {error}. Give the folder of missing packages in "
+            f"xacro does not expand {path.name}: {cause}. Give the folder of missing packages in "
             "`packages`, and values of arguments in `arguments`.",
         ) from None
 
@@ -59,3 +62,17 @@ def package_folders(path: Path) -> list[Path]:
         if (folder / MANIFEST).is_file():
             return [folder, folder.parent]
     return []
+
+
+def repositories(folder: Path) -> list[Path]:
+    """Folders below a folder that have ROS packages: those of the repositories of a workspace."""
+    found, seen = list[Path](), set[str]()
+    for place, inner, files in os.walk(folder, followlinks=True):
+        is_package = MANIFEST in files
+        if is_package and Path(place).parent not in found:
+            found.append(Path(place).parent)
+        # no package lies in another one, and links may lead round in a circle
+        is_known = os.path.realpath(place) in seen
+        seen.add(os.path.realpath(place))
+        inner[:] = [] if is_package or is_known else [n for n in sorted(inner) if n[0] != "."]
+    return found

@@ -67,10 +67,31 @@ def test_packages_elsewhere(arm: Path, tmp_path: Path) -> None:
     pytest.importorskip("xacrodoc")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "src" / "macros").rename(tmp_path / "elsewhere" / "macros")
-    with pytest.raises(InvalidArm, match=r"macros.*`packages`"):
+    with pytest.raises(InvalidArm, match=r"xacro: Package not found: macros\. .*`packages`"):
         read_description(arm)
     arm.write_text(arm.read_text() + "packages: elsewhere\n")
     assert 'xyz="0 0 0.4"' in read_description(arm).urdf
+
+
+def test_meshes_of_a_repository_in_a_workspace(arm: Path, tmp_path: Path) -> None:
+    """The packages of a maker's repository are one level below the folder of the workspace."""
+    pytest.importorskip("xacrodoc")
+    maker = tmp_path / "elsewhere" / "maker"
+    maker.mkdir(parents=True)
+    (maker / "back").symlink_to(maker, target_is_directory=True)
+    (tmp_path / "src" / "macros").rename(maker / "macros")
+    (tmp_path / "src" / "cell_arm" / "meshes").rename(maker / "macros" / "meshes")
+    file = tmp_path / "src" / "cell_arm" / "urdf" / "arm.urdf.xacro"
+    file.write_text(file.read_text().replace("cell_arm/meshes", "macros/meshes"))
+    arm.write_text(arm.read_text() + "packages: elsewhere\n")
+    assert list(read_description(arm).meshes or {}) == ["package://macros/meshes/block.obj"]
+
+
+def test_a_file_of_macros_alone(arm: Path) -> None:
+    pytest.importorskip("xacrodoc")
+    arm.write_text(arm.read_text().replace("cell_arm/urdf/arm.urdf", "macros/urdf/places"))
+    with pytest.raises(InvalidArm, match="name the one that uses them"):
+        load_robot(arm)
 
 
 @pytest.mark.parametrize(
