@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from joulepath.models.robot import Array
 
 
+@dataclass(frozen=True)
+class ChainSettings:
+    """Settings of least chains."""
+
+    rounding: float = 1e-12
+    """Relative rounding error of a sum of costs, far above that of thousands of legs."""
+
+
+CHAINS = ChainSettings()
+
+
 class LeastChain:
     """Least chain through legs with non-decreasing costs between calls of `find`.
 
     A decrease of a cost must be announced by `lower`. A closed chain ends in its first node, and
-    every first node has a least chain of its own. These chains are computed again only while their
-    known value is the least.
+    every first node has a least chain of its own. A lower bound of each is known, at first that of
+    the open chains from and to the node, and a chain is computed only while its bound is the least.
 
     Args:
         costs: cost matrix of every leg, shape (n_k, n_k+1) [J].
@@ -30,7 +42,7 @@ class LeastChain:
         if not self.closed:
             return self._through(np.zeros(self.costs[0].shape[0]), None)
         if self._known is None:
-            self._known = np.array([self._from(node)[0] for node in range(self.costs[0].shape[0])])
+            self._known = self._open_bounds()
         while True:
             node = int(self._known.argmin())
             if not np.isfinite(self._known[node]):
@@ -48,6 +60,20 @@ class LeastChain:
         """
         if self._known is not None:
             self._known = self._known - by if np.isfinite(by) else None
+
+    def _open_bounds(self) -> Array:
+        """Lower bounds (n,) [J] of the closed chains through the first nodes.
+
+        A closed chain costs no less than the least open ones from its node and to its node.
+        """
+        onwards, back = np.zeros(self.costs[-1].shape[1]), np.zeros(self.costs[0].shape[0])
+        for cost in reversed(self.costs):
+            onwards = (cost + onwards).min(axis=1)
+        for cost in self.costs:
+            back = (back[:, None] + cost).min(axis=0)
+        bounds = np.maximum(onwards, back)
+        # sums in another order round otherwise
+        return bounds * (1 - CHAINS.rounding * np.sign(bounds))
 
     def _from(self, node: int) -> tuple[float, list[int]]:
         first = np.full(self.costs[0].shape[0], np.inf)
