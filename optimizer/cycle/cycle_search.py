@@ -52,8 +52,8 @@ class CycleSearchSettings:
     """Number of stops above which unsolved pairs weigh more than their bounds: the proof that no
     chain is better then takes more time than it is worth."""
     unsolved_excess: float = 0.1
-    """Share of the bound by which unsolved pairs weigh more then; motions need 17 % more than their
-    bounds in the median."""
+    """Share of the bound by which unsolved pairs weigh more then, and in cycles with free
+    orientations; motions need 17 % more than their bounds in the median."""
     usual_times: float = 4.0
     """Multiple of the mean time of a first motion that every first motion may take."""
 
@@ -98,12 +98,13 @@ class CycleSearch(LazySearch):
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
         self.solver = PairSolver(cycle, self.moves, legs, clock, self.end)
-        self._overestimates = (
-            cycle.approximate or len(cycle.stops) > CYCLE_SEARCH.many_stops
-        ) and cycle.objective == "electrical"
+        excess = cycle.unsolved_excess
+        if len(cycle.stops) > CYCLE_SEARCH.many_stops:
+            excess = max(excess, CYCLE_SEARCH.unsolved_excess)
+        self._overestimates = excess > 0 and cycle.objective == "electrical"
         for leg in legs:
             if self._overestimates and not isinstance(leg, PassingLeg):
-                leg.raise_unsolved_costs(CYCLE_SEARCH.unsolved_excess)
+                leg.raise_unsolved_costs(excess)
         # whether an untried route has a bound below the motion found of its pair
         self._skipped_routes = False
         reserved = CYCLE_SEARCH.reserved_share * cycle.deadline

@@ -22,6 +22,7 @@ import numpy as np
 
 from joulepath.optimizer.cycle.cycle_baselines import recompared
 from joulepath.optimizer.cycle.cycle_move import CycleMove
+from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
 from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.known_motions import knowing, known_motions
@@ -173,9 +174,11 @@ def _first_cycle(
     """
     all_around = {name: turns_all_around(cycle.arm, stop) for name, stop in free.items()}
     # many orientations need nearly the same energy: a proof that none is better would take long
-    cycle = replace(cycle, approximate=any(stop.path is None for stop in free.values()))
-    settings = FREE_ORIENTATIONS
-    if not cycle.windings or not cycle.approximate:
+    settings, excess = FREE_ORIENTATIONS, 0.0
+    if any(stop.path is None for stop in free.values()):
+        excess = max(cycle.unsolved_excess, CYCLE_SEARCH.unsolved_excess)
+    cycle = replace(cycle, unsolved_excess=excess)
+    if not cycle.windings or not excess:
         return all_around, _bounded(cycle, all_around, search, settings.share_of_first * end.left)
     found, found_at = None, {name: turns[0] for name, turns in all_around.items()}
     # a cycle may need full turns, or more time than this

@@ -77,8 +77,10 @@ class Cycle:
         wait: stop at which the arm waits, or `start`; None for the cheapest place.
         rests_at_passes: whether the arm also rests at the stops it would pass through.
         with_baselines: whether to search for baselines.
-        approximate: whether unsolved electrical moves weigh more than their bounds, so that fewer
-            of them are solved and the answer is only likely the best.
+        unsolved_excess: share of the bound by which unsolved electrical moves weigh more than it.
+            Above 0, fewer of them are solved, and the answer is only likely the best.
+        with_move_bounds: whether to raise the lower bounds of single moves. The bound of the cycle
+            does not depend on them.
         sample_period: period of the samples [s].
         deadline: limit of the wall time [s].
 
@@ -104,7 +106,8 @@ class Cycle:
     wait: str | None = None
     rests_at_passes: bool = False
     with_baselines: bool = True
-    approximate: bool = False
+    unsolved_excess: float = 0.0
+    with_move_bounds: bool = True
     sample_period: float = 0.008
     deadline: float = 60.0
 

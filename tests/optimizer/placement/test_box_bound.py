@@ -23,6 +23,7 @@ from joulepath.optimizer.placement.extents import Extents
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
 from joulepath.optimizer.placement.region import Group, Moved, Places, Region
 from joulepath.optimizer.placement.region_bound import region_bound
+from joulepath.optimizer.placement.rounds import ROUNDS
 from joulepath.optimizer.placement.space import Space
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm
@@ -107,7 +108,7 @@ def test_every_configuration_is_in_a_box(robot: str, region: str, base: np.ndarr
 @pytest.mark.parametrize("region", long_but(("listed",), REGIONS))
 def test_no_cycle_needs_less_than_the_bound(region: str, robot: str) -> None:
     own_arm = Arm(robot=load_robot(robot))
-    cycle = two_stops(arm=own_arm, with_baselines=False, approximate=True)
+    cycle = two_stops(arm=own_arm, with_baselines=False, unsolved_excess=ROUNDS.unsolved_excess)
     space, rng, found = space_of(cycle, REGIONS[region]), np.random.default_rng(1), 0
     bound = box_bound(space, NEVER)
     assert bound is not None
