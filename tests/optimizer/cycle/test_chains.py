@@ -53,6 +53,15 @@ def test_it_is_the_least_of_all_while_costs_rise_and_fall(seed: int, closed: boo
             costs[k][pair] += rng.choice([0.3, np.inf], p=[0.8, 0.2])
 
 
+def test_of_equal_closed_chains_the_first_is_taken() -> None:
+    """Turns of a joint lead to chains of the same cost; a cycle has one answer all the same."""
+    cost = np.random.default_rng(0).uniform(1.0, 2.0, (3, 3))
+    costs = [np.tile(cost, (4, 4)) for _ in range(3)]
+    value, nodes = LeastChain(costs, True).find()
+    assert value == pytest.approx(least_of_all([cost] * 3, True))
+    assert max(nodes) < len(cost)
+
+
 def test_no_chain_has_no_nodes() -> None:
     costs = [np.full((2, 2), np.inf), np.zeros((2, 2))]
     for closed in (True, False):
