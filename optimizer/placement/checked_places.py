@@ -8,7 +8,7 @@ points of the map before any cycle is computed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -28,6 +28,10 @@ class CheckedPlacesSettings:
     finest_share: float = 0.2
     """Step below which the search ends, as a share of the distance between neighbours on the
     map."""
+    greatest_fall: float = 0.1
+    """Share by which the bound may fall next to a place of the map, where another configuration
+    comes within reach. In eight cells of the benchmark, searches from all places took three times
+    as many bounds and led to none below the least."""
 
 
 CHECKED_PLACES = CheckedPlacesSettings()
@@ -64,24 +68,41 @@ class CheckedPlaces:
         return None if known is None else known.bound
 
     def least_bounds(self, starts: Sequence[Round], end: Deadline) -> Iterator[Round]:
-        """Local minima of the bound, from the start of least bound to that of the greatest.
+        """Local minima of the bound, from the local minima on the map, and from other starts that a
+        fall by `greatest_fall` would bring below all before.
 
         Args:
-            starts: checked places to begin with; places without a bound are left out.
+            starts: checked places of the map; places without a bound are left out.
             end: deadline.
         """
         step = PATTERN.first_step * self.spacing
         spacing = float((self.spacing / self.box.scale).max(initial=0.0))
         # a map finer than the search for the least energy leaves nothing between its points
         finest = max(CHECKED_PLACES.finest_share * spacing, PATTERN.finest)
-        bounded = [each for each in starts if each.reason is None and each.bound is not None]
-        for start in sorted(bounded, key=lambda each: each.bound or 0.0):
+        bounds = {each: each.bound for each in starts if each.bound is not None}
+        minima = {each for each in bounds if self._is_minimum(each, bounds)}
+        least = np.inf
+        for start in sorted(bounds, key=lambda each: (each not in minima, bounds[each])):
+            fallen = bounds[start] - CHECKED_PLACES.greatest_fall * abs(bounds[start])
+            if start not in minima and fallen > least:
+                return
             choice = start.place.choice
             bound = partial(self._bound_at, choice, end)
             x, ended = refined(bound, start.place.x, self.box, step, finest)
-            yield self.check(self.rounds.space.place(choice, x), end)
+            found = self.check(self.rounds.space.place(choice, x), end)
+            least = min(least, np.inf if found.bound is None else found.bound)
+            yield found
             if not ended:
                 return
+
+    def _is_minimum(self, start: Round, bounds: Mapping[Round, float]) -> bool:
+        """Whether no place one step of one coordinate away on the map has a lower bound."""
+        lower = [other.place for other, bound in bounds.items() if bound < bounds[start]]
+        return not any(
+            other.choice == start.place.choice
+            and np.round(np.abs(other.x - start.place.x) / self.spacing).sum() == 1
+            for other in lower
+        )
 
     def _bound_at(self, choice: tuple[int, ...], end: Deadline, x: Array) -> float | None:
         """Bound [J] at coordinates (n,): inf without a bound, None if the time is up."""

@@ -9,7 +9,7 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.known_motions import KnownMotions
-from joulepath.optimizer.deadline import Clock, Deadline
+from joulepath.optimizer.deadline import NEVER, Clock, Deadline
 from joulepath.optimizer.placement import placement_search
 from joulepath.optimizer.placement.nearby_chain import Visited
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
@@ -57,6 +57,31 @@ class GivenRounds(Rounds):
 
     def nearby(self, place: Place, near: Sequence[Visited]) -> list[Cycle] | None:
         return None
+
+
+@pytest.mark.parametrize(("slope", "starts"), [(200.0, 2), (20.0, 7)])
+def test_bounds_are_descended_from_local_minima_and_from_where_they_may_fall_below_the_least(
+    slope: float, starts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two opposite corners of nine places are local minima. A fall by a tenth below the least bound
+    is possible from no other place on a steep slope, and from those up to 111 J on a gentle one.
+    """
+
+    def checked(_: Rounds, place: Place, end: Deadline) -> Round:
+        low, high = (float(np.abs(place.x - corner).sum()) for corner in (-0.25, 0.25))
+        return Round(place, bound=min(100.0 + slope * low, 112.0 + slope * high))
+
+    monkeypatch.setattr(GivenRounds, "checked", checked)
+    monkeypatch.setattr(placement_search, "Rounds", GivenRounds)
+    region = Region(x=(-0.25, 0.25), y=(-0.25, 0.25))
+    placement = Placement(
+        cycles=[WeightedCycle(two_stops())], moved=[Moved(region)], resolution=0.25
+    )
+    search = PlacementSearch(placement, still, no_listener)
+    points = [search.checked.check(point, NEVER) for point in search.points]
+    found = [each.bound for each in search.checked.least_bounds(points, NEVER)]
+    assert found[:2] == [100.0, 112.0]
+    assert len(found) == starts
 
 
 def test_a_place_between_those_of_the_map_is_found_by_its_bound(
