@@ -80,7 +80,7 @@ class CheckedPlaces:
         # a map finer than the search for the least energy leaves nothing between its points
         finest = max(CHECKED_PLACES.finest_share * spacing, PATTERN.finest)
         bounds = {each: each.bound for each in starts if each.bound is not None}
-        minima = {each for each in bounds if self._is_minimum(each, bounds)}
+        minima = self._minima(bounds)
         least = np.inf
         for start in sorted(bounds, key=lambda each: (each not in minima, bounds[each])):
             fallen = bounds[start] - CHECKED_PLACES.greatest_fall * abs(bounds[start])
@@ -95,14 +95,27 @@ class CheckedPlaces:
             if not ended:
                 return
 
-    def _is_minimum(self, start: Round, bounds: Mapping[Round, float]) -> bool:
-        """Whether no place one step of one coordinate away on the map has a lower bound."""
-        lower = [other.place for other, bound in bounds.items() if bound < bounds[start]]
-        return not any(
-            other.choice == start.place.choice
-            and np.round(np.abs(other.x - start.place.x) / self.spacing).sum() == 1
-            for other in lower
-        )
+    def _minima(self, bounds: Mapping[Round, float]) -> set[Round]:
+        """Places of the map at which the bound is no greater than one step of one coordinate
+        away."""
+        steps = {each: self._steps(each.place.x) for each in bounds}
+        at = {(each.place.choice, steps[each]): bound for each, bound in bounds.items()}
+
+        def around(place: Round) -> Iterator[float]:
+            """Bounds of the neighbours that have one."""
+            numbers = steps[place]
+            for k, number in enumerate(numbers):
+                for other in (number - 1, number + 1):
+                    key = place.place.choice, (*numbers[:k], other, *numbers[k + 1 :])
+                    yield at.get(key, np.inf)
+
+        return {
+            each for each, bound in bounds.items() if bound <= min(around(each), default=np.inf)
+        }
+
+    def _steps(self, x: Array) -> tuple[int, ...]:
+        """Numbers of coordinates (n,) of the map, counted from the lower ends of their ranges."""
+        return tuple(np.rint((x - self.box.low) / self.spacing).astype(int).tolist())
 
     def _bound_at(self, choice: tuple[int, ...], end: Deadline, x: Array) -> float | None:
         """Bound [J] at coordinates (n,): inf without a bound, None if the time is up."""

@@ -86,7 +86,6 @@ def test_of_an_edited_cycle_only_the_moves_that_changed_are_solved() -> None:
     )
 
 
-@pytest.mark.long
 def test_the_bounds_of_moves_change_no_motion_and_not_the_bound_of_the_cycle() -> None:
     """The proofs that a single move is the best one are of no use where only the cycle counts."""
     found, _ = searched()
@@ -97,6 +96,7 @@ def test_the_bounds_of_moves_change_no_motion_and_not_the_bound_of_the_cycle() -
     assert sum(bounds[0]) < sum(bounds[1])
 
 
+@pytest.mark.long
 def test_in_a_given_time_too() -> None:
     own = searched()[0].duration
     asked, motions = replace(ASKED, duration_min=1.3 * own, duration_max=1.3 * own), KnownMotions()
