@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from benchmarks.identification import tx40_torque
 from benchmarks.identification_logs import ur3e
 from joulepath.optimizer.identify.identify import identify
@@ -32,6 +34,7 @@ def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
     assert found.validation.half_width is not None and found.validation.half_width <= 2.5
 
 
+@pytest.mark.long
 def test_currents_tell_friction_that_the_factory_does_not_know(place: Path) -> None:
     robot, log = ur3e(place)
     assert log.effort_meaning == "current"

@@ -20,6 +20,7 @@ from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import SILENT, recorded, rigid_torques, truth_of
+from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
 TRUTH = truth_of(ROBOT, 0)
@@ -51,7 +52,7 @@ def _log(kind: str, moves: int) -> Log:
             return log
 
 
-@pytest.mark.parametrize("moves", [1, 2, 3])
+@pytest.mark.parametrize("moves", long_but([2], [1, 2, 3]))
 @pytest.mark.parametrize(
     "kind",
     ["all channels", "currents", "constant currents", "one joint", "the same row"],
