@@ -9,6 +9,7 @@ import logging
 import math
 import socket
 import sys
+import threading
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, cast
@@ -67,15 +68,15 @@ class _Server(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, app: FastAPI, connections: Connections) -> None:
         super().__init__(config)
         self._state, self._connections = app.state, connections
-        self._build_document = app.openapi
+        # its end is not waited for when the service stops
+        self._document = threading.Thread(target=app.openapi, daemon=True)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Begins to listen; builds the OpenAPI document later, in a thread."""
         await super().startup(sockets)
         if sockets and sys.stderr.isatty():
             print(told(sockets), file=sys.stderr)
-        loop = asyncio.get_running_loop()
-        loop.call_later(SERVER.document_delay, loop.run_in_executor, None, self._build_document)
+        asyncio.get_running_loop().call_later(SERVER.document_delay, self._document.start)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Lets running requests finish; too long ones are answered by `shutting-down`."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import atexit
 import logging
 import math
 from collections.abc import Callable
@@ -92,8 +91,6 @@ class Engine:
     def start(self) -> None:
         """Starts the workers in the background."""
         start_forkserver()
-        # `stop` is skipped when the operator forces the exit
-        atexit.register(self._kill_all)
         self._keepers = [
             asyncio.create_task(self._keep(first=index == 0))
             for index in range(self._settings.workers)
@@ -106,10 +103,10 @@ class Engine:
         for keeper in self._keepers:
             keeper.cancel()
         await asyncio.gather(*self._keepers, return_exceptions=True)
-        self._kill_all()
+        for worker in self._workers:
+            worker.kill()
         await asyncio.gather(*(worker.ended.wait() for worker in self._workers))
         await asyncio.to_thread(self._threads.shutdown)
-        atexit.unregister(self._kill_all)
 
     def drain(self) -> None:
         """Refuses new tasks and gives running tasks `settings.shutdown_grace` seconds to finish."""
@@ -240,10 +237,6 @@ class Engine:
         if not self._was_ready and self.warm_workers == self._settings.workers:
             self._was_ready = True
             logger.info("ready", extra={"workers": self.warm_workers})
-
-    def _kill_all(self) -> None:
-        for worker in self._workers:
-            worker.kill()
 
 
 @dataclass(frozen=True)

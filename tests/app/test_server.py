@@ -308,6 +308,22 @@ def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
 
 
 @pytest.mark.long
+def test_another_ctrl_c_ends_what_runs() -> None:
+    """The end of the lifespan is left out then, and the workers end by themselves."""
+    with serving(workers=1) as server, ThreadPoolExecutor() as pool:
+        everyone = server.descendants()
+        start_work(server, lambda: in_background(pool, server, long_search(LONG)), workers=1)
+
+        def ended() -> bool:
+            server.process.send_signal(signal.SIGINT)
+            return server.process.poll() is not None
+
+        until(ended)
+        assert server.process.wait(EXIT) == 0
+        until(lambda: not any(alive(pid) for pid in everyone))
+
+
+@pytest.mark.long
 def test_workers_do_not_outlive_a_killed_parent() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
