@@ -40,8 +40,8 @@ class Place:
         self.since = 0.0
         """When it began to wait, by the monotonic clock [s]."""
         self.gave_back = False
-        """Whether it had to give its worker back. Then it waits until its client has no other
-        worker.
+        """Whether it had to give its worker back. As long as its client has another worker, it then
+        comes after all other clients.
         """
         self.begins_again = False
         """Whether its worker was taken or has died. Then it comes before the others of its
@@ -268,10 +268,11 @@ class FairQueue:
         heads = [
             next((place for place in line if place.waits), None) for line in self._waiting.values()
         ]
-        allowed = [
-            place for place in heads if place and not (place.gave_back and working[place.client])
-        ]
-        return min(allowed, key=lambda place: working[place.client], default=None)
+
+        def turn(place: Place) -> tuple[bool, int]:
+            return place.gave_back and working[place.client] > 0, working[place.client]
+
+        return min((place for place in heads if place), key=turn, default=None)
 
     def _leave(self, place: Place) -> None:
         """The place stands in line no longer."""

@@ -309,6 +309,21 @@ class QueueMachine(RuleBasedStateMachine):
             self.loop.close()
 
 
+def test_a_request_that_gave_its_worker_back_waits_beside_no_idle_one() -> None:
+    """Its client has the other worker all the time."""
+    machine = QueueMachine()
+    for client in "aab":
+        machine.arrives(client, 1e6)
+        machine.settles()
+    machine.time_passes(PATIENCE)
+    for task in ("a2", "b3"):
+        (worker,) = [each for each in machine.busy if each.task == task]
+        machine._within(lambda worker=worker: machine._end(worker, worker.end))
+        machine.settles()
+    assert {each.task for each in machine.busy} == {"a1", "a2"}
+    machine.teardown()
+
+
 def run_machine(steps: int) -> None:
     run_state_machine_as_test(
         QueueMachine,
