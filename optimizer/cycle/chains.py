@@ -68,9 +68,9 @@ class LeastChain:
         """
         onwards, back = np.zeros(self.costs[-1].shape[1]), np.zeros(self.costs[0].shape[0])
         for cost in reversed(self.costs):
-            onwards = (cost + onwards).min(axis=1)
+            onwards = (cost + onwards).min(axis=1, initial=np.inf)
         for cost in self.costs:
-            back = (back[:, None] + cost).min(axis=0)
+            back = (back[:, None] + cost).min(axis=0, initial=np.inf)
         bounds = np.maximum(onwards, back)
         # sums in another order round otherwise
         return bounds * (1 - CHAINS.rounding * np.sign(bounds))

@@ -29,7 +29,6 @@ from tests.refusals import refusal_of
         ('<cylinder radius="0.05" length="0"/>', "<cylinder>, whose `length`"),
         ('<cylinder radius="0.05" length="-0.3"/>', "<cylinder>, whose `length`"),
         ('<capsule radius="0" length="0.3"/>', "<capsule>, whose `radius`"),
-        ('<sphere radius="0"/>', "<sphere>, whose `radius`"),
         ('<sphere radius="1e-9"/>', "<sphere>, whose `radius`"),
         ('<sphere radius="1e9"/>', "<sphere>, whose `radius`"),
         ('<sphere radius="nan"/>', "`radius` that is no finite number"),
