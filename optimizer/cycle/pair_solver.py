@@ -70,13 +70,7 @@ class PairSolver:
 
     def run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:
         """Search for a motion of leg `k`, from known motions."""
-        run = Run(
-            problem,
-            known,
-            self.clock,
-            models=self.legs[k].prepared.models,
-            raises_bounds=self.cycle.with_move_bounds,
-        )
+        run = Run(problem, known, self.clock, models=self.legs[k].prepared.models)
         trace = self.legs[k].trace_of(problem)
         if trace is not None:
             run.state.prepared.followed.keep(trace)

@@ -196,7 +196,6 @@ class Rounds:
                 deadline=min(cycle.deadline, share),
                 with_baselines=compared,
                 unsolved_excess=0.0 if compared else ROUNDS.unsolved_excess,
-                with_move_bounds=compared,
             )
             try:
                 with knowing(known):

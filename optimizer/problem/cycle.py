@@ -79,8 +79,6 @@ class Cycle:
         with_baselines: whether to search for baselines.
         unsolved_excess: share of the bound by which unsolved electrical moves weigh more than it.
             Above 0, fewer of them are solved, and the answer is only likely the best.
-        with_move_bounds: whether to raise the lower bounds of single moves. The bound of the cycle
-            does not depend on them.
         sample_period: period of the samples [s].
         deadline: limit of the wall time [s].
 
@@ -107,7 +105,6 @@ class Cycle:
     rests_at_passes: bool = False
     with_baselines: bool = True
     unsolved_excess: float = 0.0
-    with_move_bounds: bool = True
     sample_period: float = 0.008
     deadline: float = 60.0
 

@@ -26,10 +26,9 @@ def final_bound(state: SearchState, objective: float) -> tuple[float, bool]:
         The bound [J], and whether bounds prove that no unsolved candidate is better.
     """
     prepared, candidates, deadline = state.prepared, state.candidates, state.deadline
-    if state.raises_bounds:
-        raised = raised_bounds(prepared, candidates, objective, deadline)
-        for candidate, bound in zip(candidates, raised, strict=True):
-            candidate.lower_bound = bound
+    raised = raised_bounds(prepared, candidates, objective, deadline)
+    for candidate, bound in zip(candidates, raised, strict=True):
+        candidate.lower_bound = bound
     unsolved = [
         each
         for each in candidates

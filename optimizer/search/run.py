@@ -31,7 +31,6 @@ class Run:
         models: models of the problem's arm, if they are built already.
         seeks_baselines: whether baselines along planned paths are sought where the usual ones break
             a limit.
-        raises_bounds: whether the lower bound of the answer is raised.
     """
 
     def __init__(
@@ -42,10 +41,9 @@ class Run:
         tell: Tell = no_listener,
         models: ArmModels | None = None,
         seeks_baselines: bool = False,
-        raises_bounds: bool = True,
     ) -> None:
         self.state = SearchState.of(problem, known, clock, tell, models)
-        self.state.seeks_baselines, self.state.raises_bounds = seeks_baselines, raises_bounds
+        self.state.seeks_baselines = seeks_baselines
 
     @property
     def problem(self) -> Problem:

@@ -90,8 +90,6 @@ class SearchState:
     """Whether the motion of the longest duration is still to be compared."""
     seeks_baselines: bool = False
     """Whether baselines along planned paths are sought where the usual ones break a limit."""
-    raises_bounds: bool = True
-    """Whether the bounds of candidates below the energy of the answer are raised."""
     baselines: list[Baseline] = field(default_factory=list)
     """Baselines of the best motion."""
     answer: Solution | None = None

@@ -86,16 +86,6 @@ def test_of_an_edited_cycle_only_the_moves_that_changed_are_solved() -> None:
     )
 
 
-def test_the_bounds_of_moves_change_no_motion_and_not_the_bound_of_the_cycle() -> None:
-    """The proofs that a single move is the best one are of no use where only the cycle counts."""
-    found, _ = searched()
-    other = plan_cycle(replace(ASKED, with_move_bounds=False))
-    assert_same(other, found)
-    bounds = [[move.solution.lower_bound for move in each.moves] for each in (other, found)]
-    assert (np.array(bounds[0]) <= bounds[1]).all()
-    assert sum(bounds[0]) < sum(bounds[1])
-
-
 @pytest.mark.long
 def test_in_a_given_time_too() -> None:
     own = searched()[0].duration
