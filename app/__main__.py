@@ -42,7 +42,9 @@ def main() -> None:
         serve(settings)
     except WrongSettings as error:
         sys.exit(str(error))
-    except SystemExit:
+    except SystemExit as ended:
+        if ended.code:
+            raise
         # The interpreter would take seconds to free all objects one by one.
         logging.shutdown()
         os._exit(0)

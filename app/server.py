@@ -68,7 +68,7 @@ class _Server(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, app: FastAPI, connections: Connections) -> None:
         super().__init__(config)
         self._state, self._connections = app.state, connections
-        # its end is not waited for when the service stops
+        # A daemon: the stop of the service does not wait for its end.
         self._document = threading.Thread(target=app.openapi, daemon=True)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:

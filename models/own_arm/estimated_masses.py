@@ -80,7 +80,7 @@ def add_inertials(
         body = _body(elements[name], description.meshes or {}, checkpoint)
         if body is not None:
             if inertial is not None:
-                # exporters write zeros for a body whose mass nobody entered
+                # Exporters write zeros for a mass without an entry.
                 elements[name].remove(inertial)
             factor = by_link[name] / body.mass if name in by_link else density or RULES.density
             estimated[name] = pin.Inertia(factor * body.mass, body.lever, factor * body.inertia)

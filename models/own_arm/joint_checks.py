@@ -1,4 +1,4 @@
-"""Checks of the joints of a URDF: those that move an arm, and those that are held."""
+"""Checks of the moving and of the held joints of a URDF."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from joulepath.models.own_arm.urdf_tree import (
 
 
 def check_held(tree: UrdfTree, name: str) -> None:
-    """Raises InvalidArm unless a joint exists that has one position."""
+    """Raises InvalidArm unless a joint exists and a single position can hold it."""
     if name not in tree.joints:
         refuse(
             "locked",
@@ -37,7 +37,7 @@ def check_held(tree: UrdfTree, name: str) -> None:
 
 
 def check_place(joint: Element) -> None:
-    """Raises InvalidArm for numbers of a joint that Pinocchio would not read."""
+    """Raises InvalidArm for an origin or an axis of a joint without finite numbers."""
     where = f"Joint {name_of(joint)!r} has an <origin>"
     for part in ("xyz", "rpy"):
         numbers(joint.find("origin"), part, where, ZERO)
@@ -51,7 +51,7 @@ def check_turning(joint: Element, moving: Sequence[Element], holds_others: bool)
     Args:
         joint: the joint.
         moving: all moving joints from base to tip.
-        holds_others: whether `locked` holds all joints beside the chain, without their names.
+        holds_others: whether `locked` holds all joints beside the chain without naming them.
     """
     kind = str(joint.get("type"))[: PLAUSIBLE.name]
     if kind in TURNING:
@@ -60,14 +60,14 @@ def check_turning(joint: Element, moving: Sequence[Element], holds_others: bool)
     if kind == "prismatic":
         remedy = "give its position in `locked`"
         if holds_others:
-            remedy += ', with those of the joints that "others" holds'
+            remedy += ', in place of "others", with the positions of all other held joints'
     if not any(each.get("type") in TURNING for each in moving[: moving.index(joint)]):
         remedy += f", or name {joint_end(joint, 'child')!r} as `base`"
     refuse("urdf", f"Joint {name_of(joint)!r} is {kind}: only revolute joints can move: {remedy}.")
 
 
 def check_range(joint: Element) -> None:
-    """Raises InvalidArm unless a revolute joint has position limits, or those of another."""
+    """Raises InvalidArm unless a revolute joint has position limits or mimics another joint."""
     name, kind = name_of(joint), joint.get("type")
     if joint.find("mimic") is not None:
         return
@@ -82,7 +82,7 @@ def check_range(joint: Element) -> None:
         )
     ends = joint_limit(joint, "lower"), joint_limit(joint, "upper")
     if kind == "revolute" and not ends[0] < ends[1]:
-        # exporters write two zeros for a joint whose range nobody entered
+        # Exporters write two zeros for a range without an entry.
         how = "exchange them" if ends[0] > ends[1] else "write its range, or make it continuous"
         refuse(
             "urdf",

@@ -65,13 +65,13 @@ def package_folders(path: Path) -> list[Path]:
 
 
 def repositories(folder: Path) -> list[Path]:
-    """Folders below a folder that have ROS packages: those of the repositories of a workspace."""
+    """Folders with ROS packages below a folder, such as the repositories of a workspace."""
     found, seen = list[Path](), set[str]()
     for place, inner, files in os.walk(folder, followlinks=True):
         is_package = MANIFEST in files
         if is_package and Path(place).parent not in found:
             found.append(Path(place).parent)
-        # no package lies in another one, and links may lead round in a circle
+        # Packages do not contain packages, and symbolic links may form a circle.
         is_known = os.path.realpath(place) in seen
         seen.add(os.path.realpath(place))
         inner[:] = [] if is_package or is_known else [n for n in sorted(inner) if n[0] != "."]

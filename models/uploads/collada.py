@@ -115,8 +115,9 @@ class _Document:
 
 
 def _used(geometry: Element, count: int) -> npt.NDArray[np.int64]:
-    """Numbers, below `count`, of the corners that the faces of a geometry have; none without a
-    face. Raises UnreadableFile.
+    """Numbers of the corners of the faces of a geometry, below `count`; empty without faces.
+
+    Raises UnreadableFile.
     """
     found = [np.zeros(0)]
     for faces in geometry.iterfind("mesh/*"):
@@ -131,7 +132,7 @@ def _used(geometry: Element, count: int) -> npt.NDArray[np.int64]:
         found += [_floats(each.text or "")[of_corners::step] for each in faces.iter("p")]
     used = np.unique(np.concatenate(found))
     if len(used) and not (used[0] >= 0 and used[-1] < count):
-        raise UnreadableFile("has faces at corners that it does not have.")
+        raise UnreadableFile("has faces with corners outside its list of corners.")
     return used.astype(np.int64)
 
 

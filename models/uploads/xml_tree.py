@@ -21,7 +21,7 @@ def xml_tree(
     """
     counted = _Counted()
     try:
-        # expat wants the declaration first, and some exporters write an empty line before it
+        # Expat needs the declaration first; some exporters write an empty line before it.
         data = text.lstrip().encode()
         if len(data) > most:
             raise UnreadableFile(f"has more than {most >> 20} MiB.")

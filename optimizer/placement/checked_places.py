@@ -68,8 +68,8 @@ class CheckedPlaces:
         return None if known is None else known.bound
 
     def least_bounds(self, starts: Sequence[Round], end: Deadline) -> Iterator[Round]:
-        """Local minima of the bound, from the local minima on the map, and from other starts that a
-        fall by `greatest_fall` would bring below all before.
+        """Local minima of the bound. The searches begin at the local minima on the map, and then at
+        other places while a bound lower by `greatest_fall` would be the least of all.
 
         Args:
             starts: checked places of the map; places without a bound are left out.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -53,6 +55,18 @@ def test_the_process_ends_with_the_remedies() -> None:
 def test_arguments_are_refused_and_not_ignored() -> None:
     ended = run(("joulepath.app", "--port", "80"), os.environ | {"PORT": "0"}, EXIT)
     assert ended.returncode == 1 and b"takes no arguments" in ended.stderr
+
+
+@pytest.mark.parametrize("code", [0, 3])
+def test_the_exit_code_of_the_server_is_kept(code: int) -> None:
+    """Only an end without an error skips the end of the interpreter."""
+    program = (
+        "import sys, joulepath.app.server as server; "
+        f"server.serve = lambda settings: sys.exit({code}); sys.argv = ['joulepath']; "
+        "from joulepath.app.__main__ import main; main()"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], timeout=EXIT, check=False)
+    assert ended.returncode == code
 
 
 @pytest.mark.parametrize(

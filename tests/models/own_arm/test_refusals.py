@@ -61,7 +61,7 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
     (
         "urdf",
-        "'finger' is prismatic.*in `locked`, with those of the joints that \"others\" holds",
+        "'finger' is prismatic.*in `locked`, in place of \"others\", with the positions of all",
         {"tip": "finger", "locked": "others"},
     ),
     ("urdf", "'fixed_1' is prismatic.*in `locked`, or name 'pedestal' as `base`", ON_A_RAIL),

@@ -84,7 +84,7 @@ def test_an_empty_line_before_the_declaration_has_no_effect() -> None:
         (b"<robot/>", "no COLLADA"),
         (
             file_of(INSTANCE).replace(b"</mesh>", b"<triangles><p>0 1 4</p></triangles></mesh>"),
-            "faces at corners",
+            "faces with corners outside",
         ),
         (b"<COLLADA><", "not XML"),
         (file_of("<node><instance_geometry url='#other'/></node>"), "'other'"),
