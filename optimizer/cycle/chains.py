@@ -44,9 +44,9 @@ class LeastChain:
         if self._known is None:
             self._known = self._open_bounds()
         while True:
-            node = int(self._known.argmin())
-            if not np.isfinite(self._known[node]):
+            if not np.isfinite(self._known.min(initial=np.inf)):
                 return np.inf, []
+            node = int(self._known.argmin())
             value, nodes = self._from(node)
             risen = value > self._known[node]
             self._known[node] = value

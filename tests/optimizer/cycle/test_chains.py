@@ -64,8 +64,9 @@ def test_of_equal_closed_chains_the_first_is_taken() -> None:
 
 def test_no_chain_has_no_nodes() -> None:
     costs = [np.full((2, 2), np.inf), np.zeros((2, 2))]
-    without_nodes = [np.zeros((2, 0)), np.zeros((0, 2))]
-    assert LeastChain(without_nodes, True).find()[0] == np.inf
+    for first, second in ((2, 0), (0, 2)):
+        without_nodes = [np.zeros((first, second)), np.zeros((second, first))]
+        assert LeastChain(without_nodes, True).find() == (np.inf, [])
     for closed in (True, False):
         assert LeastChain(costs, closed).find() == (np.inf, [])
 
