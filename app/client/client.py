@@ -8,9 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
-import orjson
-
-from joulepath.app.client.errors import Json, ServiceUnreachable, error_in
+from joulepath.app.client.encoding import json_text, key_header, part
+from joulepath.app.client.errors import Json, ServiceUnreachable, error_in, json_in
 from joulepath.optimizer.presentation.extras import required
 
 PENDING = ("queued", "running")
@@ -38,15 +37,16 @@ class Client:
 
         Args:
             url: address of the service.
-            key: API key, if the service asks for one.
+            key: API key, if the service asks for one; blanks around it are left out.
             http: client of httpx to send requests with, for its proxies or certificates; its own
                 base address and timeouts are kept.
 
         Raises:
+            Unauthenticated: the key has characters that no key has.
             ModuleNotFoundError: httpx is not installed.
         """
         self._url = url.rstrip("/")
-        self._headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+        self._headers = key_header(key)
         self._httpx = required("httpx2", "Client", "joulepath[client]")
         # the deadline of a request bounds the time of its answer
         timeout = self._httpx.Timeout(10.0, read=None)
@@ -116,7 +116,7 @@ class Client:
             The content of the file.
         """
         body = {"answer": answer, **options}
-        content: bytes = self._send("POST", f"/export/{format}", json=body).content
+        content: bytes = self._send("POST", f"/export/{part(format)}", json=body).content
         return content
 
     def read_log(self, file: str | PathLike[str], **settings: Any) -> Json:
@@ -129,7 +129,7 @@ class Client:
         Returns:
             The log; its `id` stands for it in `identify`.
         """
-        query = {name: orjson.dumps(value).decode() for name, value in settings.items()}
+        query = {name: json_text(value) for name, value in settings.items()}
         headers = {"Content-Type": "text/csv"}
         return self._json(
             "POST", "/logs", params=query, content=Path(file).read_bytes(), headers=headers
@@ -154,7 +154,7 @@ class Client:
             The identification with its `state`, and its `result` or its `problem`.
         """
         while True:
-            found = self.get(f"/identifications/{id}")
+            found = self.get(f"/identifications/{part(id)}")
             if found["state"] not in PENDING:
                 return found
             time.sleep(period)
@@ -174,17 +174,15 @@ class Client:
 
     def load_robot(self, name: str) -> Json:
         """All parameters of a robot: `GET /robots/{name}`."""
-        return self.get(f"/robots/{name}")
+        return self.get(f"/robots/{part(name)}")
 
     def mjcf(self, name: str) -> str:
         """The MJCF of a robot, for MuJoCo: `GET /robots/{name}/mjcf`."""
-        text: str = self._send("GET", f"/robots/{name}/mjcf").text
-        return text
+        return self._text(f"/robots/{part(name)}/mjcf")
 
     def joint_limits(self, name: str, **query: Any) -> str:
         """The `joint_limits.yaml` of a robot: `GET /robots/{name}/joint_limits`."""
-        text: str = self._send("GET", f"/robots/{name}/joint_limits", params=query).text
-        return text
+        return self._text(f"/robots/{part(name)}/joint_limits", params=query)
 
     def robot_names(self) -> tuple[str, ...]:
         """Names of all robots: `GET /robots`."""
@@ -192,7 +190,7 @@ class Client:
 
     def load_tool(self, name: str) -> Json:
         """All figures of a tool: `GET /tools/{name}`."""
-        return self.get(f"/tools/{name}")
+        return self.get(f"/tools/{part(name)}")
 
     def tool_names(self) -> tuple[str, ...]:
         """Names of all tools: `GET /tools`."""
@@ -219,7 +217,7 @@ class Client:
 
     def job(self, id: str) -> Json:
         """A job and its first requests: `GET /jobs/{id}`."""
-        return self.get(f"/jobs/{id}")
+        return self.get(f"/jobs/{part(id)}")
 
     def wait_for_job(
         self, id: str, period: float = 1.0, tell: Callable[[Json], object] = lambda job: None
@@ -243,26 +241,26 @@ class Client:
 
     def job_results(self, id: str) -> Iterator[Json]:
         """The requests of a job that have ended, with their answers: `GET /jobs/{id}/results`."""
-        headers = {"Accept": "application/x-ndjson"}
-        for line in self._send("GET", f"/jobs/{id}/results", headers=headers).content.splitlines():
-            yield orjson.loads(line)
+        lines = {"Accept": "application/x-ndjson"}
+        answer = self._send("GET", f"/jobs/{part(id)}/results", headers=lines)
+        for line in answer.content.splitlines():
+            yield json_in(line, self._url)
 
     def job_table(self, id: str) -> str:
         """The figures of the ended requests of a job, as CSV: `GET /jobs/{id}/results`."""
-        text: str = self._send("GET", f"/jobs/{id}/results", headers={"Accept": "text/csv"}).text
-        return text
+        return self._text(f"/jobs/{part(id)}/results", headers={"Accept": "text/csv"})
 
     def cancel_job(self, id: str) -> Json:
         """Cancel what waits and stop what runs: `POST /jobs/{id}/cancel`."""
-        return self._json("POST", f"/jobs/{id}/cancel")
+        return self._json("POST", f"/jobs/{part(id)}/cancel")
 
     def retry_job(self, id: str) -> Json:
         """Let failed and cancelled requests wait again: `POST /jobs/{id}/retry`."""
-        return self._json("POST", f"/jobs/{id}/retry")
+        return self._json("POST", f"/jobs/{part(id)}/retry")
 
     def delete_job(self, id: str) -> None:
         """Delete a job with its answers: `DELETE /jobs/{id}`."""
-        self._send("DELETE", f"/jobs/{id}")
+        self._send("DELETE", f"/jobs/{part(id)}")
 
     def begin_study(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
         """Begin a study, such as `name="Lift", threshold=28`: `POST /studies`."""
@@ -274,12 +272,11 @@ class Client:
 
     def study(self, id: str) -> Json:
         """A study and its history: `GET /studies/{id}`."""
-        return self.get(f"/studies/{id}")
+        return self.get(f"/studies/{part(id)}")
 
     def study_table(self, id: str) -> str:
         """The history of a study as CSV: `GET /studies/{id}`."""
-        text: str = self._send("GET", f"/studies/{id}", headers={"Accept": "text/csv"}).text
-        return text
+        return self._text(f"/studies/{part(id)}", headers={"Accept": "text/csv"})
 
     def add_iteration(self, id: str, step: Mapping[str, Any]) -> Json:
         """Compute the next iteration of a study: `POST /studies/{id}/iterations`.
@@ -288,15 +285,15 @@ class Client:
             id: id of the study.
             step: one field, `optimize` or `evaluate`, with a body of that endpoint.
         """
-        return self._post(f"/studies/{id}/iterations", step, {})
+        return self._post(f"/studies/{part(id)}/iterations", step, {})
 
     def suggestions(self, id: str) -> Json:
         """Changes of a study's best motion that need less energy: `GET /studies/{id}/suggest`."""
-        return self.get(f"/studies/{id}/suggest")
+        return self.get(f"/studies/{part(id)}/suggest")
 
     def delete_study(self, id: str) -> None:
         """Delete a study with its iterations: `DELETE /studies/{id}`."""
-        self._send("DELETE", f"/studies/{id}")
+        self._send("DELETE", f"/studies/{part(id)}")
 
     def get(self, path: str, **query: Any) -> Json:
         """The JSON at any path of the service, such as that in the field `answer`."""
@@ -330,21 +327,24 @@ class Client:
         return self._json("POST", path, json={**(request or {}), **fields})
 
     def _json(self, method: str, path: str, **options: Any) -> Json:
-        content: Json = orjson.loads(self._send(method, path, **options).content)
-        return content
+        return json_in(self._send(method, path, **options).content, self._url)
+
+    def _text(self, path: str, **options: Any) -> str:
+        text: str = self._send("GET", path, **options).text
+        return text
 
     def _send(self, method: str, path: str, **options: Any) -> Any:
         """The response. Raises the error of a problem, and ServiceUnreachable."""
         headers = {**self._headers, **options.pop("headers", {})}
         if "json" in options:
-            options["content"] = orjson.dumps(
-                options.pop("json"), option=orjson.OPT_SERIALIZE_NUMPY
-            )
+            options["content"] = json_text(options.pop("json")).encode()
             headers["Content-Type"] = "application/json"
+        url = f"{self._url}/{path.removeprefix('/')}"
         try:
-            answer = self._http.request(method, self._url + path, headers=headers, **options)
-        except self._httpx.TransportError as error:
-            raise ServiceUnreachable(self._url, str(error) or type(error).__name__) from error
-        if answer.is_error:
+            answer = self._http.request(method, url, headers=headers, **options)
+        except (self._httpx.RequestError, self._httpx.InvalidURL) as error:
+            reason = str(error).rstrip(".") or type(error).__name__
+            raise ServiceUnreachable(self._url, reason) from error
+        if not answer.is_success:
             raise error_in(answer, self._url)
         return answer

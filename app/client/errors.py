@@ -42,11 +42,23 @@ def error_in(answer: Any, url: str) -> DeclaredError:
         The error of the problem document, or `ServiceUnreachable` if the body is none.
     """
     try:
-        document = orjson.loads(answer.content)
-        return error_of(document)
-    except (orjson.JSONDecodeError, KeyError, TypeError, AttributeError):
-        reason = f"it answers {answer.status_code}, but not as joulepath does"
+        return error_of(json_in(answer.content, url))
+    except (ServiceUnreachable, KeyError, AttributeError):
+        where = answer.headers.get("location")
+        told = f" and refers to {where}" if where else ""
+        reason = f"it answers {answer.status_code}{told}, but not as joulepath does"
         return ServiceUnreachable(url, reason)
+
+
+def json_in(content: bytes, url: str) -> Json:
+    """The JSON object of a successful answer. Raises ServiceUnreachable if it is none."""
+    try:
+        found = orjson.loads(content)
+    except orjson.JSONDecodeError:
+        found = None
+    if not isinstance(found, dict):
+        raise ServiceUnreachable(url, "another program answers, without a JSON object")
+    return found
 
 
 def error_of(document: Json) -> DeclaredError:

@@ -120,8 +120,10 @@ def test_a_job_from_begin_to_end(service: joulepath.Client) -> None:
     assert caught.value.slug() == "unknown-job"
 
 
-def answering(status: int, content: bytes) -> joulepath.Client:
-    transport = httpx2.MockTransport(lambda _: httpx2.Response(status, content=content))
+def answering(status: int, content: bytes, **headers: str) -> joulepath.Client:
+    transport = httpx2.MockTransport(
+        lambda _: httpx2.Response(status, content=content, headers=headers)
+    )
     return joulepath.Client("http://other", http=httpx2.Client(transport=transport))
 
 
@@ -131,7 +133,42 @@ def test_another_server_is_no_service(content: bytes) -> None:
         answering(502, content).optimize(move())
 
 
+@pytest.mark.parametrize("content", [b"<html>Log in</html>", b"[]", b""])
+def test_another_server_that_answers_is_no_service(content: bytes) -> None:
+    """A page of a proxy, and a redirection, which is not followed with the key."""
+    other = answering(200, content)
+    with pytest.raises(joulepath.ServiceUnreachable, match="another program"):
+        other.optimize(move())
+    with pytest.raises(joulepath.ServiceUnreachable, match="refers to https://other"):
+        answering(301, content, location="https://other").mjcf("ur5e")
+
+
+def test_arrays_of_any_layout_are_sent(service: joulepath.Client) -> None:
+    rows = np.array([HOME, HOME, NEAR, NEAR])
+    for each in (rows[::3], np.asfortranarray(rows[::3])):
+        found = service.evaluate(configurations=each, time_per_segment=np.float32(1.5))
+        assert found["duration"] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("value", [float("nan"), np.array(np.inf), {1}, object(), 2**70])
+def test_what_json_has_not_is_refused(service: joulepath.Client, value: object) -> None:
+    """NaN is not sent as null, which would leave the field out."""
+    with pytest.raises(joulepath.InvalidRequest) as caught:
+        service.optimize(move(), duration=value)
+    assert caught.value.errors[0]["loc"] in (["body", "duration"], ["body"])
+
+
+def test_a_name_leads_to_no_other_path(service: joulepath.Client) -> None:
+    for name in ("../jobs", "..", ".", "ur5e/urdf", "ur5e?", "ur5e#", ""):
+        with pytest.raises((joulepath.ServiceError, joulepath.UnknownRobot)):
+            service.load_robot(name)
+    assert service.get("robots")["robots"]
+
+
 def test_nobody_answers() -> None:
+    for url in ("ftp://a", "127.0.0.1:1", "http://a:b"):
+        with pytest.raises(joulepath.ServiceUnreachable, match=url):
+            joulepath.Client(url).optimize(move())
     with (
         joulepath.Client("http://127.0.0.1:1") as client,
         pytest.raises(joulepath.ServiceUnreachable, match=r"http://127\.0\.0\.1:1"),
@@ -147,9 +184,16 @@ def test_the_key_goes_along() -> None:
         return httpx2.Response(200, json={"jobs": [], "next": None})
 
     http = httpx2.Client(transport=httpx2.MockTransport(answer))
-    for key in ("secret", None):
+    for key in ("secret", "secret\n", None, ""):
         assert [*joulepath.Client("http://service/", key, http=http).jobs()] == []
-    assert seen == ["Bearer secret", None]
+    assert seen == ["Bearer secret", "Bearer secret", None, None]
+
+
+@pytest.mark.parametrize("key", ["sec\nret", "sécret"])
+def test_an_error_does_not_repeat_the_key(key: str) -> None:
+    with pytest.raises(joulepath.ServiceError, match="not valid") as caught:
+        joulepath.Client("http://service", key)
+    assert caught.value.slug() == "unauthenticated" and key not in str(caught.value)
 
 
 def test_all_pages_of_jobs() -> None:
