@@ -17,6 +17,8 @@ from joulepath.app.answers.envelope import AnswerFigures
 
 _HEAD = re.compile(rb'\{"request":"([^"]*)","id":(?:null|"([^"]*)")')
 """The first fields of an answer: the id of its request, and its own. No id has a quotation mark."""
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""Beginnings of the texts that spreadsheets compute."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,14 @@ def json_document(content: Any) -> bytes:
 
 
 def csv_document(rows: Iterable[Iterable[Any]]) -> bytes:
-    """Rows as CSV, the head included; None is an empty cell."""
+    """Rows as CSV, the head included; None is an empty cell.
+
+    Texts that a spreadsheet would compute, such as `=1+1`, begin with an apostrophe.
+    """
     text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows(map(_inert, row) for row in rows)
     return text.getvalue().encode()
+
+
+def _inert(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell

@@ -9,6 +9,8 @@ from collections.abc import Callable
 JOULES_PER_KWH = 3.6e6
 SPACE = "\u00a0"
 """A no-break space."""
+_PLAIN = (-5, 9)
+"""Powers of ten of numbers that are written in full; others would not fit into a column."""
 _UNIT = re.compile(r"(?<=\d) (?=(?:J|s|h|W|mm|kg|kWh|%)(?!\w))")
 _ROUNDINGS: dict[str, Callable[[float], int]] = {
     "nearest": round,
@@ -55,6 +57,10 @@ def unbroken(text: str) -> str:
 def _written(value: float, count: int, rounding: Callable[[float], int]) -> str:
     if value == 0 or not math.isfinite(value):
         return "0" if value == 0 else "–"
-    places = max(count - 1 - math.floor(math.log10(abs(value))), 0)
+    power = math.floor(math.log10(abs(value)))
+    if not _PLAIN[0] <= power < _PLAIN[1]:
+        mantissa = rounding(value / 10.0 ** (power + 1 - count)) * 10.0 ** (1 - count)
+        return f"{mantissa:.{count - 1}f}e{power}".replace("-", "−")
+    places = max(count - 1 - power, 0)
     found = rounding(value * 10**places) / 10**places
     return f"{found:,.{places}f}".replace("-", "−")

@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.api.advice.request import AdviceName, AnsweredRequest
 from joulepath.app.api.placement.request import CYCLE, PlacementRequest
-from joulepath.app.schemas.common import NO_CONTROLS, Request, described
+from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import JOB_ID, LOG_ID
 from joulepath.app.schemas.lengths import LENGTHS
@@ -19,7 +19,8 @@ MOST_ROWS = 2000
 JOB_DEADLINE = 60.0
 """Wall time of the report of a job or a log [s]."""
 
-Text = Annotated[str, Field(min_length=1, max_length=120, pattern=NO_CONTROLS)]
+Text = Annotated[str, Field(min_length=1, max_length=120, pattern=NO_CONTROLS), PLAIN]
+Currency = Annotated[str, Field(min_length=1, max_length=12, pattern=NO_CONTROLS), PLAIN]
 Format = Literal["html", "pdf"]
 Kind = Literal["optimize", "cycle", "job", "evaluate", "placement"]
 
@@ -62,7 +63,7 @@ class Costs(Request):
         {"value": 0.2, "source": "contract of 2026"},
         default=None,
     )
-    currency: Text = described("Currency of the price.", None, "€", default="€")
+    currency: Currency = described("Currency of the price.", None, "€", default="€")
     carbon: Sourced | None = described(
         "Mass of CO₂e per kilowatt-hour [kg]. Null: no CO₂e.",
         None,

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 from starlette.testclient import TestClient
 
+from joulepath.app.api.report.build import report_of
 from joulepath.app.api.report.bundle import Bundle, NoReport, attached_to, in_html
 from joulepath.app.api.report.check import checked
 from joulepath.app.api.report.numbers import amount, digits, down, percent, up
+from joulepath.app.api.report.pdf import pdf
 from tests.app.live import ROOT
 from tests.app.requests import HOME, NEAR, move
 
@@ -144,6 +151,29 @@ def test_a_pdf_has_the_same_documents(client: TestClient) -> None:
     assert checked(file, again=False, request_id="test").agrees
 
 
+def test_long_names_and_amounts_stay_on_the_page(
+    html: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As pictures, the pages of the PDF have white margins."""
+    typst = pytest.importorskip("typst")
+    compiled, sides, edge = typst.compile, list[bytes](), 13 / 210
+
+    def pictures(file: Path, **options: Any) -> bytes:
+        pages = compiled(file, **options | {"format": "png", "ppi": 40})
+        sides.extend(pages if isinstance(pages, list) else [pages])
+        return b""
+
+    monkeypatch.setattr(typst, "compile", pictures)
+    huge = {"value": 1e12, "source": "W" * 120, "letter": "Y"}
+    costs = {"price": huge, "carbon": huge, "shifts_per_year": huge, "cycles_per_shift": huge}
+    bundle = replace(attached_to(html), title="W" * 120, costs=COSTS | costs)
+    pdf(report_of(bundle), bundle)
+    for page in sides:
+        shown = np.asarray(Image.open(io.BytesIO(page)).convert("L"))
+        margin = int(edge * shown.shape[1])
+        assert shown[:, :margin].min() == shown[:, -margin:].min() == 255
+
+
 @pytest.mark.long
 def test_where_nothing_keeps_every_limit_no_saving_is_claimed(client: TestClient) -> None:
     # nearly as fast as any motion can be: ways with rests are too slow, the others break the limit
@@ -175,7 +205,14 @@ def test_a_way_that_needs_less_in_its_own_time_is_told(client: TestClient) -> No
 
 
 @pytest.mark.parametrize(
-    "body", [{}, {"optimize": move(), "cycle": CYCLE}, {"optimize": move(), "format": "doc"}]
+    "body",
+    [
+        {},
+        {"optimize": move(), "cycle": CYCLE},
+        {"optimize": move(), "format": "doc"},
+        {"optimize": move(), "title": "turned \u202e round"},
+        {"optimize": move(), "costs": {"currency": "pounds sterling"}},
+    ],
 )
 def test_other_bodies_are_refused(recorded: TestClient, body: Json) -> None:
     assert recorded.post("/report", json=body).status_code == 422
@@ -190,6 +227,7 @@ def test_a_file_without_documents_is_no_report(html: bytes) -> None:
 def test_numbers_are_rounded_to_the_safe_side() -> None:
     assert (digits(755.7), down(697.96), up(58.11), up(5.861)) == ("756", "697", "58.2", "5.87")
     assert (digits(1239.4), digits(0.0420), digits(-18.4)) == ("1,239", "0.0420", "−18.4")
+    assert (digits(4.026e16), down(2.019e-10), digits(-1e-7)) == ("4.03e16", "2.01e−10", "−1.00e−7")
     assert (percent(0.0482), percent(0.0769, "up")) == ("4.8\u00a0%", "7.7\u00a0%")
 
 
