@@ -33,7 +33,8 @@ def connect(context: click.Context, url: str, key: str | None) -> None:
     from joulepath.app.client.client import Client
 
     try:
-        context.obj = context.with_resource(Client(url, key))
+        with answered():
+            context.obj = context.with_resource(Client(url, key))
     except ModuleNotFoundError as error:
         raise click.UsageError(str(error)) from None
 

@@ -67,3 +67,9 @@ def test_no_service(here: Here) -> None:
     code, out, err = here.run("jobs", "--url", "http://127.0.0.1:1", "show", UNKNOWN)
     assert (code, out) == (1, b"")
     assert json.loads(err)["title"] == "Service unreachable"
+
+
+def test_a_key_that_cannot_be_sent_is_a_problem(here: Here) -> None:
+    for command in ("jobs", "studies"):
+        code, problem = here.problem(command, "--key", "k\u00e9y")
+        assert (code, problem["type"]) == (1, "/problems/unauthenticated")
