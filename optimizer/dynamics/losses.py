@@ -202,3 +202,9 @@ def _storage_use(flows: BusFlow) -> StorageUse:
 def relative_error(energy: float, reference: float) -> float:
     """|energy - reference| / |reference| of two energies [J]."""
     return abs(energy - reference) / max(abs(reference), ENERGY_FLOOR)
+
+
+def share_of(value: float, energy: float) -> float | None:
+    """A value over the amount of an energy [J]; None if that is below `ENERGY_FLOOR`, as of an arm
+    at rest without idle power. Energies may be negative, as of a bus that takes energy back."""
+    return value / abs(energy) if abs(energy) > ENERGY_FLOOR else None

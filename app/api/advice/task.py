@@ -25,6 +25,7 @@ from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import Joules, Ratio, Seconds
 from joulepath.optimizer.dynamics.dwell import holding_power
+from joulepath.optimizer.dynamics.losses import share_of
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeclaredError
 
@@ -52,7 +53,7 @@ class AdvisedChange:
     saving: Joules = field(init=False)
     """`instead_of` - `energy`."""
     share: Ratio = field(init=False)
-    """Saving / `instead_of`."""
+    """Saving / amount of `instead_of`; 0 if that is 0."""
     duration: Seconds
     """Duration of the changed motion or cycle."""
     request: dict[str, Any] | None
@@ -60,7 +61,7 @@ class AdvisedChange:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "saving", self.instead_of - self.energy)
-        object.__setattr__(self, "share", self.saving / self.instead_of)
+        object.__setattr__(self, "share", share_of(self.saving, self.instead_of) or 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -108,7 +108,7 @@ def _sentence(names: list[str]) -> str:
 
 def interval_note(interval: dict[str, Any] | None) -> str:
     """Main sources of the interval: the fewest sources with nearly all of its width."""
-    if interval is None:
+    if interval is None or not interval["shares"]:
         return ""
     made, names = 0.0, list[str]()
     for name, share in sorted(interval["shares"].items(), key=lambda each: -each[1]):

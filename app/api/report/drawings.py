@@ -9,6 +9,7 @@ from typing import Any, Self
 from xml.sax.saxutils import escape
 
 from joulepath.app.api.report.numbers import digits
+from joulepath.optimizer.dynamics.losses import ENERGY_FLOOR
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def drawn_bars(bars: Sequence[Bar]) -> str:
         return ""
     low, high = DRAWING.legs + 30.0, 10.0
     known = [value for bar in bars for value in (bar.energy, bar.dot, *(bar.ends or ()))]
-    most: float = max(value for value in known if value is not None)
+    most: float = max(ENERGY_FLOOR, *(value for value in known if value is not None))
     step = (DRAWING.width - DRAWING.left - DRAWING.right) / len(bars)
 
     def y(energy: float) -> float:
@@ -182,7 +183,7 @@ def _x(course: Course, t: float) -> float:
 def _legs(course: Course) -> Iterator[str]:
     """Legs with their joules: width by time, height by mean power."""
     mean = [leg.energy / leg.duration for leg in course.legs]
-    most, low, high = max(mean), DRAWING.legs - 18.0, 34.0
+    most, low, high = max(1.0, *mean), DRAWING.legs - 18.0, 34.0
     yield from _grid([(0.0, low), (_round_below(most), low - (low - high) * _of(most))])
     for leg, power in zip(course.legs, mean, strict=True):
         left, right = _x(course, leg.t0), _x(course, leg.t0 + leg.duration)

@@ -9,7 +9,7 @@ from joulepath.app.api.report.bundle import COMPUTED, Bundle
 from joulepath.app.api.report.costs import Money, cost_table, costs_note, facts
 from joulepath.app.api.report.drawings import Bar, drawn_bars
 from joulepath.app.api.report.job_rows import answered, rivals_of
-from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
+from joulepath.app.api.report.numbers import counted, digits, down, percent, share, unbroken, up
 from joulepath.app.api.report.programs import program_of_motion
 from joulepath.app.api.report.report import Report, Rival, Table
 from joulepath.app.api.report.rivals import (
@@ -20,6 +20,7 @@ from joulepath.app.api.report.rivals import (
     parts_of,
     rival_name,
     saved,
+    their_energy,
 )
 from joulepath.app.convert.given_answer import arm_of
 from joulepath.optimizer.exceptions import InvalidProblem
@@ -77,6 +78,10 @@ def _joules(row: Json) -> float:
     return float(row["answer"]["energy"]["electrical"]["total"])
 
 
+def _moves(count: int) -> str:
+    return counted(count, "move")
+
+
 def _name(row: Json) -> str:
     name: str = row["name"] or f"no. {row['index'] + 1}"
     return name
@@ -86,15 +91,15 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     rows, answer = answered(bundle.moves), bundle.answer
     total = answer["energy"]["electrical"]["total"]
     first = (
-        f"{len(rows):,} moves need *{digits(total)} J* together, in {digits(answer['duration'])} s "
-        "of motion"
+        f"{_moves(len(rows))} need{'s' if len(rows) == 1 else ''} *{digits(total)} J* together, "
+        f"in {digits(answer['duration'])} s of motion"
     )
     count, theirs, ours = rivals_of(rows).get("nearest", (0, 0.0, 0.0))
     claim = (
         ". No usual way is known that keeps every limit: no saving is claimed."
         if not count
-        else f". In the {count:,} moves in which a usual way keeps every limit, the answers need "
-        f"{_against(1 - ours / theirs)} the nearest such way of each, in the same time."
+        else f". In the {_moves(count)} in which a usual way keeps every limit, the answers need "
+        f"{_against(share(theirs - ours, theirs))} the nearest such way of each, in the same time."
     )
     left = [row for row in bundle.moves if row["answer"] is None]
     have = "has" if len(left) == 1 else "have"
@@ -112,11 +117,11 @@ def _against(saving: float) -> str:
 def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
     found = rivals_of(bundle.moves)
     total = bundle.answer["energy"]["electrical"]["total"]
-    ratios = {name: theirs / ours for name, (_, theirs, ours) in found.items()}
+    ratios = {name: share(theirs, ours) for name, (_, theirs, ours) in found.items()}
     most = max([1.0, *ratios.values()])
     own = Rival(
         "These answers",
-        f"{len(answered(bundle.moves)):,} moves",
+        _moves(len(answered(bundle.moves))),
         f"{digits(total)} J",
         1 / most,
         "",
@@ -128,12 +133,12 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
         *(
             Rival(
                 _NEAREST if name == "nearest" else rival_name({"name": name}),
-                f"{count:,} moves",
+                _moves(count),
                 f"{digits(theirs)} J",
-                ratios[name] / most,
-                saved(1 - ours / theirs),
+                max(ratios[name], 0.0) / most,
+                saved(share(theirs - ours, theirs)),
                 True,
-                saves=1 - ours / theirs >= EQUAL,
+                saves=share(theirs - ours, theirs) >= EQUAL,
             )
             for name, (count, theirs, ours) in sorted(
                 found.items(), key=lambda each: (each[0] != "nearest", -each[1][0])
@@ -155,7 +160,8 @@ def _proven(rows: list[Json]) -> str:
         for each, row in zip(certificates, rows, strict=True)
         if each.get("clearance") is not None
     ]
-    sentences = [f"Every limit is kept in all {len(rows):,} moves: {limits_used(worst)} at most."]
+    every = f"all {_moves(len(rows))}" if len(rows) > 1 else "the move"
+    sentences = [f"Every limit is kept in {every}: {limits_used(worst)} at most."]
     if checked:
         least, row = min(checked, key=lambda each: float(each[0]))
         sentences.append(
@@ -163,7 +169,8 @@ def _proven(rows: list[Json]) -> str:
             f"{_name(row)}, proven between the samples too."
         )
     if len(checked) < len(rows):
-        sentences.append(f"Collisions were not checked in {len(rows) - len(checked):,} moves.")
+        unchecked = _moves(len(rows) - len(checked))
+        sentences.append(f"Collisions were not checked in {unchecked}.")
     error = max(each["energy_error"] for each in certificates)
     sentences.append(
         "A second program, which shares nothing with the solver but the motion, finds the same "
@@ -200,7 +207,7 @@ def _cells(row: Json) -> tuple[str, ...]:
         digits(answer["duration"]),
         digits(electrical["total"]),
         "" if known is None else f"{down(known['p5'])} to {up(known['p95'])}",
-        "–" if nearest is None or ours is None else digits(ours / (1 - nearest["saving"])),
+        "–" if nearest is None or ours is None else digits(their_energy(ours, nearest["saving"])),
         "–" if nearest is None else percent(nearest["saving"]),
         down(answer["energy"]["lower_bound"]),
     )

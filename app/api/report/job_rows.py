@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from joulepath.app.api.report.rivals import nearest_rival
+from joulepath.app.api.report.rivals import nearest_rival, their_energy
 
 Json = dict[str, Any]
 _LEFT_OUT = frozenset({"candidates", "limits", "branch", "unreachable", "solver"})
@@ -94,5 +94,5 @@ def rivals_of(rows: Sequence[Json]) -> dict[str, tuple[int, float, float]]:
         for name, each in named if nearest is None else [*named, ("nearest", nearest)]:
             count, theirs, own = found.get(name, (0, 0.0, 0.0))
             # at the same time, the shorter of both waits
-            found[name] = (count + 1, theirs + ours / (1 - each["saving"]), own + ours)
+            found[name] = (count + 1, theirs + their_energy(ours, each["saving"]), own + ours)
     return found

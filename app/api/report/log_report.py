@@ -7,10 +7,11 @@ from typing import Any
 from joulepath.app.api.report.assumptions import assumptions, interval_note
 from joulepath.app.api.report.bundle import Bundle
 from joulepath.app.api.report.drawings import Bar, drawn_bars
-from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
+from joulepath.app.api.report.numbers import digits, down, percent, share, unbroken, up
 from joulepath.app.api.report.report import Fact, Report, Rival, Table
 from joulepath.app.api.report.rivals import listed, parts_of
 from joulepath.app.convert.given_answer import arm_of
+from joulepath.optimizer.dynamics.losses import ENERGY_FLOOR
 
 Json = dict[str, Any]
 _BY = {"electrical": "power", "by_efforts": "currents or torques"}
@@ -125,14 +126,15 @@ def _facts(answer: Json) -> tuple[Fact, ...]:
 def _bars(total: Json) -> tuple[Rival, ...]:
     known, predicted = total["measured"] or {}, total["energy"]["electrical"]["total"]
     shown = [(f"Measured by {_BY[by]}", value) for by, value in known.items() if value is not None]
-    most = max([predicted, *(value for _, value in shown)])
-    return (
-        Rival("Predicted", "", f"{digits(predicted)} J", predicted / most, "", True, ours=True),
-        *(
-            Rival(name, "", f"{digits(value)} J", value / most, _more(value / predicted - 1), True)
-            for name, value in shown
-        ),
+    most = max([ENERGY_FLOOR, predicted, *(value for _, value in shown)])
+
+    def rival(name: str, value: float, more: str, ours: bool = False) -> Rival:
+        return Rival(name, "", f"{digits(value)} J", max(value, 0.0) / most, more, True, ours=ours)
+
+    measured = (
+        rival(name, value, _more(share(value - predicted, predicted))) for name, value in shown
     )
+    return rival("Predicted", predicted, "", ours=True), *measured
 
 
 def _bar(number: int, part: Json) -> Bar:

@@ -17,7 +17,7 @@ from joulepath.app.api.report.costs import (
     waiting,
 )
 from joulepath.app.api.report.drawings import Course, Leg, Stop, drawn
-from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
+from joulepath.app.api.report.numbers import counted, digits, down, percent, share, unbroken, up
 from joulepath.app.api.report.report import Report, Rival
 from joulepath.app.api.report.rivals import (
     EQUAL,
@@ -27,7 +27,9 @@ from joulepath.app.api.report.rivals import (
     parts_of,
     rival_name,
     saved,
+    their_energy,
 )
+from joulepath.optimizer.dynamics.losses import ENERGY_FLOOR
 from joulepath.optimizer.export.program import Program
 from joulepath.optimizer.picture.cell_picture import cell_picture, stops_of
 
@@ -89,7 +91,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
     answer = bundle.answer
     objective, word = answer["objective"], bundle.what
     total, bound = answer["energy"][objective]["total"], answer["energy"]["lower_bound"]
-    stops = f" of {len(answer['order'])} stops" if bundle.kind == "cycle" else ""
+    stops = f" of {counted(len(answer['order']), 'stop')}" if bundle.kind == "cycle" else ""
     kind = "" if objective == "electrical" else " of mechanical work"
     length = cycle_time(bundle)
     waits = length > answer["duration"] and objective == "electrical"
@@ -128,8 +130,9 @@ def _saved(answer: dict[str, Any], rival: dict[str, Any]) -> float:
     """Saving over a rival [J], in the time of the longer motion."""
     objective, saving = answer["objective"], float(rival["saving"])
     if rival["duration"] > answer["duration"]:
-        return saving * float(rival[objective])
-    return float(answer["energy"][objective]["total"]) * saving / (1 - saving)
+        return saving * abs(float(rival[objective]))
+    ours = float(answer["energy"][objective]["total"])
+    return their_energy(ours, saving) - ours
 
 
 def _share(answer: dict[str, Any], rival: dict[str, Any], held: float) -> float:
@@ -137,7 +140,7 @@ def _share(answer: dict[str, Any], rival: dict[str, Any], held: float) -> float:
     if not held:
         return float(rival["saving"])
     saved = _saved(answer, rival)
-    return saved / (float(answer["energy"][answer["objective"]]["total"]) + held + saved)
+    return share(saved, float(answer["energy"][answer["objective"]]["total"]) + held + saved)
 
 
 def _yearly(bundle: Bundle, rival: dict[str, Any]) -> str:
@@ -159,13 +162,13 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
     objective = answer["objective"]
     total = answer["energy"][objective]["total"]
     table = sorted(answer["baselines"], key=lambda each: (each["saving"] is None, each[objective]))
-    most = max(total, *(each[objective] for each in table)) if table else total
+    most = max(total, *(each[objective] for each in table), ENERGY_FLOOR)
     return (
         Rival(
             f"This {bundle.what}",
             f"{digits(answer['duration'])} s",
             f"{digits(total)} J",
-            total / most,
+            max(total / most, 0.0),
             "",
             True,
             ours=True,

@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Callable
 
+from joulepath.optimizer.dynamics.losses import share_of
+
 JOULES_PER_KWH = 3.6e6
 SPACE = "\u00a0"
 """A no-break space."""
@@ -49,6 +51,16 @@ def percent(share: float, rounding: str = "nearest") -> str:
     return f"{whole / 10:.1f}{SPACE}%".replace("-", "−")
 
 
+def share(value: float, energy: float) -> float:
+    """A value over the amount of an energy [J]; 0 where there is none."""
+    return share_of(value, energy) or 0.0
+
+
+def counted(count: int, thing: str) -> str:
+    """A number of things, in words."""
+    return f"{count:,} {thing}{'' if count == 1 else 's'}"
+
+
 def unbroken(text: str) -> str:
     """The text with no-break spaces between numbers and units."""
     return _UNIT.sub(SPACE, text)
@@ -59,8 +71,10 @@ def _written(value: float, count: int, rounding: Callable[[float], int]) -> str:
         return "0" if value == 0 else "–"
     power = math.floor(math.log10(abs(value)))
     if not _PLAIN[0] <= power < _PLAIN[1]:
-        mantissa = rounding(value / 10.0 ** (power + 1 - count)) * 10.0 ** (1 - count)
-        return f"{mantissa:.{count - 1}f}e{power}".replace("-", "−")
+        # the digits of a whole number are exact, also where they round up to the next power
+        whole = f"{rounding(value / 10.0 ** (power + 1 - count)):.{count - 1}e}"
+        mantissa, more = whole.split("e")
+        return f"{mantissa}e{power + 1 - count + int(more)}".replace("-", "−")
     places = max(count - 1 - power, 0)
     found = rounding(value * 10**places) / 10**places
     return f"{found:,.{places}f}".replace("-", "−")

@@ -16,7 +16,7 @@ from joulepath.app.api.report.drawings import Bar, drawn, drawn_bars
 from joulepath.app.api.report.job_rows import summed
 from joulepath.app.api.report.map_drawing import REASONS, drawn_map
 from joulepath.app.api.report.motion_report import course_of, proven
-from joulepath.app.api.report.numbers import digits, down, percent, unbroken, up
+from joulepath.app.api.report.numbers import digits, down, percent, share, unbroken, up
 from joulepath.app.api.report.placed import of_cycle, rows_at
 from joulepath.app.api.report.programs import program_of
 from joulepath.app.api.report.report import Fact, Report, Rival, Table
@@ -160,7 +160,7 @@ def _rivals(answer: Json) -> tuple[Rival, ...]:
             "The best place",
             f"{digits(best['duration'])} s",
             f"{digits(best['energy'])} J",
-            best["energy"] / dearest,
+            max(share(best["energy"], dearest), 0.0),
             "",
             True,
             ours=True,
@@ -170,8 +170,8 @@ def _rivals(answer: Json) -> tuple[Rival, ...]:
                 name,
                 time.get(name) or "",
                 f"{digits(energy)} J",
-                energy / dearest,
-                saved(1 - best["energy"] / energy),
+                max(share(energy, dearest), 0.0),
+                saved(share(energy - best["energy"], energy)),
                 True,
                 saves=best["energy"] < energy,
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from joulepath.app.api.report.numbers import digits, down, percent
+from joulepath.app.api.report.numbers import digits, down, percent, share
 from joulepath.app.api.report.report import Part
 
 _PARTS = {
@@ -78,6 +78,12 @@ def nearest_rival(answer: Mapping[str, Any], period: float | None = None) -> dic
     return min(found, key=lambda each: float(each["saving"]), default=None)
 
 
+def their_energy(ours: float, saving: float) -> float:
+    """The energy of a rival [J], of which an answer saves this share of its amount."""
+    left = 1 + saving if ours < 0 and saving <= 1 else 1 - saving
+    return ours / left if left else 0.0
+
+
 def saved(saving: float) -> str:
     """A saving in words."""
     if abs(saving) < EQUAL:
@@ -99,18 +105,18 @@ def parts_of(electrical: Mapping[str, Any]) -> tuple[Part, ...]:
     """The parts of an electrical energy, largest first."""
     total = electrical["total"]
     known = {name: float(electrical.get(name) or 0.0) for name in _PARTS}
-    shown = {name: value for name, value in known.items() if abs(value) >= _LEAST_PART * abs(total)}
+    shown = {name: value for name, value in known.items() if abs(value) > _LEAST_PART * abs(total)}
     rest = total - sum(shown.values())
     rows = sorted(shown.items(), key=lambda each: -each[1])
     parts = [Part(*_PARTS[name], *_in_joules(value, total)) for name, value in rows]
-    if abs(rest) >= _LEAST_PART * abs(total):
+    if abs(rest) > _LEAST_PART * abs(total):
         parts.append(Part("Other", "#e2e7ec", *_in_joules(rest, total)))
     return tuple(parts)
 
 
 def _in_joules(value: float, total: float) -> tuple[str, str]:
     written = digits(value, 2 if abs(value) < 10 else 3)
-    return f"{written} J", f"{value / total:.0%}".replace("%", " %").replace("-", "−")
+    return f"{written} J", f"{share(value, total):.0%}".replace("%", " %").replace("-", "−")
 
 
 def limits_used(worst_ratio: Mapping[str, float | None]) -> str:

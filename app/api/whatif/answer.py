@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Protocol, Self
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.optimizer.declared import Joules, NotEmpty, Ratio, Seconds, Watts
-from joulepath.optimizer.dynamics.losses import ENERGY_FLOOR
+from joulepath.optimizer.dynamics.losses import share_of
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import ElectricalEnergy, Energy, Objective
 
@@ -43,7 +43,7 @@ class Difference:
     def of(cls, base: float, value: float) -> Self:
         """Difference of a value from the base value."""
         difference = value - base
-        return cls(value, difference, difference / abs(base) if abs(base) > ENERGY_FLOOR else None)
+        return cls(value, difference, share_of(difference, base))
 
 
 @dataclass(frozen=True)

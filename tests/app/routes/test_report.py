@@ -17,8 +17,11 @@ from starlette.testclient import TestClient
 from joulepath.app.api.report.build import report_of
 from joulepath.app.api.report.bundle import Bundle, NoReport, attached_to, in_html
 from joulepath.app.api.report.check import checked
-from joulepath.app.api.report.numbers import amount, digits, down, percent, up
+from joulepath.app.api.report.numbers import amount, counted, digits, down, percent, up
 from joulepath.app.api.report.pdf import pdf
+from joulepath.app.api.report.rivals import their_energy
+from joulepath.app.schemas.examples.own_arm import ARM
+from joulepath.optimizer.search.baselines import saving
 from tests.app.live import ROOT
 from tests.app.requests import HOME, NEAR, move
 
@@ -204,6 +207,25 @@ def test_a_way_that_needs_less_in_its_own_time_is_told(client: TestClient) -> No
     assert f"{percent(cycle / theirs - 1)} more than a usual way" in waiting.decode()
 
 
+@pytest.mark.parametrize(("regeneration", "goal", "sign"), [(0.0, 0.0, 0), (1.0, 1.2, -1)])
+def test_a_motion_without_energy_or_that_gives_some(
+    client: TestClient, regeneration: float, goal: float, sign: int
+) -> None:
+    """At rest without idle power; and downwards, into a bus that takes energy back."""
+    arm = ARM | {"electronics": {"idle_power": 0.0, "regeneration": regeneration}}
+    free = {"rotor_inertia": 1e-3, "coulomb": 0.0, "viscous": 0.0, "copper": 1e-3}
+    assert client.put("/robots/free", json=arm | {"drives": free}).status_code in (200, 201)
+    body = {"robot": "free", "start": {"q": [0.0, 0.0]}, "goal": {"q": [goal, 0.0]}}
+    bundle = attached_to(reported(client, optimize=body, period=4.0))
+    assert np.sign(bundle.answer["energy"]["electrical"]["total"]) == sign
+    assert client.delete("/robots/free").status_code == 204
+
+
+def test_energies_of_others_follow_from_savings() -> None:
+    for ours, theirs in ((80.0, 100.0), (-5.0, 3.0), (-5.0, -4.0), (-3.0, -4.0), (0.0, 0.0)):
+        assert their_energy(ours, saving(ours, theirs)) == pytest.approx(theirs)
+
+
 @pytest.mark.parametrize(
     "body",
     [
@@ -228,6 +250,8 @@ def test_numbers_are_rounded_to_the_safe_side() -> None:
     assert (digits(755.7), down(697.96), up(58.11), up(5.861)) == ("756", "697", "58.2", "5.87")
     assert (digits(1239.4), digits(0.0420), digits(-18.4)) == ("1,239", "0.0420", "−18.4")
     assert (digits(4.026e16), down(2.019e-10), digits(-1e-7)) == ("4.03e16", "2.01e−10", "−1.00e−7")
+    assert (up(9.5e-9, 1), digits(9.9996e20)) == ("1e−8", "1.00e21")
+    assert (counted(1, "move"), counted(1200, "stop")) == ("1 move", "1,200 stops")
     assert (percent(0.0482), percent(0.0769, "up")) == ("4.8\u00a0%", "7.7\u00a0%")
 
 
