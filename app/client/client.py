@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -10,12 +9,8 @@ from typing import Any, Self
 
 from joulepath.app.client.encoding import json_text, key_header, part
 from joulepath.app.client.errors import Json, ServiceUnreachable, error_in, json_in
+from joulepath.app.client.waiting import ended
 from joulepath.optimizer.presentation.extras import required
-
-PENDING = ("queued", "running")
-"""States of an identification that has not ended."""
-ENDED = ("done", "cancelled")
-"""States of a job whose requests have all ended."""
 
 
 class Client:
@@ -143,21 +138,20 @@ class Client:
         """
         return self._post("/identifications", request, fields)
 
-    def wait_for_identification(self, id: str, period: float = 1.0) -> Json:
-        """Wait until an identification has ended: `GET /identifications/{id}`.
+    def wait_for_identification(
+        self, id: str, period: float = 1.0, patience: float = 300.0
+    ) -> Json:
+        """Wait until an identification has ended, as `wait_for_job` does.
 
         Args:
             id: id of the identification.
             period: time between two looks [s].
+            patience: longest time without an answer of the service, once there was one [s].
 
         Returns:
             The identification with its `state`, and its `result` or its `problem`.
         """
-        while True:
-            found = self.get(f"/identifications/{part(id)}")
-            if found["state"] not in PENDING:
-                return found
-            time.sleep(period)
+        return ended(lambda: self.get(f"/identifications/{part(id)}"), period, patience)
 
     def advice(self, request: Mapping[str, Any] | None = None, /, **fields: Any) -> Json:
         """Find changes of a motion or a cycle that need less energy: `POST /advice`."""
@@ -220,24 +214,30 @@ class Client:
         return self.get(f"/jobs/{part(id)}")
 
     def wait_for_job(
-        self, id: str, period: float = 1.0, tell: Callable[[Json], object] = lambda job: None
+        self,
+        id: str,
+        period: float = 1.0,
+        tell: Callable[[Json], object] = lambda job: None,
+        patience: float = 300.0,
     ) -> Json:
-        """Wait until all requests of a job have ended.
+        """Wait until all requests of a job have ended, also while the service restarts.
 
         Args:
             id: id of the job.
             period: time between two looks [s].
             tell: gets the job at each look.
+            patience: longest time without an answer of the service, once there was one [s].
 
         Returns:
             The job.
         """
-        while True:
+
+        def look() -> Json:
             job = self.job(id)
             tell(job)
-            if job["state"] in ENDED:
-                return job
-            time.sleep(period)
+            return job
+
+        return ended(look, period, patience)
 
     def job_results(self, id: str) -> Iterator[Json]:
         """The requests of a job that have ended, with their answers: `GET /jobs/{id}/results`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import httpx2
@@ -15,6 +16,8 @@ from starlette.testclient import TestClient
 import joulepath
 from joulepath.app.client.errors import error_of
 from joulepath.app.exceptions.error_types import types_of_error
+from joulepath.app.exceptions.queue import ShuttingDown
+from joulepath.app.exceptions.stored import UnknownJob
 from joulepath.app.http.problems import path_of, problem_of
 from joulepath.optimizer.exceptions import OutsideLimits
 from tests.app.live import LOCAL
@@ -118,6 +121,35 @@ def test_a_job_from_begin_to_end(service: joulepath.Client) -> None:
     with pytest.raises(joulepath.ServiceError, match="job") as caught:
         service.job(sent["id"])
     assert caught.value.slug() == "unknown-job"
+
+
+def test_a_wait_outlasts_a_restart_of_the_service() -> None:
+    """But neither a service that never answers, nor one that stays away, nor a deleted job."""
+    stopping = problem_of(ShuttingDown(), "7")
+    going = httpx2.Response(200, json={"state": "running"})
+    away: list[httpx2.Response | Exception]
+    away = [httpx2.ConnectError("refused"), httpx2.Response(503, json=stopping)]
+    gone = httpx2.Response(404, json=problem_of(UnknownJob(), "7"))
+    end = httpx2.Response(200, json={"state": "done"})
+    assert waiting([going, *away, going, *away, end], 60.0) == {"state": "done"}
+    for answers, patience in (([*away, end], 60.0), ([going, *away, end], 0.0)):
+        with pytest.raises(joulepath.ServiceUnreachable, match="refused"):
+            waiting(answers, patience)
+    with pytest.raises(joulepath.ServiceError, match="job"):
+        waiting([going, gone, end], 60.0)
+
+
+def waiting(answers: Sequence[httpx2.Response | Exception], patience: float) -> Any:
+    left = iter(answers)
+
+    def answer(_: httpx2.Request) -> httpx2.Response:
+        found = next(left)
+        if isinstance(found, Exception):
+            raise found
+        return httpx2.Response(found.status_code, content=found.content)
+
+    http = httpx2.Client(transport=httpx2.MockTransport(answer))
+    return joulepath.Client("http://service", http=http).wait_for_job("7", 0.0, patience=patience)
 
 
 def answering(status: int, content: bytes, **headers: str) -> joulepath.Client:

@@ -28,6 +28,8 @@ class DrawingSettings:
     """Height of the power curve."""
     foot: float = 24.0
     """Lower margin, with times."""
+    stop: float = 11.0
+    """Radius of the numbers of stops; a number that would cover another one is left out."""
     ink: str = "#17202b"
     """Colour of text."""
     grey: str = "#616d79"
@@ -200,6 +202,7 @@ def _legs(course: Course) -> Iterator[str]:
             ink = "#ffffff" if leg.loaded else DRAWING.ink
             y = low - tall / 2 + 4.5
             yield words_at((left + right) / 2, y, text, ink, "middle", 600)
+    free = 0.0
     for stop in course.stops:
         x = _x(course, stop.t)
         fill, ink, edge = (
@@ -208,7 +211,10 @@ def _legs(course: Course) -> Iterator[str]:
             else ("#fff", DRAWING.ink, DRAWING.ink)
         )
         yield f'<path d="M{x:.1f} 24V{low:.1f}" stroke="{DRAWING.rest}"/>'
-        yield f'<circle cx="{x:.1f}" cy="14" r="11" fill="{fill}" stroke="{edge}"/>'
+        if x < free:
+            continue
+        free = x + 2 * DRAWING.stop
+        yield f'<circle cx="{x:.1f}" cy="14" r="{DRAWING.stop:g}" fill="{fill}" stroke="{edge}"/>'
         yield words_at(x, 18.4, str(stop.number), ink, "middle", 600)
 
 

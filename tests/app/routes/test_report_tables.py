@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.api.report.bundle import Bundle, attached_to, in_html
 from joulepath.app.api.report.check import checked
+from joulepath.app.api.report.drawings import DRAWING, Course, Leg, Stop, drawn
 from joulepath.app.api.report.log_report import measured
 from joulepath.app.api.report.numbers import digits, percent
 from joulepath.app.tasks import job_document
@@ -21,6 +24,8 @@ from tests.identification_logs import csv_of, recorded, truth_of
 
 Json = dict[str, Any]
 ROBOT = load_robot("ur5e")
+# places are written with one digit
+ROUNDING = 0.11
 CSV = {"Content-Type": "text/csv"}
 
 
@@ -169,3 +174,13 @@ def test_pages_of_a_table_repeat_its_head(client: TestClient, job: str) -> None:
     file = reported(client, job=job, format="pdf")
     assert file.startswith(b"%PDF")
     assert checked(file, again=False, request_id="test").agrees
+
+
+def test_numbers_of_stops_do_not_cover_each_other() -> None:
+    """Nor are any left out that have room."""
+    for count, shown in ((9, 9), (200, 40)):
+        stops = [Stop((k + 0.5) / count, k + 1, False) for k in range(count)]
+        legs = [Leg(k / 2, 0.5, 1.0, False, False) for k in range(2)]
+        text = drawn(Course(1.0, [0.0, 1.0], [1.0, 1.0], legs, stops))
+        places = [float(x) for x in re.findall(r'<circle cx="([0-9.]+)"', text)]
+        assert len(places) >= shown and min(np.diff(places)) >= 2 * DRAWING.stop - ROUNDING
