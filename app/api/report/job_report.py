@@ -9,7 +9,16 @@ from joulepath.app.api.report.bundle import COMPUTED, Bundle
 from joulepath.app.api.report.costs import Money, cost_table, costs_note, facts
 from joulepath.app.api.report.drawings import Bar, drawn_bars
 from joulepath.app.api.report.job_rows import answered, rivals_of
-from joulepath.app.api.report.numbers import counted, digits, down, percent, share, unbroken, up
+from joulepath.app.api.report.numbers import (
+    counted,
+    digits,
+    down,
+    percent,
+    share,
+    unbroken,
+    unmarked,
+    up,
+)
 from joulepath.app.api.report.programs import program_of_motion
 from joulepath.app.api.report.report import Report, Rival, Table
 from joulepath.app.api.report.rivals import (
@@ -83,8 +92,7 @@ def _moves(count: int) -> str:
 
 
 def _name(row: Json) -> str:
-    name: str = row["name"] or f"no. {row['index'] + 1}"
-    return name
+    return unmarked(row["name"] or f"no. {row['index'] + 1}")
 
 
 def _lead(bundle: Bundle) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ SPACE = "\u00a0"
 """A no-break space."""
 _PLAIN = (-5, 9)
 """Powers of ten of numbers that are written in full; others would not fit into a column."""
+_MARKS = str.maketrans({"*": "∗", "`": "ˋ"})
 _UNIT = re.compile(r"(?<=\d) (?=(?:J|s|h|W|mm|kg|kWh|%)(?!\w))")
 _ROUNDINGS: dict[str, Callable[[float], int]] = {
     "nearest": round,
@@ -59,6 +60,11 @@ def share(value: float, energy: float) -> float:
 def counted(count: int, thing: str) -> str:
     """A number of things, in words."""
     return f"{count:,} {thing}{'' if count == 1 else 's'}"
+
+
+def unmarked(name: str) -> str:
+    """A name for a sentence in which `*` and accents mark words."""
+    return name.translate(_MARKS)
 
 
 def unbroken(text: str) -> str:

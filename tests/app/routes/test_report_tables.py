@@ -40,7 +40,7 @@ def job(client: TestClient) -> str:
     """Two motions, one that cannot be, one request without a motion of its own, and a cycle."""
     requests = [
         optimization(1.0) | {"name": "bin to shelf"},
-        optimization(2.0) | {"name": "shelf <to> bin"},
+        optimization(2.0) | {"name": "shelf *<to>* bin"},
         {"optimize": move(duration=0.01)},
         evaluation(),
         {"cycle": CYCLE},
@@ -72,8 +72,9 @@ def test_a_job_is_summed_and_listed(page: bytes) -> None:
     bounds = sum(answer["energy"]["lower_bound"] for answer in answers)
     assert len(totals) == 3 and bounds <= sum(totals)
     assert f"<b>{digits(sum(totals))}\u00a0J</b> together" in text and "<h1>Night run</h1>" in text
-    for name in ("bin to shelf", "shelf &lt;to&gt; bin"):
+    for name in ("bin to shelf", "shelf *&lt;to&gt;* bin"):
         assert f"<td>{name}</td>" in text
+    assert "most energy: shelf ∗&lt;to&gt;∗ bin," in text, "the stars of a name mark nothing"
     for total in totals:
         assert f"<td>{digits(total)}</td>" in text
     assert '<td colspan="7" class="remark">' in text, "the motion that cannot be says why"
