@@ -129,13 +129,9 @@ class _Solver:
     def _kept(self, promised: float, before: Iterate) -> bool:
         """Whether the last step kept its promise: then no further step promises enough.
 
-        Among obstacles, and with passes or sliding ends, the next QP has other constraints.
+        Through passes, the promise is unreliable.
         """
-        if (
-            self.p.has_clearance
-            or self.p.has_equations
-            or float(self.at.violation.max()) >= FEASIBILITY
-        ):
+        if self.p.passes is not None or float(self.at.violation.max()) >= FEASIBILITY:
             return False
         wrong_by = abs((before.cost - self.at.cost) * self.cost_scale - promised)
         allowed = max(SQP.promise_error * abs(promised), SQP.progress_error * self.progress)

@@ -19,7 +19,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
 from joulepath.optimizer.solve.nlp.sliding_ends import Slide, SlidingEnds
-from joulepath.optimizer.solve.nlp.sqp import solve
+from joulepath.optimizer.solve.nlp.sqp import _Solver, solve
 from joulepath.optimizer.solve.nlp.sqp_state import SqpStatus
 from tests.optimizer.solve.nlp.second_differences import assert_curvature, without_dry_friction
 
@@ -126,6 +126,18 @@ def test_the_solver_slides_the_ends_and_needs_less(start: bool, goal: bool) -> N
     assert found.cost < least.cost
     moved = np.abs(points[[0, -1]] - [START, GOAL]).max(axis=1) > 1e-3
     assert moved.tolist() == [start, goal]
+
+
+def test_a_step_that_keeps_its_promise_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    progress = 1e-3
+    own = [program(True, True), program(True, False), program(False, True)]
+    found = [solve(each, straight(each), 2.0, progress=progress) for each in own]
+    monkeypatch.setattr(_Solver, "_kept", lambda *_: False)
+    longer = [solve(each, straight(each), 2.0, progress=progress) for each in own]
+    assert sum(each.iterations for each in found) < sum(each.iterations for each in longer)
+    for early, late in zip(found, longer, strict=True):
+        assert early.status is SqpStatus.SOLVED and early.feasible
+        assert early.cost == pytest.approx(late.cost, rel=progress)
 
 
 def test_a_guess_far_from_its_curve_is_refused() -> None:
