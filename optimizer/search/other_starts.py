@@ -21,7 +21,7 @@ from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.method import Method, above
-from joulepath.optimizer.solve.methods.solve_result import SolveResult
+from joulepath.optimizer.solve.methods.solve_result import MotionOrigin, SolveResult
 from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 from joulepath.optimizer.solve.nlp.sqp_state import SQP
 
@@ -36,7 +36,8 @@ def start_beside(state: SearchState, best: Candidate) -> Candidate:
     """Search for a better candidate from postures one step along the self-motions of the ends.
 
     Motions with more control points than in the first solve are left out. So are motions with
-    corners in the powers of joints, because `sharpening` restarts them itself.
+    corners in the powers of joints, because `sharpening` restarts them itself, and motions from
+    planned paths: planning anew took a tenth of the time, and saved 0.02 % of the energy.
 
     Args:
         state: state of the search; better candidates are appended to its list.
@@ -47,7 +48,13 @@ def start_beside(state: SearchState, best: Candidate) -> Candidate:
     """
     prepared = state.prepared
     cornered = has_corners(state.problem.objective, prepared.arm)
-    if cornered or not slides(prepared, best) or not state.method.may_refine(best.spline):
+    planned = best.attempt is not None and best.attempt.origin is MotionOrigin.FROM_PLANNED_PATH
+    if (
+        cornered
+        or planned
+        or not slides(prepared, best)
+        or not state.method.may_refine(best.spline)
+    ):
         return best
     first = best
     for side in SIDES:

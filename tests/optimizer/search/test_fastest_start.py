@@ -8,15 +8,24 @@ import numpy as np
 import pytest
 
 from benchmarks.agreement import request
+from benchmarks.tasks import collision_free
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.models.registry import load_robot
+from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.bus import Bus
+from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.refinement import refine, start_from_fastest
+from joulepath.optimizer.search.refinement import (
+    FastestStartSettings,
+    refine,
+    start_from_fastest,
+)
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
@@ -100,3 +109,17 @@ def test_a_motion_that_nothing_holds_back_is_not_solved_again(given: dict[str, o
     solves, energy = state.solves, best.energy
     start_from_fastest(state, best)
     assert (state.solves, best.energy) == (solves, energy)
+
+
+@pytest.mark.parametrize("slides", [True, False])
+def test_a_broken_promise_starts_another_solve_between_fixed_ends_alone(slides: bool) -> None:
+    robot, rng = load_robot("panda"), np.random.default_rng([0, 4])
+    arm = Arm(robot=robot)
+    start, goal = collision_free(rng, robot), collision_free(rng, robot)
+    to = Pose(tcp_pose(arm, goal)) if slides else goal
+    run = prepared(Problem(arm=arm, start=start, goal=to, deadline=AMPLE))
+    run.explore()
+    best, solves = run.state.best(), run.state.solves
+    assert best is not None
+    start_from_fastest(run.state, best, FastestStartSettings(broken_promise=-1.0))
+    assert (run.state.solves == solves) is slides

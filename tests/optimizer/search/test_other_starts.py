@@ -4,6 +4,8 @@ optimum.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.state import SearchState
+from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 from tests.optimizer.search.runs import prepared
 
 # s: no search comes near it, however busy the machine
@@ -65,3 +68,12 @@ def test_cornered_power_is_left_to_its_own_restarts() -> None:
     state, first = explored(1, False, Bus(mode="isolated"))
     before = len(state.candidates)
     assert start_beside(state, first) is first and len(state.candidates) == before
+
+
+def test_a_motion_from_a_planned_path_is_not_planned_anew() -> None:
+    state, first = explored(4, False, Bus())
+    assert first.attempt is not None
+    first.attempt = replace(first.attempt, origin=MotionOrigin.FROM_PLANNED_PATH)
+    solves, before = state.solves, len(state.candidates)
+    assert start_beside(state, first) is first
+    assert (state.solves, len(state.candidates)) == (solves, before)
