@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.compilers import with_compiler, without_compiler
+
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
 
@@ -81,6 +83,19 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     """Gives each test a database of its own, also for the commands and programs that it starts: not
     the user's, and none that another test has written to."""
     os.environ["JOULEPATH_DATABASE_URL"] = f"sqlite:///{DATABASES.name}/{next(_count)}.db"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _without_compiler() -> Iterator[None]:
+    with without_compiler():
+        yield
+
+
+@pytest.fixture
+def compiler() -> Iterator[None]:
+    """For tests of what the C compiler makes."""
+    with with_compiler():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -23,6 +23,7 @@ import pytest
 from joulepath.optimizer.native.build import LIBRARY
 from tests.app.live import free_port
 from tests.app.requests import move
+from tests.compilers import with_compiler
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("app", "optimizer", "models")
@@ -45,7 +46,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "--wheel-dir",
         str(folder),
     ]
-    subprocess.run([sys.executable, "-m", "pip", "wheel", *options, str(ROOT)], check=True)
+    with with_compiler():
+        subprocess.run([sys.executable, "-m", "pip", "wheel", *options, str(ROOT)], check=True)
     (built,) = folder.glob("joulepath-*.whl")
     return built
 

@@ -42,9 +42,10 @@ def sources_digest(folder: Path = FOLDER) -> str:
 
 
 def compiler() -> str | None:
-    """Path of the C compiler named by CC, or of the system's; None if there is none."""
-    names = os.environ.get("CC", "cc"), "gcc", "clang"
-    return next(filter(None, map(shutil.which, names)), None)
+    """Path of the C compiler named by CC, or of the system's; None if there is none, or if CC is
+    empty."""
+    named = os.environ.get("CC", "cc")
+    return next(filter(None, map(shutil.which, (named, "gcc", "clang"))), None) if named else None
 
 
 def build(folder: Path = FOLDER) -> Path:

@@ -38,6 +38,7 @@ from tests.app.requests import move
 from tests.app.test_live_cluster import machines, process
 from tests.selection import long_but
 
+pytestmark = pytest.mark.usefixtures("compiler")
 DEPLOYED = ("/opt/joulepath", "/etc/joulepath", "/var/lib/joulepath", "/var/cache/joulepath")
 # these change the machine: root, or a program that only a server has
 OF_ROOT = ("useradd ", "cp deploy/", "nginx -t")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +11,6 @@ import pytest
 from benchmarks.slow_moves import MOST_EXCESS, NEAR, compare, other_searches, slow_problem
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.dynamics import kernel
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
@@ -20,6 +18,7 @@ from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
+from tests.compilers import with_compiler
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but
 
@@ -34,14 +33,10 @@ RAMPS = 5e-3
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _compiled() -> Iterator[None]:
-    """Many motions of the default robot take a while without it. The few of another one take less
-    than its compiler.
-    """
-    compile_kernel(load_robot("ur5e"))
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(kernel, "compiler", lambda: None)
-        yield
+def _compiled() -> None:
+    """Many motions of the default robot take a while without it."""
+    with with_compiler():
+        compile_kernel(load_robot("ur5e"))
 
 
 def slow(speed: float, **given: Any) -> Problem:

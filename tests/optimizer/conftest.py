@@ -1,5 +1,5 @@
-"""What all tests of the library share: one thread for linear algebra, and no kernel but that of the
-default robot.
+"""What all tests of the library share: one thread for linear algebra, and the kernel of the default
+robot.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.dynamics import kernel
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
+from tests.compilers import with_compiler
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -22,11 +22,7 @@ def _one_thread() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _compiled() -> Iterator[None]:
-    """Many motions of the default robot take a while without it. The few of another one take less
-    than its compiler.
-    """
-    compile_kernel(load_robot("ur5e"))
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(kernel, "compiler", lambda: None)
-        yield
+def _compiled() -> None:
+    """Many motions of the default robot take a while without it."""
+    with with_compiler():
+        compile_kernel(load_robot("ur5e"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -32,13 +31,6 @@ THERE = np.array([-0.9, 0.3, 0.6, 0.8, -0.7])
 ROLL, ACROSS = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 # m and rad: residual of a pose, and difference of a configuration found again
 ACCURACY, FOUND = 1e-9, 1e-6
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _no_compiler() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("PATH", "")
-        yield
 
 
 @pytest.fixture(scope="module")

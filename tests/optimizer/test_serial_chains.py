@@ -4,7 +4,6 @@ kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -40,16 +39,6 @@ OBJECTIVES: dict[str, dict[str, Any]] = {"electrical": {}, "mechanical": {"durat
 STEPS, SUMMED = 20001, 1e-3
 # relative, of a limit: the certificate's own tolerance
 HELD = 1e-6
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _no_compiler() -> Iterator[None]:
-    """Compiling the kernels would take minutes, and the virtual machine solves each of these in a
-    second.
-    """
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("PATH", "")
-        yield
 
 
 @pytest.fixture(scope="module", params=JOINTS)

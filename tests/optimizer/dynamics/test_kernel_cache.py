@@ -24,7 +24,6 @@ import pytest
 import joulepath
 from joulepath.models.registry import robot_names
 from joulepath.models.robot import Robot
-from joulepath.optimizer.dynamics import kernel
 from joulepath.optimizer.dynamics.kernel import Kernel, kernel_for
 from joulepath.optimizer.dynamics.kernel_cache import (
     SOURCE_MODULES,
@@ -42,6 +41,7 @@ from tests.optimizer.dynamics.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
 from tests.selection import long_but
 
+pytestmark = pytest.mark.usefixtures("compiler")
 SWAP = 60.0  # s; a compilation without optimisation takes one to three
 ALL_COMPILED = 400.0  # s; of every robot, beside other work
 
@@ -116,6 +116,7 @@ class Workshop:
 
 @pytest.fixture
 def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workshop:
+    kernel_for(ROBOT)  # from the folder that the other tests have
     real = compiler()
     assert real is not None, "make installs a compiler where there is none"
     script = tmp_path / "compiler"
@@ -125,8 +126,6 @@ def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workshop:
     script.chmod(0o755)
     monkeypatch.setenv("CC", str(script))
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
-    # no other test of the library compiles in the background
-    monkeypatch.setattr(kernel, "compiler", compiler)
     return Workshop(tmp_path, replace(ROBOT))
 
 

@@ -20,6 +20,7 @@ from tests.optimizer.dynamics.kernel_states import states
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but
 
+pytestmark = pytest.mark.usefixtures("compiler")
 PARAMETERS = sizes(ROBOT.nq)["torque"][0][1]
 
 

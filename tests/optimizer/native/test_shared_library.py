@@ -22,6 +22,7 @@ from joulepath.optimizer.native import build
 from joulepath.optimizer.native.build import FOLDER, LIBRARY, BuildFailed, sources_digest
 from joulepath.optimizer.native.shared_library import LibraryUnusable, load
 
+pytestmark = pytest.mark.usefixtures("compiler")
 FRAMES = 1e-14  # m and cosines; both round, and numpy's sine differs in the last digit
 
 
