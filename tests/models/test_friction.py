@@ -64,6 +64,8 @@ def test_a_larger_knee_softens_the_reversal_only(robot: Robot, law: FrictionLaw)
     assert soft.torque(fast) == pytest.approx(law.torque(fast), rel=1e-3)
 
 
-def test_stored_coefficients_are_the_fits(law: FrictionLaw) -> None:
-    for part, values in fit("ur5e")[law.name].items():
-        assert getattr(law, part) == pytest.approx(values, rel=REFIT), part
+def test_stored_coefficients_are_the_fits(robot: Robot) -> None:
+    fits = fit("ur5e")
+    for law in robot.friction_laws.values():
+        for part, values in fits[law.name].items():
+            assert getattr(law, part) == pytest.approx(values, rel=REFIT), part

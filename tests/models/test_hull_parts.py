@@ -62,6 +62,7 @@ def test_both_sides_of_a_plane_are_the_whole_surface() -> None:
     assert sum(area(each) for each in sides) == pytest.approx(area(triangles))
 
 
+@pytest.mark.long
 def test_two_hulls_hold_a_bent_link_closely() -> None:
     """One hull reaches 16 mm into the bend."""
     parts = divided([BENT], RADIUS, nowhere)

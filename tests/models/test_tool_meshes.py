@@ -93,6 +93,7 @@ def test_the_hulls_of_the_robotiq_hold_it_at_every_opening_and_in_between() -> N
         assert any(unproven(end, smaller, 0.0) for end in ends)
 
 
+@pytest.mark.long
 def test_a_fit_repeats_the_figures() -> None:
     fitted = list(fitted_hulls(ROBOTIQ, meshes(ROBOTIQ)))
     for each, points in zip(hulls(ROBOTIQ), fitted, strict=True):

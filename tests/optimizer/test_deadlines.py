@@ -119,7 +119,7 @@ HARD: dict[str, Problem] = {
 }
 
 
-@pytest.mark.parametrize("deadline", long_but((0.02, 1.0), (0.02, 0.3, 1.0, 2.0)))
+@pytest.mark.parametrize("deadline", long_but((0.02, 0.3), (0.02, 0.3, 1.0, 2.0)))
 @pytest.mark.parametrize("kind", HARD)
 def test_nothing_overruns(clock: WorkClock, kind: str, deadline: float) -> None:
     asked = due(HARD[kind], deadline)
@@ -150,6 +150,7 @@ def test_a_front_does_not_overrun(clock: WorkClock, kind: str) -> None:
     assert 0 < clock.now < 1.0 + OVERRUN
 
 
+@pytest.mark.long
 def test_a_change_does_not_overrun(clock: WorkClock) -> None:
     """Two minutes of motion, certified on the changed arm and optimised for it, in a second of
     work.
@@ -161,6 +162,7 @@ def test_a_change_does_not_overrun(clock: WorkClock) -> None:
     assert clock.now - began < 0.2 + OVERRUN
 
 
+@pytest.mark.long
 def test_what_was_verified_by_then_is_answered(clock: WorkClock) -> None:
     """Many candidates, of which the time is enough for some."""
     whole = optimize(due(HARD["mechanical"], 1e6), clock)

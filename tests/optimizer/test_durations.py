@@ -142,6 +142,7 @@ def test_a_payload_beyond_the_rating_is_refused() -> None:
     assert refusal.value.field == "payload.mass" and "5 kg" in str(refusal.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("refused", ["all", "the first"])
 def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refused: str) -> None:
     """A motion that its certificate does not confirm is not the answer; what it had ruled out may

@@ -32,9 +32,8 @@ EVERYDAY: dict[int | str, tuple[list[float], ...]] = {
     "xarm7": ([0.0, -0.5, 0.0, 1.0, 0.0, 1.5, 0.0], [0.0] * 7, [0.0, 0.5, 0.0, 1.2, 0.0, 0.8, 0.0]),
     7: ([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], [0.0, 0.5, 0.0, -1.2, 0.0, 0.8, 0.0]),
 }
-# robots that every run tries: their kernels take ten seconds each to compile; one has no figures of
-# drives of its own
-QUICK = ("ur3e", "ur5e")
+# the robot that every run tries, which has no figures of drives of its own
+QUICK = ("ur3e",)
 
 
 @pytest.fixture(params=long_but(QUICK, robot_names()), scope="module")

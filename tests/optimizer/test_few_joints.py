@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 
 import numpy as np
 import pytest
@@ -112,9 +113,14 @@ def test_a_position_within_the_length_that_is_not_reached(arm: Arm) -> None:
         inverse_kinematics(short(2), ConeOrientedPose([0.05, 0.05, 0.05]))
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
-@pytest.mark.parametrize("kind", ["free", "about"])
-def test_motions_to_poses_are_certified_with_a_bound(count: int, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "count"),
+    long_but(
+        [("free", 1), ("about", 2), ("free", 3), ("about", 4), ("free", 5)],
+        product(("free", "about"), range(1, 6)),
+    ),
+)
+def test_motions_to_poses_are_certified_with_a_bound(kind: str, count: int) -> None:
     arm = short(count)
     T = tcp_pose(arm, THERE[:count])
     axis = ConeOrientedPose.about(Pose(T), ROLL)

@@ -114,6 +114,7 @@ def test_past_a_corner_the_free_end_is_no_worse_than_a_given_one() -> None:
     assert optimize(along(free(goal), path=path)).energy.electrical.total <= given * (1 + 2e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("start", long_but(["joint positions"], ["joint positions", "pose"]))
 def test_no_motion_to_any_angle_at_the_goal_needs_less_than_the_bound(start: str) -> None:
     rng, goal = np.random.default_rng(3), moved([0.1, 0.15, -0.1])

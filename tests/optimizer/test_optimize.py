@@ -69,7 +69,7 @@ def test_answers_are_true(name: str, method: str) -> None:
 @pytest.mark.parametrize(
     ("name", "method", "duration"),
     long_but(
-        [("as it comes", "bspline", "fixed"), ("half recovered", "time_scaling", "longest")],
+        [("half recovered", "time_scaling", "longest")],
         product(CONDITIONS, ("bspline", "time_scaling"), ("fixed", "longest")),
     ),
 )
@@ -164,6 +164,7 @@ def test_the_trajectory_is_that_of_the_spline() -> None:
     )
 
 
+@pytest.mark.long
 def test_regeneration_gives_energy_back() -> None:
     """A load let down by a metre: what is recovered is negative and lowers the total; more of it
     lowers it more.

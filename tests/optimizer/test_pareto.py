@@ -119,6 +119,7 @@ def test_every_point_is_certified(asked_and_found: tuple[Problem, Front]) -> Non
         assert 0 < point.lower_bound <= objective(asked, point)
 
 
+@pytest.mark.long
 def test_every_point_is_at_least_as_good_as_a_fresh_answer(
     asked_and_found: tuple[Problem, Front],
 ) -> None:
@@ -152,6 +153,7 @@ def test_what_lies_between_passes_within_the_rectangles(
         assert objective(asked, between) >= objective(asked, right) * (1 - LOCAL)
 
 
+@pytest.mark.long
 def test_ends_at_the_longest_duration_where_that_costs_least() -> None:
     """Mechanical work has no idle power: the smoothed cost must not end it early."""
     asked = replace(mechanical(), method="time_scaling")
@@ -178,6 +180,7 @@ def test_jumps_are_found_where_they_are() -> None:
         assert any(right.duration * (1 - NEAR) <= duration < right.duration for duration in tried)
 
 
+@pytest.mark.long
 def test_keeps_to_the_range_asked_for() -> None:
     front = pareto(replace(joints(), duration_min=0.72, duration_max=0.75), 3, still)
     assert front.points[0].duration == pytest.approx(0.72)
@@ -261,6 +264,7 @@ SEEDED = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "kind"), SEEDED)
 def test_the_front_ends_where_optimize_ends(seed: int, kind: str) -> None:
     """Neither is better than the other: the last point is what `optimize` answers, and no other

@@ -96,6 +96,7 @@ def test_tcp_and_elbow_keep_their_speeds(limit: float) -> None:
     assert max(ratios["tcp_speed"], ratios["elbow_speed"]) > 0.98, "a limit is made use of"
 
 
+@pytest.mark.long
 def test_tighter_limits_cost_more() -> None:
     free = electrical(solved())
     cones = [electrical(solved(half_angle)) for half_angle in (0.1, 0.02, 0.005)]

@@ -94,6 +94,7 @@ def test_a_cycle_ends_with_its_answer() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_cycle_of_another_time_tells_none_of_its_own() -> None:
     """In its own time it needs less than in the time that is asked for: that is no answer."""
     longer = 1.5 * plan_cycle(pick_and_place(1, 2, method="time_scaling")).duration

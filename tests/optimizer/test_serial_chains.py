@@ -41,7 +41,7 @@ STEPS, SUMMED = 20001, 1e-3
 HELD = 1e-6
 
 
-@pytest.fixture(scope="module", params=JOINTS)
+@pytest.fixture(scope="module", params=long_but(JOINTS[:3], JOINTS))
 def robot(request: pytest.FixtureRequest) -> Robot:
     return serial_chain(request.param)
 

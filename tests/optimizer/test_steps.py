@@ -15,6 +15,7 @@ from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
 from joulepath.optimizer.excitation.excite import excite
 from joulepath.optimizer.identify.logs.log import Log
 from tests.identification_logs import csv_of, recorded, truth_of
+from tests.selection import long_but
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 ROUNDING = 1e-9
@@ -54,7 +55,10 @@ def motions(count: int) -> dict[str, tuple[Any, float]]:
     return by_kind | {"recording": (joulepath.Recording.of(times + 7.0, q), times[-1])}
 
 
-@pytest.mark.parametrize("kind", ["linear", "trapezoid", "quintic", "spline", "recording"])
+@pytest.mark.parametrize(
+    "kind",
+    long_but(["trapezoid", "recording"], ["linear", "trapezoid", "quintic", "spline", "recording"]),
+)
 def test_an_evaluation_tells_the_time_that_it_has_reached(arm: joulepath.Arm, kind: str) -> None:
     """Of a motion of more than one block, and of a smooth one, which is one block."""
     motion, duration = motions(2500)[kind]
@@ -99,6 +103,7 @@ def test_a_replay_tells_its_simulations(
     assert [each.done for each in alone] == [0, 1] and alone[0].total == 1
 
 
+@pytest.mark.long
 def test_an_identification_tells_its_fits() -> None:
     """One without each motion, and the last to all; one alone if nothing is held out."""
     robot = joulepath.load_robot("ur5e")

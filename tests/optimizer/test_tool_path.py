@@ -46,7 +46,7 @@ LINES = {
 }
 
 
-@pytest.mark.parametrize("name", long_but(("down", "with a turn"), LINES))
+@pytest.mark.parametrize("name", long_but(("with a turn",), LINES))
 def test_the_tool_is_on_the_line(name: str) -> None:
     """By the definition of a line, not by the course's own measure."""
     goal = moved(*LINES[name])
@@ -186,6 +186,7 @@ def speeds_of(found: Solution, count: int = 4000) -> tuple[float, float, float]:
     return float(speed.max()), float(speed[between].min()), float(speed[0])
 
 
+@pytest.mark.long
 def test_the_tool_is_no_slower_than_asked_between_the_ramps() -> None:
     found = optimize(cornered())
     most, least, first = speeds_of(found)
@@ -255,6 +256,7 @@ def test_seven_joints_follow_a_line() -> None:
     assert found.certificate.valid and found.certificate.worst_ratio["path_position"] < 1
 
 
+@pytest.mark.long
 def test_what_is_out_of_reach_says_how_far_each_branch_gets() -> None:
     with pytest.raises(PathInfeasible) as refusal:
         optimize(along(moved([0.0, -1.0, 0.0]), moved([0.0, 0.0, 0.0])))
@@ -351,6 +353,7 @@ def test_random_lines_are_followed_or_refused(seed: int) -> None:
     )
 
 
+@pytest.mark.long
 def test_work_without_friction_takes_the_longest_time() -> None:
     given = {"objective": "mechanical", "duration_max": 2.0}
     assert optimize(

@@ -147,6 +147,7 @@ def test_a_turning_is_the_shortest_of_all_on_its_sheet() -> None:
     )
 
 
+@pytest.mark.long
 def test_what_no_turning_reaches_says_how_far_it_gets() -> None:
     with pytest.raises(PathInfeasible) as refusal:
         optimize(over_the_base(goal=down(-1.4, 0.12, 0.25)))

@@ -20,6 +20,7 @@ from tests.selection import long_but
 # relative, of energy and bound
 SAME = 1e-4
 START, MOVE = [0.2, -1.2, 1.0, 0.3, 0.9, 0.3], [0.9, 0.3, -0.4, 0.5, 0.4, 0.3]
+FIGURES = (repr, "{:.9f}".format, "{:.4f}".format, "{:.3f}".format)
 AS_GIVEN = Convention(np.ones(6), np.zeros(6), np.tile(np.eye(3), (7, 1, 1)))
 
 
@@ -56,7 +57,10 @@ def test_a_motion_costs_the_same_in_every_drawing(arm: Robot, count: int) -> Non
 
 
 @pytest.mark.parametrize("arm", [UR5E, KUKA], ids=lambda each: each.name)
-@pytest.mark.parametrize("figure", [repr, "{:.9f}".format, "{:.4f}".format, "{:.3f}".format])
+@pytest.mark.parametrize(
+    "figure",
+    long_but(FIGURES[2:3], FIGURES),
+)
 def test_rounded_figures_are_the_arm_that_they_stand_for(
     arm: Robot, figure: Callable[[float], str]
 ) -> None:

@@ -50,7 +50,7 @@ def volume(axis: Array, radius: float) -> float:
     return float(np.pi * radius**2 * (np.linalg.norm(axis[1] - axis[0]) + 4 / 3 * radius))
 
 
-@pytest.mark.parametrize("link", long_but(range(3), range(7)))
+@pytest.mark.parametrize("link", long_but((0, 2), range(7)))
 def test_a_capsule_holds_every_triangle_of_a_link(link: int) -> None:
     """Of a real arm; and it is not much larger than it has to be: than 2.6 times the hull."""
     surface = link_surfaces(arm_folder("ur5e"), "ur5e", link)["visual"]

@@ -146,9 +146,7 @@ def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Ar
     return lower_bounds(task, goal - start, potential_gain)
 
 
-@pytest.mark.parametrize(
-    "name", long_but(("loaded and tilted", "lossy", "load, all recovered"), CONDITIONS)
-)
+@pytest.mark.parametrize("name", long_but(("loaded and tilted", "load, all recovered"), CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
     """Thousands of motions over all conditions, electrical and mechanical, with free duration and
     with their own.

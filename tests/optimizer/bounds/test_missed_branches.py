@@ -90,6 +90,7 @@ def attacked(start: Array, goal: Array, seed: int) -> float:
     return float(best.min())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "given",
     [

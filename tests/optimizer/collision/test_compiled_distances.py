@@ -86,7 +86,7 @@ def test_boxes_and_segments(kind: str) -> None:
     )
     boxes = [standing(Core(box_corners(-size, size), half_size=size)) for size in half]
     moving = [standing(Core(x)) for x in b]
-    for pairs in (of_pairs(boxes, moving), of_pairs(moving, boxes)):
+    for pairs in (of_pairs(boxes[::2], moving[::2]), of_pairs(moving[1::2], boxes[1::2])):
         assert_same(*pairs, SAME)
 
 

@@ -60,6 +60,7 @@ def divided(*stops: Stop, **given: Any) -> Cycle:
     return with_divided_paths(a_cycle(*stops, **{"arm": NARROW} | given))
 
 
+@pytest.mark.long
 def test_a_path_is_divided_where_a_joint_comes_to_its_end() -> None:
     asked = a_cycle(glue(dwell=0.1, payload=PART), arm=NARROW)
     with pytest.raises(PathInfeasible) as refusal:

@@ -111,6 +111,7 @@ def test_twelve_stops(windings: bool) -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("readings", long_but([2000], [200, 2000, 5000, 10_000, 20_000]))
 def test_a_deadline_gives_a_cycle_or_says_so(readings: int) -> None:
     clock, asked = CountingClock(), inspection(1, 4, deadline=float(readings))

@@ -261,6 +261,7 @@ def test_a_stop_out_of_reach_at_every_orientation_is_one_pose() -> None:
     assert refusal.value.target == "stops/pick"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_angles")
 def test_without_time_for_full_turns_the_cycle_without_them_is_the_answer() -> None:
     def search(asked: Cycle) -> CycleSolution:

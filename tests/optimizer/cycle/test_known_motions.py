@@ -96,6 +96,7 @@ def test_in_a_given_time_too() -> None:
     assert_same(other, found)
 
 
+@pytest.mark.long
 def test_a_motion_that_is_not_certified_is_solved_for() -> None:
     _, motions = searched()
     wrong = {key: replace(each, spline=_twice_as_fast(each)) for key, each in motions.used.items()}

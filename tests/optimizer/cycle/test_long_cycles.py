@@ -70,6 +70,7 @@ def test_a_deadline_gives_the_best_long_cycle_so_far(whole: Whole) -> None:
     assert sum(move.solved for move in found.moves) < sum(move.solved for move in best.moves)
 
 
+@pytest.mark.long
 def test_the_proof_alone_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = pick_and_place(5, 4, method="time_scaling")
     proven = plan_cycle(asked)

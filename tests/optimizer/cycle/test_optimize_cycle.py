@@ -143,6 +143,7 @@ def test_cycles_are_true_and_not_above_move_by_move(seed: int, count: int) -> No
         assert whole.within_limits == all(each.within_limits for each in parts)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "start",
     [
@@ -227,6 +228,7 @@ def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> N
         assert found.lower_bound <= fixed.lower_bound * (1 + ROUNDING)
 
 
+@pytest.mark.long
 def test_one_of_several_targets_is_chosen_for_the_whole_cycle() -> None:
     near, far = poses(5, 2)
     stops = [Stop(name="either", target=AnyOf((near, far))), Stop(name="then", target=far)]

@@ -191,6 +191,7 @@ def test_a_time_that_even_passing_does_not_keep_is_too_short() -> None:
     assert 0.5 < caught.value.shortest < 4
 
 
+@pytest.mark.long
 def test_motions_that_stop_become_motions_that_pass_and_need_no_more() -> None:
     """What stands in where the search finds nothing better than stopping."""
     asked = of(*(Stop(name=f"{k}", target=q, via=k < 2) for k, q in enumerate(Q)))
@@ -295,6 +296,7 @@ def test_a_motion_has_a_dozen_passes_at_most() -> None:
         of(*many, Stop(name="one more", target=Q[0], via=True))
 
 
+@pytest.mark.long
 def test_passes_at_the_same_place_are_one() -> None:
     """Twice in a row, at the start and at the goal: the curve is there already."""
     places = [HOME, Q[0], Q[0], Q[1]]
@@ -310,6 +312,7 @@ def test_passes_at_the_same_place_are_one() -> None:
     )
 
 
+@pytest.mark.long
 def test_waiting_is_not_at_a_stop_that_is_passed() -> None:
     """In much more time than the cycle takes: neither ours nor the one that stops rests there for
     long.

@@ -147,6 +147,7 @@ def test_each_of_several_targets_has_lines_of_its_own() -> None:
         )
 
 
+@pytest.mark.long
 def test_a_path_that_no_branch_follows_says_how_far_each_gets() -> None:
     far = replace(BEAD, goal=down(0.45, 1.2, 0.2), path=ToolPath())
     with pytest.raises(PathInfeasible) as refusal:

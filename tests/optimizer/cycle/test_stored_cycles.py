@@ -102,6 +102,7 @@ def test_without_room_it_is_the_shared_bus_and_without_limits_the_recuperating_o
     assert boundless.status == other.status
 
 
+@pytest.mark.long
 def test_it_is_never_above_choosing_move_by_move() -> None:
     own = plan_cycle(with_bus(ASKED, LARGE))
     theirs = {each.name: each.electrical for each in own.baselines}

@@ -179,6 +179,7 @@ def test_a_greatest_time_is_as_good_as_this_time_where_it_is_short() -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", long_but([0.5], [0.05, 0.5]))
 def test_too_little_time_says_how_much_the_fastest_cycle_takes(factor: float) -> None:
     with pytest.raises(CycleTooShort) as refusal:
@@ -222,6 +223,7 @@ def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
             assert found.energy.electrical.total <= total * (1 + CONVERGED)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "hold",
     [pytest.param({}, marks=pytest.mark.long), {"hold": "brakes", "brake_power": 1.0}],
@@ -264,6 +266,7 @@ def test_a_least_time_is_bounded_for_longer_cycles_and_longer_moves_too(
         assert bound <= sum(moving(k, t) for k, t in enumerate(durations)) + waiting * waited
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("readings", long_but([3000], [500, 3000, 10_000]))
 def test_a_deadline_gives_a_cycle_in_its_time_or_says_so(readings: int) -> None:
     asked = replace(in_time(ASKED, 1.3 * free().duration), deadline=float(readings))

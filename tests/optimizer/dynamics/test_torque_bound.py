@@ -62,7 +62,7 @@ def prepared_for(robot: str, side: str = "motor") -> PreparedProblem:
 SIDES = [("ur5e", "motor"), ("ur5e", "link"), ("panda", "motor"), ("ur20", "motor")]
 
 
-@pytest.mark.parametrize(("robot", "side"), long_but(SIDES[:2], SIDES))
+@pytest.mark.parametrize(("robot", "side"), long_but(SIDES[1:2], SIDES))
 def test_no_torque_between_samples_is_above_the_bound(robot: str, side: str) -> None:
     prepared, missed = prepared_for(robot, side), []
     for seed in range(2):

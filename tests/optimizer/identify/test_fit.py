@@ -24,6 +24,7 @@ from joulepath.optimizer.identify.quality import curves as curves_module
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
 from tests.refusals import refusal_of
+from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
 WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
@@ -102,6 +103,7 @@ def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
         assert (np.diff(curves.time)[np.diff(curves.move) == 0] > 0).all()
 
 
+@pytest.mark.long
 def test_curves_of_long_logs_are_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(curves_module, "CURVES", curves_module.CurveSettings(max_rows=MOST))
     truth = truth_of(ROBOT)
@@ -155,7 +157,7 @@ def test_power_alone_gives_idle_power_and_the_size_of_friction() -> None:
     assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
 
 
-@pytest.mark.parametrize("scale", [0.88, 1.0])
+@pytest.mark.parametrize("scale", long_but([0.88], [0.88, 1.0]))
 def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
     """The power of lifting tells it; the payload, which is known, is not scaled with them."""
     none = np.zeros((3, 3))

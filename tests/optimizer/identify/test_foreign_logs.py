@@ -17,6 +17,7 @@ from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import LogReading, read_log
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
+from tests.selection import long_but
 
 ROBOT = load_robot("ur5e")
 SEVEN = load_robot("panda")
@@ -312,7 +313,7 @@ def test_speeds_of_one_joint_that_are_none(recording: Recording) -> None:
     )
 
 
-@pytest.mark.parametrize("robot", ["ur5e", "gen3"])
+@pytest.mark.parametrize("robot", long_but(["ur5e"], ["ur5e", "gen3"]))
 def test_efforts_of_one_joint_with_the_other_sign(robot: str) -> None:
     arm = load_robot(robot)
     turned = recorded(arm, truth_of(arm), moves=6)

@@ -17,6 +17,7 @@ from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import Noise, recorded, truth_of
+from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
 STILL = 5
@@ -43,7 +44,9 @@ def variances(robot: Robot) -> dict[str, float]:
     return dict(zip(known.names, np.diag(known.matrix).tolist(), strict=True))
 
 
-@pytest.mark.parametrize("options", [{}, {"refit": True}, {"method": "base_parameters"}])
+@pytest.mark.parametrize(
+    "options", long_but([{}], [{}, {"refit": True}, {"method": "base_parameters"}])
+)
 def test_a_kept_figure_is_exactly_the_robots_own_and_has_no_deviation(
     options: dict[str, Any],
 ) -> None:
@@ -110,6 +113,7 @@ def test_errors_of_held_figures_move_the_others_as_far_as_a_fit_with_such_errors
     assert not found[3:].any() and not found[:, 3:].any()
 
 
+@pytest.mark.long
 def test_base_parameters_count_the_errors_of_figures_that_are_held() -> None:
     """Of units that are as far from engineering defaults as these promise, the figures found beside
     held ones are within three standard deviations. Without the errors of held figures, 3 of 57 are

@@ -23,6 +23,7 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
 from tests.identification_logs import Truth, recorded, rigid_torques, truth_of
+from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
 TRUTH = truth_of(ROBOT)
@@ -105,7 +106,7 @@ def test_ten_seconds_at_rest_are_asked_for_where_no_power_was_logged() -> None:
     assert found.advice == found.measure[0]
 
 
-@pytest.mark.parametrize("channels", ["currents", "power"])
+@pytest.mark.parametrize("channels", long_but(["currents"], ["currents", "power"]))
 def test_a_known_figure_takes_its_share_out_of_the_interval(channels: str) -> None:
     """Against the intervals of answers, of the document and of one in which the figure is known."""
     log = recorded(ROBOT, TRUTH, moves=8).log()

@@ -215,6 +215,7 @@ def test_links_from_the_wrench_beneath_the_arm() -> None:
     assert "coulomb" not in body
 
 
+@pytest.mark.long
 def test_links_from_the_wrench_do_not_depend_on_the_payload() -> None:
     model, (q, v, a) = ROBOT.model, fourier(ROBOT.nq, 2)
     payload = Payload(3.0, np.array([0.0, 0.02, 0.1]))
@@ -233,6 +234,7 @@ def test_links_from_the_wrench_do_not_depend_on_the_payload() -> None:
     assert found[0] == pytest.approx(found[1], rel=1e-3)
 
 
+@pytest.mark.long
 def test_four_times_the_moves_halve_the_deviations() -> None:
     """Verdonck, Radkhah: what a log tells of a figure goes by how it excites it; and the truth is
     within it.

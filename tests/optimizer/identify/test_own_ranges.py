@@ -17,6 +17,7 @@ from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import Noise, recorded, truth_of
+from tests.selection import long_but
 
 ARM = load_robot("ur15")
 """All of its friction and rotors are engineering defaults."""
@@ -93,7 +94,7 @@ def test_figures_of_earlier_logs_are_as_well_known_as_their_document_says() -> N
         assert sd == pytest.approx(np.sqrt(covariance["matrix"][place][place]))
 
 
-@pytest.mark.parametrize("method", ["automatic", "base_parameters"])
+@pytest.mark.parametrize("method", long_but(["automatic"], ["automatic", "base_parameters"]))
 def test_a_small_figure_takes_its_estimate_where_the_own_value_is_a_default(method: Method) -> None:
     """Its standard deviation is large beside its value, and small beside the error of a default."""
     options = IdentificationOptions(method=method, constants=False, held_out=0.0)

@@ -50,7 +50,7 @@ def check(carried: IdentifiedPayload, mass: float = PAYLOAD.mass) -> None:
     assert (np.abs(carried.com - PAYLOAD.com) <= FAR * sd[1:]).all() and sd[1:].max() < 0.005
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", long_but([0], [0, 1]))
 def test_mass_and_centre_of_mass_are_found(seed: int) -> None:
     """In other motions than those of the log without the payload."""
     check(found_in(log_of(NOTHING, seed, NOTHING, seed), log_of(PAYLOAD, seed, PAYLOAD, seed + 50)))
@@ -68,6 +68,7 @@ def test_errors_of_the_links_do_not_become_payload() -> None:
     check(found)
 
 
+@pytest.mark.long
 def test_torque_constants_that_differ_make_the_mass_less_certain() -> None:
     """Of joints whose motors give up to 4 % more or less torque than the robot's figures say."""
     wrong = np.array([1.0, 1.04, 0.97, 1.03, 1.0, 1.0])
@@ -118,6 +119,7 @@ def turned(log: Log) -> Log:
     return replace(log, **motion, effort=np.where(first, np.asarray(log.effort), 0.01))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([0], [0, 1]))
 def test_nothing_carried_is_found_with_its_deviation(seed: int) -> None:
     """Whether the last log says so or not, and where the others carried something, too."""

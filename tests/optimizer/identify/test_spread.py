@@ -54,6 +54,7 @@ def _estimates(seed: int) -> tuple[Array, Array, Array]:
     )
 
 
+@pytest.mark.long
 def test_adjusted_residuals_tell_the_error_where_leaving_a_group_out_says_too_much() -> None:
     errors, by_residuals, by_leaving_out = (
         np.array(each) for each in zip(*map(_estimates, range(400)), strict=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import cycle, product
 
 import numpy as np
 import pytest
@@ -24,6 +25,17 @@ from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
 TRUTH = truth_of(ROBOT, 0)
+METHODS: tuple[Method, ...] = (
+    "automatic",
+    "base_parameters",
+    "essential_parameters",
+    "threshold_velocity",
+)
+KINDS = ("all channels", "currents", "constant currents", "one joint", "the same row")
+QUICK = [
+    *((method, kind, 2) for method, kind in zip(cycle(METHODS), KINDS, strict=False)),
+    ("essential_parameters", "the same row", 2),
+]
 ENERGY_ERROR = 5.0
 """Largest error [%] of the mean energy of a move from six moves without noise; the friction of the
 drives, which torques behind the gears do not show, is known from the power of four moves alone."""
@@ -52,13 +64,8 @@ def _log(kind: str, moves: int) -> Log:
             return log
 
 
-@pytest.mark.parametrize("moves", long_but([2], [1, 2, 3]))
 @pytest.mark.parametrize(
-    "kind",
-    ["all channels", "currents", "constant currents", "one joint", "the same row"],
-)
-@pytest.mark.parametrize(
-    "method", ["automatic", "base_parameters", "essential_parameters", "threshold_velocity"]
+    ("method", "kind", "moves"), long_but(QUICK, product(METHODS, KINDS, (1, 2, 3)))
 )
 def test_a_tiny_log_gives_figures_to_load_or_a_named_error(
     method: Method, kind: str, moves: int

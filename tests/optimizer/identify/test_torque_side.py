@@ -30,6 +30,7 @@ from tests.identification_logs import (
     truth_of,
 )
 from tests.refusals import refusal_of
+from tests.selection import long_but
 
 PANDA = load_robot("panda")
 WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
@@ -115,7 +116,7 @@ def test_gains_of_sensors_are_not_taken_for_links() -> None:
     assert (ratio[[3, 5]] < 0.1).all()
 
 
-@pytest.mark.parametrize("distance", [1e-5, 2e-3])
+@pytest.mark.parametrize("distance", long_but([2e-3], [1e-5, 2e-3]))
 def test_friction_of_bearings_reverses_over_the_distance_of_the_log(distance: float) -> None:
     truth = truth_of(PANDA, 2)
     recording = recorded(PANDA, truth, moves=14, seed=2)
@@ -131,6 +132,7 @@ def test_friction_of_bearings_reverses_over_the_distance_of_the_log(distance: fl
     assert sensor.sensor_coulomb == pytest.approx([BEARING] * PANDA.nq, rel=0.05)
 
 
+@pytest.mark.long
 def test_advice_asks_for_what_the_links_do_not_tell(heavier: tuple[Robot, Log]) -> None:
     advice = identify(PANDA, [heavier[1]], WITHOUT_SPLIT).advice
     assert advice is not None and advice.figure in ("idle_power", "coulomb", "copper")
@@ -175,7 +177,9 @@ def test_keeping_the_links_or_asking_for_friction_is_refused_with_the_cause(
         replace(log, effort_meaning="current")
 
 
-@pytest.mark.parametrize("method", ["base_parameters", "essential_parameters"])
+@pytest.mark.parametrize(
+    "method", long_but(["base_parameters"], ["base_parameters", "essential_parameters"])
+)
 def test_base_parameters_behind_the_gears_have_no_rotors(
     heavier: tuple[Robot, Log], method: str
 ) -> None:

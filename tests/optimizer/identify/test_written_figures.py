@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Arm
 from tests.identification_logs import Recording, recorded, truth_of, with_current
 from tests.identification_logs import rigid_torques as true_torques
+from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
 # relative; a few roundings of sums of some ten terms
@@ -140,7 +142,11 @@ def test_equations_of_joints_that_keep_other_terms_are_those_without_their_torqu
 
 
 @pytest.mark.parametrize(
-    "options", [{}, {"terms": ("coulomb",)}, {"fit": ("rotor",)}, {"fit": ("power",)}]
+    "options",
+    long_but(
+        [{"fit": ("rotor",)}],
+        [{}, {"terms": ("coulomb",)}, {"fit": ("rotor",)}, {"fit": ("power",)}],
+    ),
 )
 def test_figures_beside_earlier_ones_are_written_as_fitted(options: dict[str, Any]) -> None:
     """What a later log does not change is that of the earlier logs, not of the robot's maker."""
@@ -149,8 +155,13 @@ def test_figures_beside_earlier_ones_are_written_as_fitted(options: dict[str, An
     check(identify(written(first), [log], IdentificationOptions(held_out=0.0, **options)), log)
 
 
-@pytest.mark.parametrize("method", ["base_parameters", "essential_parameters"])
-@pytest.mark.parametrize("still", [5, None])
+@pytest.mark.parametrize(
+    ("method", "still"),
+    long_but(
+        [("base_parameters", 5), ("essential_parameters", None)],
+        product(("base_parameters", "essential_parameters"), (5, None)),
+    ),
+)
 def test_methods_without_links_write_the_other_figures_as_they_were_fitted(
     method: Method, still: int | None
 ) -> None:
@@ -172,7 +183,7 @@ def test_methods_without_links_write_the_other_figures_as_they_were_fitted(
     assert energy.electrical.total == pytest.approx(arm.energy(rows), rel=2e-3)
 
 
-@pytest.mark.parametrize("terms", [DEFAULT_TERMS, CURVED])
+@pytest.mark.parametrize("terms", long_but([CURVED], [DEFAULT_TERMS, CURVED]))
 def test_figures_of_power_beside_torques_behind_the_gears_are_written_as_they_were_fitted(
     terms: tuple[Term, ...],
 ) -> None:
@@ -222,14 +233,17 @@ def test_what_power_hardly_determines_keeps_its_letter_and_says_so() -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [
-        {"fit": ("friction",)},
-        {"fit": ("rotor",)},
-        {"fit": ("friction", "rotor", "torque_constant"), "terms": CURVED},
-        {"knee": 0.02},
-        {"estimator": "irls", "terms": CURVED},
-        {"method": "threshold_velocity"},
-    ],
+    long_but(
+        [{"fit": ("friction",)}, {"method": "threshold_velocity"}],
+        [
+            {"fit": ("friction",)},
+            {"fit": ("rotor",)},
+            {"fit": ("friction", "rotor", "torque_constant"), "terms": CURVED},
+            {"knee": 0.02},
+            {"estimator": "irls", "terms": CURVED},
+            {"method": "threshold_velocity"},
+        ],
+    ),
 )
 def test_figures_of_any_options_are_written_as_they_were_fitted(options: dict[str, Any]) -> None:
     log = log_of()
@@ -241,7 +255,7 @@ def test_figures_of_power_alone_are_written_as_they_were_fitted() -> None:
     check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0)), log)
 
 
-@pytest.mark.parametrize("terms", [("coulomb", "viscous", "offset"), CURVED])
+@pytest.mark.parametrize("terms", long_but([CURVED], [("coulomb", "viscous", "offset"), CURVED]))
 def test_refitted_links_are_written_as_they_were_fitted(terms: tuple[Term, ...]) -> None:
     log = log_of()
     options = IdentificationOptions(held_out=0.0, refit=True, terms=terms)

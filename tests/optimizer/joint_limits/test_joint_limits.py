@@ -32,6 +32,7 @@ from tests.models.own_arm.palletiser import ACROSS, UP, joint, link
 from tests.models.own_arm.palletiser import description as palletiser
 from tests.optimizer.joint_limits.attack import torque_ratios, worst_ratio
 from tests.refusals import refusal_of
+from tests.selection import long_but
 
 HOME, REST = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.zeros((2, 6))
 PENDULUM = (
@@ -67,7 +68,9 @@ def test_the_terms_give_the_torques_of_pinocchio(name: str) -> None:
     assert bodies + arm.drives.rotor_inertia * a == pytest.approx(expected, abs=ROUNDING)
 
 
-@pytest.mark.parametrize(("name", "half"), [("ur5e", 0.4), ("panda", 0.4), ("ur10e", 0.1)])
+@pytest.mark.parametrize(
+    ("name", "half"), long_but([("panda", 0.4)], [("ur5e", 0.4), ("panda", 0.4), ("ur10e", 0.1)])
+)
 def test_the_bound_of_a_box_holds_inside_it(name: str, half: float) -> None:
     """And is near: a box is not refused without a reason."""
     arm = loaded(name, com=(0.03, 0.02, 0.1))
@@ -122,6 +125,7 @@ def test_no_attack_exceeds_a_torque_limit_of_any_robot(name: str) -> None:
     assert ratio <= 1
 
 
+@pytest.mark.long
 def test_narrower_ranges_leave_more() -> None:
     arm = loaded("ur5e")
     most = arm.active_limits
@@ -167,6 +171,7 @@ def test_the_file_of_moveit() -> None:
     assert "gravity (0, 0, -9.81) m/s²" in head
 
 
+@pytest.mark.long
 def test_the_file_of_several_moves_claims_no_payload_for_all() -> None:
     spline = spline_through(np.array([0.0, 1.5]), np.array([HOME, HOME + 0.3]), REST, REST)
     moves = [(spline, loaded("ur5e", share)) for share in (1.0, 0.0)]

@@ -66,6 +66,7 @@ def test_an_excursion_of_the_path_cannot_be_left_out() -> None:
         assert course.deviation(course.poses(np.linspace(0.0, 1.0, 5000)))[0].max() < tolerance
 
 
+@pytest.mark.long
 def test_a_course_that_turns_back_between_two_of_its_points_is_compared() -> None:
     """Two points of the course's grid then coincide."""
     out = 0.1

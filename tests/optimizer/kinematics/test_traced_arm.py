@@ -211,6 +211,7 @@ def test_no_curve_of_a_closed_form_is_missing() -> None:
     assert members > 15 and found >= COVERED * members
 
 
+@pytest.mark.long
 def test_most_nearly_straight_arms_are_found() -> None:
     """The elbow of the first one was once missed, and its pose refused."""
     arm, rng = TracedArm.of(GEN3.model), np.random.default_rng(3)
@@ -255,6 +256,7 @@ def test_an_upright_arm_is_refused_as_singular() -> None:
     assert str(required_inverse_kinematics(GEN3, "goal").label(np.zeros(7))) == "branch 1"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("from_pose", long_but((False,), (False, True)))
 def test_an_answer_over_curves_that_may_be_missing_is_not_optimal(from_pose: bool) -> None:
     start, goal = move(7)

@@ -125,6 +125,7 @@ def test_no_cycle_needs_less_than_the_bound(region: str, robot: str) -> None:
     assert found
 
 
+@pytest.mark.long
 def test_it_is_far_above_the_bound_that_knows_no_configurations() -> None:
     space = space_of(two_stops(), REGIONS["shifted"])
     bound, plain = box_bound(space, NEVER), region_bound(space)

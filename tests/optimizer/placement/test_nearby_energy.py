@@ -44,6 +44,7 @@ def test_estimates_rank_places_as_certified_cycles_do() -> None:
     assert (values.argsort(axis=1)[0] == values.argsort(axis=1)[1]).all()
 
 
+@pytest.mark.long
 def test_far_away_the_best_cycles_are_sought() -> None:
     rounds = rounds_of(Region(x=(-3.0, 0.2)))
     asked = list[float]()

@@ -98,6 +98,7 @@ def test_the_base_at_the_same_place_in_another_world_costs_the_same() -> None:
     assert by_group.best.energy == pytest.approx(by_base.best.energy, rel=SCATTER)
 
 
+@pytest.mark.long
 def test_the_map_tells_why_there_is_no_cycle() -> None:
     cycle = two_stops([floor(), wall(-0.35)])
     places = [at(-3.0), at(-0.2)]
@@ -127,6 +128,7 @@ def test_a_bad_nominal_place_does_not_matter() -> None:
     assert found.best.base.position == pytest.approx([-0.05, 0.0, 0.0])
 
 
+@pytest.mark.long
 def test_weights_count() -> None:
     short = two_stops(stops=two_stops().stops[:1])
     cycles = [WeightedCycle(two_stops(), 3.0), WeightedCycle(short)]
@@ -136,6 +138,7 @@ def test_weights_count() -> None:
     assert found.best.energy == pytest.approx(3 * first + second)
 
 
+@pytest.mark.long
 def test_a_deadline_gives_the_best_so_far() -> None:
     ticks = iter(range(10**9))
     placement = Placement(

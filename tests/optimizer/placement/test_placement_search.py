@@ -84,6 +84,7 @@ def test_bounds_are_descended_from_local_minima_and_from_where_they_may_fall_bel
     assert len(found) == starts
 
 
+@pytest.mark.long
 def test_a_place_between_those_of_the_map_is_found_by_its_bound(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

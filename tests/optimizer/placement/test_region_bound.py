@@ -128,7 +128,7 @@ CYCLES: dict[str, dict[str, Any]] = {
 }
 
 
-QUICK = ("fast", "open", "home", "recuperating")
+QUICK = ("open", "recuperating")
 
 
 @pytest.mark.parametrize("name", long_but(QUICK, CYCLES))

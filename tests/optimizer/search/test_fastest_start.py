@@ -68,7 +68,7 @@ def from_fastest(state: SearchState, best: Candidate) -> float:
 
 
 @pytest.mark.parametrize(
-    "index", long_but([HELD_BACK, ENDED_EARLY], [HELD_BACK_TO_POSE, HELD_BACK, ENDED_EARLY])
+    "index", long_but([HELD_BACK], [HELD_BACK_TO_POSE, HELD_BACK, ENDED_EARLY])
 )
 def test_an_answer_needs_no_more_than_what_the_time_optimal_motion_leads_to(index: int) -> None:
     state, best = refined(asked(index))

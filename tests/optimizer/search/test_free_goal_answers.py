@@ -99,7 +99,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("condition", long_but(("tool and payload", "time scaling"), CONDITIONS))
+@pytest.mark.parametrize("condition", long_but(("tool and payload",), CONDITIONS))
 def test_holds_under(condition: str) -> None:
     """Every other setting with a cone about a tool axis: in place, within the cone, above the
     bound.

@@ -169,6 +169,7 @@ def plain_and_held(posed: Problem, monkeypatch: pytest.MonkeyPatch) -> tuple[flo
         return self_motion_bound(prepared, candidates), held
 
 
+@pytest.mark.long
 def test_holding_raises_the_bound_of_curves_and_no_motion_spends_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -68,6 +68,7 @@ def test_the_goal_moves_once_more_after_the_refinement(monkeypatch: pytest.Monke
     assert found.certificate.valid
 
 
+@pytest.mark.long
 def test_no_motion_of_near_duration_stores_more_to_advantage() -> None:
     """Where the storage just takes all surplus, the best motion needs the value of a joule of
     surplus to be nearly the highest: coarser values left 1.6 % here.

@@ -194,6 +194,7 @@ def test_an_end_may_slide_onto_a_joint_limit() -> None:
     assert answer.certificate.valid and max(answer.certificate.goal_error) < HELD
 
 
+@pytest.mark.long
 def test_an_answer_between_poses_holds_both() -> None:
     answer = optimize(problem_of("panda", 6, both=True))
     assert answer.certificate.valid

@@ -188,7 +188,7 @@ def test_gradients_of_the_retiming() -> None:
         assert np.abs(state.slopes[:, k] - slopes).max() < DIFFERENCE_TOLERANCE * scale
 
 
-@pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
+@pytest.mark.parametrize("method", long_but(["time_scaling"], ["time_scaling", "uniform_scaling"]))
 def test_limits_along_the_motion_hold_on_a_planned_path(method: MethodName) -> None:
     free = optimize(blocked(method, POST))
     slower = optimize(problem_with(START, GOAL, scene=Scene((POST,)), method=method, tcp_speed=0.4))

@@ -232,6 +232,7 @@ def test_the_genetic_algorithm_solves_a_few_candidates_and_says_so_of_the_others
     assert not left or max(first) <= min(last)
 
 
+@pytest.mark.long
 def test_the_genetic_algorithm_is_never_optimal_with_energy_storage_either() -> None:
     """With a store, the answer may be the motion found without the store."""
     store = Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9)

@@ -25,6 +25,7 @@ from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from tests.optimizer.moves import AMPLE, GOAL, START, fixed, problem
 from tests.optimizer.search.runs import prepared
 from tests.refusals import refusal_of
+from tests.selection import long_but
 
 # tolerance of a spline at the time of a pass [rad]
 ON_PASS = 1e-9
@@ -60,7 +61,7 @@ def stopping(q: Array) -> list[Solution]:
     return [optimize(problem(a, b)) for a, b in pairwise(q)]
 
 
-@pytest.mark.parametrize("passes", [1, 3])
+@pytest.mark.parametrize("passes", long_but([1], [1, 3]))
 def test_it_goes_through_every_configuration_and_needs_less_than_stopping(passes: int) -> None:
     for seed in range(2):
         q = configurations(seed, passes)

@@ -36,6 +36,7 @@ from tests.optimizer.collision.test_path_planner import (
     task,
     walled_in,
 )
+from tests.selection import long_but
 
 
 def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
@@ -63,7 +64,7 @@ def test_more_paths_are_planned_only_where_the_first_is_hard_to_find() -> None:
         np.testing.assert_array_equal(path, same)
 
 
-@pytest.mark.parametrize("goals", [1, 2])
+@pytest.mark.parametrize("goals", long_but([2], [1, 2]))
 def test_more_paths_are_planned_for_the_only_candidate(
     goals: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -164,6 +165,7 @@ def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(
     ) == skipped
 
 
+@pytest.mark.long
 def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_paths(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
