@@ -72,33 +72,29 @@ def pairs_that_meet(
     shapes = [
         [(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules
     ]
-    balls = [_balls(rows) for rows in capsules]
+    frames = [
+        _frames(chain, upright, q)
+        for q in np.random.default_rng(0).uniform(
+            chain.q_min, chain.q_max, (OVERLAP.samples, chain.nq)
+        )
+    ]
+    balls = [_balls(rows, [each[k] for each in frames]) for k, rows in enumerate(capsules)]
     request = coal.CollisionRequest()
-    for q in np.random.default_rng(0).uniform(
-        chain.q_min, chain.q_max, (OVERLAP.samples, chain.nq)
-    ):
-        frames = [pin.SE3.Identity()]
-        angles = chain.coupling.positions(q)
-        for angle, placement in zip(angles, upright.placements, strict=True):
-            frames.append(
-                frames[-1] * placement * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3))
-            )
-        for k, pair in enumerate(pairs):
+    for k, (a, b) in enumerate(pairs):
+        met = set[int]()
+        for sample, i, j in _close(balls[a], balls[b]):
             checkpoint()
-            (T_a, first, around_a), (T_b, second, around_b) = (
-                (frames[i], shapes[i], balls[i]) for i in pair
-            )
-            meets[k] += any(
-                coal.collide(
-                    first[i][0],
-                    _pose(T_a * first[i][1]),
-                    second[j][0],
-                    _pose(T_b * second[j][1]),
-                    request,
-                    coal.CollisionResult(),
-                )
-                for i, j in _close(T_a, around_a, T_b, around_b)
-            )
+            (first, of_a), (second, of_b) = shapes[a][i], shapes[b][j]
+            if sample not in met and coal.collide(
+                first,
+                _pose(frames[sample][a] * of_a),
+                second,
+                _pose(frames[sample][b] * of_b),
+                request,
+                coal.CollisionResult(),
+            ):
+                met.add(sample)
+        meets[k] = len(met)
     found = MeetingPairs([], [])
     for (a, b), share in zip(pairs, meets / OVERLAP.samples, strict=True):
         if share >= (OVERLAP.guessed_share if guessed[a] or guessed[b] else OVERLAP.share):
@@ -108,22 +104,27 @@ def pairs_that_meet(
     return found
 
 
-def _balls(rows: Rows) -> Array:
-    """Centre and radius (n, 4) [m] of the ball around each capsule."""
-    return np.array(
-        [
-            [*((np.array(row[:3]) + row[3:6]) / 2), row[6] + _length(row) / 2 + OVERLAP.rounding]
-            for row in rows
-        ]
-    )
+def _frames(chain: Chain, upright: UprightChain, q: Array) -> list[pin.SE3]:
+    """Placements of the links in the base at a configuration (nq,), base first."""
+    frames = [pin.SE3.Identity()]
+    for angle, placement in zip(chain.coupling.positions(q), upright.placements, strict=True):
+        turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3))
+        frames.append(frames[-1] * placement * turn)
+    return frames
 
 
-def _close(T_a: pin.SE3, first: Array, T_b: pin.SE3, second: Array) -> list[list[int]]:
-    """Index pairs of overlapping balls (n, 4) and (m, 4) [m], each given in its own frame."""
-    a, b = (
-        balls[:, :3] @ T.rotation.T + T.translation for T, balls in ((T_a, first), (T_b, second))
-    )
-    apart = np.linalg.norm(a[:, None] - b[None], axis=2) - first[:, None, 3] - second[None, :, 3]
+def _balls(rows: Rows, frames: list[pin.SE3]) -> tuple[Array, Array]:
+    """Centres (samples, n, 3) in the base and radii (n,) [m] of the balls around the capsules of a
+    link."""
+    centres = np.array([(np.array(row[:3]) + row[3:6]) / 2 for row in rows])
+    turned = np.array([centres @ T.rotation.T + T.translation for T in frames])
+    return turned, np.array([row[6] + _length(row) / 2 + OVERLAP.rounding for row in rows])
+
+
+def _close(first: tuple[Array, Array], second: tuple[Array, Array]) -> list[list[int]]:
+    """Sample and indices of overlapping balls."""
+    (a, r_a), (b, r_b) = first, second
+    apart = np.linalg.norm(a[:, :, None] - b[:, None], axis=3) - r_a[:, None] - r_b
     return np.argwhere(apart <= 0).tolist()
 
 
