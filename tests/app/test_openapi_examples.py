@@ -115,6 +115,12 @@ def test_every_body_has_an_example() -> None:
 # path, an excitation of all parameters, a map of many places
 SLOW = (
     "post /cycle application/json glue_path",
+    "post /cycle application/json past_a_scanner",
+    "post /optimize application/json collaborative_speeds",
+    "post /optimize application/json glue_corner",
+    "post /optimize application/json glue_line",
+    "post /optimize application/json storage_on_the_bus",
+    "post /pareto application/json lift",
     "post /cycle application/json out_of_a_tray",
     "post /excitation application/json friction_and_rotors",
     "post /pareto application/json branch_switch",

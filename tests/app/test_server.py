@@ -252,10 +252,16 @@ def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbag
     ("settings", "deadline", "count", "statuses"),
     [
         # done in its own time: a busy machine may find no motion in it
-        ({"shutdown_grace": LONG, "deadline_grace": GRACE}, 1.0, 1, {200, 504}),
-        ({"shutdown_grace": 1.0}, LONG, 3, {503}),
+        pytest.param(
+            {"shutdown_grace": LONG, "deadline_grace": GRACE},
+            1.0,
+            1,
+            {200, 504},
+            id="ample",
+            marks=pytest.mark.long,
+        ),
+        pytest.param({"shutdown_grace": 1.0}, LONG, 3, {503}, id="short"),
     ],
-    ids=["ample", "short"],
 )
 def test_sigterm_answers_or_refuses_all_in_flight(
     settings: dict[str, float], deadline: float, count: int, statuses: set[int]

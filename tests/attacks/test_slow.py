@@ -100,6 +100,7 @@ def test_much_more_time_than_a_move_needs_is_used(
     assert energy(optimize(problem(START, goal, **fixed(duration)))) < least * (1 + MOST_EXCESS)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", long_but(["panda"], ["panda", "ur20"]))
 def test_other_robots_ramp_as_fast_as_they_can(name: str) -> None:
     robot = load_robot(name)

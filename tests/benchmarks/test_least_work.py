@@ -30,6 +30,7 @@ def test_turning_the_base_costs_its_kinetic_energy_twice() -> None:
     assert found == pytest.approx(inertia * fastest**2, rel=SAMPLED)
 
 
+@pytest.mark.long
 def test_the_work_is_the_objective_of_a_rigid_robot() -> None:
     arm = Arm(robot=rigid(load_robot("panda")), payload=Payload(2.9, COM))
     q = np.array([0, -0.785, 0, -2.356, 0, 1.571, 0.785])

@@ -17,9 +17,7 @@ from tests.pages.blocks import DOCS, SERVICE, blocks_of, run
 MOST_LINES = 40  # of a how-to
 HOW_TO = sorted(page for page in (DOCS / "how_to").glob("*.md") if page.stem != "index")
 START = sorted((DOCS / "start").glob("*.md"))
-QUICK = (
-    *("behind_nginx", "first_saving", "other_program", "pendant_pose", "progress", "run_on_robot"),
-)
+QUICK = ("behind_nginx", "first_saving", "progress", "run_on_robot")
 """Pages that take no more than a few seconds; the others are for `make test-long`."""
 LOGS = {"monday.csv": (0, 6), "friday.csv": (1, 3), "log.csv": (0, 6)}
 """Files of a reader's own that pages name: seed and number of the moves of simulated logs."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -65,8 +63,7 @@ def test_the_exit_code_of_the_server_is_kept(code: int) -> None:
         f"server.serve = lambda settings: sys.exit({code}); sys.argv = ['joulepath']; "
         "from joulepath.app.__main__ import main; main()"
     )
-    ended = subprocess.run([sys.executable, "-c", program], timeout=EXIT, check=False)
-    assert ended.returncode == code
+    assert run(("-c", program), os.environ, EXIT).returncode == code
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,7 @@ def test_a_cycle_is_advised_on_its_way_home_and_its_stops(client: TestClient) ->
     assert savings == sorted(savings, reverse=True) and min(savings) > 0
 
 
+@pytest.mark.long
 def test_the_way_home_is_needed_where_something_is_carried_there(client: TestClient) -> None:
     stops = [CYCLE["stops"][0], CYCLE["stops"][1] | {"payload": PART}]
     assert "without_home" not in by_name(advised(client, cycle=CYCLE | {"stops": stops}))
@@ -110,6 +111,7 @@ def test_a_lighter_tool_has_half_of_the_mass(client: TestClient) -> None:
     assert lighter["energy"] == pytest.approx(energy(client, "/optimize", half), rel=CLOSE)
 
 
+@pytest.mark.long
 def test_only_the_changes_that_are_asked_for_are_computed(client: TestClient) -> None:
     asked = {"optimize": move(payload=PART), "period": 6.0}
     both = advised(client, **asked)
@@ -119,6 +121,7 @@ def test_only_the_changes_that_are_asked_for_are_computed(client: TestClient) ->
     assert brakes["energy"] == pytest.approx(by_name(both)["brakes"]["energy"], rel=CLOSE)
 
 
+@pytest.mark.long
 def test_a_task_with_its_own_time_or_another_objective_gets_no_wait(client: TestClient) -> None:
     own = advised(client, optimize=move(dwell={"time": 4.0}), period=9.0)
     assert own["waiting"] == 0 and set(by_name(own)) <= {"brakes"}

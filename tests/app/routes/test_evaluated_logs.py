@@ -295,6 +295,7 @@ def test_the_command_sets_measured_against_predicted(recording: Recording, tmp_p
     assert rows[-1].startswith("total") and all("power" in row and "%" in row for row in rows)
 
 
+@pytest.mark.long
 def test_a_log_that_repeats_has_cycles(client: TestClient, tmp_path: Path) -> None:
     repeated = recorded(ROBOT, TRUTH, moves=4, seed=2, closed=True, cycles=3)
     answer = client.post("/evaluate", content=rtde(repeated), headers=CSV)

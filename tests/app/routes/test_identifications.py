@@ -35,6 +35,7 @@ from tests.app.problems import checked
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import Truth, csv_of, recorded, truth_of
+from tests.selection import long_but
 
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
@@ -219,6 +220,7 @@ def test_identifications_are_listed(client: TestClient, log: str) -> None:
     refused(client.get(f"/identifications/{found.id}/residuals"), UnknownIdentification)
 
 
+@pytest.mark.long
 def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log: str) -> None:
     other = add_log(client, moves=4, seed=5)
     result = done(client, logs=[log], validate=[other], inertials="refit", estimator="irls")
@@ -228,6 +230,7 @@ def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log:
     assert {"mass", "center_of_mass", "inertia"} <= result.document["inertials"].keys()
 
 
+@pytest.mark.long
 def test_each_motion_in_its_turn(client: TestClient, log: str) -> None:
     assert done(client, logs=[log], validate="moves").validation.moves == 8
 
@@ -259,7 +262,11 @@ def test_what_logs_do_not_tell_is_a_problem(
 
 
 @pytest.mark.parametrize(
-    "method", ["motor_current", "electrical_power", "essential_parameters", "threshold_velocity"]
+    "method",
+    long_but(
+        ["electrical_power"],
+        ["motor_current", "electrical_power", "essential_parameters", "threshold_velocity"],
+    ),
 )
 def test_methods_are_asked_for_by_name(client: TestClient, log: str, method: str) -> None:
     whole = ended(client, logs=[log], method=method)
@@ -281,6 +288,7 @@ def test_a_method_that_the_log_does_not_fit_is_a_problem(
     assert checked(MethodNotApplicable, found.problem).method == method
 
 
+@pytest.mark.long
 def test_links_from_a_log_with_the_wrench_beneath_the_base(client: TestClient) -> None:
     recording = recorded(ROBOT, TRUTH, moves=8)
     state = (recording.exact_q, recording.exact_v, recording.a)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 import orjson
+import pytest
 from starlette.testclient import TestClient
 
 from tests.app.job_clients import ended
@@ -62,6 +63,7 @@ def test_a_cycle_of_which_one_stop_changed_solves_only_the_moves_to_and_from_it(
     assert without_times(edited) == without_times(fresh)
 
 
+@pytest.mark.long
 def test_another_arm_or_cell_has_none_of_them(client: TestClient) -> None:
     first = sent(client, a_cycle(0.112, NEAR))
     assert all(solves(client, sent(client, a_cycle(0.113, NEAR))))

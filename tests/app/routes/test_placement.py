@@ -204,6 +204,7 @@ def test_no_place_is_a_problem(client: TestClient) -> None:
     assert problem["reasons"]["reach"] == 2
 
 
+@pytest.mark.long
 def test_a_job_answers_as_the_endpoint_does(client: TestClient, found: Json) -> None:
     job = ended(client, sent(client, [{"placement": ASKED}]))
     (request,) = job["requests"]

@@ -189,6 +189,7 @@ def test_where_nothing_keeps_every_limit_no_saving_is_claimed(client: TestClient
     assert "no saving is claimed" in page and 'class="claimed' not in page
 
 
+@pytest.mark.long
 def test_a_way_that_needs_less_in_its_own_time_is_told(client: TestClient) -> None:
     """Around the post, the fast motion and its wait need more than rounded via points."""
     body = json.loads((ROOT / "examples" / "optimize" / "over_a_post.json").read_text())

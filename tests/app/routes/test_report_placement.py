@@ -106,6 +106,7 @@ def test_several_cycles_count_by_their_weights(client: TestClient) -> None:
     assert checked(page, False, "test").agrees
 
 
+@pytest.mark.long
 def test_an_answer_of_something_else_is_refused(client: TestClient) -> None:
     cycle = client.post("/cycle", json=CYCLE).json()
     refused = client.post("/report", json={"placement": TWO, "answer": cycle["id"]})

@@ -141,6 +141,7 @@ def suggested_energy(client: TestClient, path: str, number: int) -> float:
     return client.get(f"{path}/iterations/{number}").json()["energy"]
 
 
+@pytest.mark.long
 def test_a_branch_that_was_asked_for_is_opened(client: TestClient) -> None:
     path = begin(client)
     pose = {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
