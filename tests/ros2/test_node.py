@@ -213,6 +213,7 @@ def test_a_dead_service_is_told_and_the_node_goes_on() -> None:
             assert problem["type"] == UNREACHABLE
 
 
+@pytest.mark.long
 def test_a_service_computes_the_same_plan_as_the_node(ur5e: System) -> None:
     ur5e.stand(left(JOINTS), START)
     ours = ur5e.go_to(left(JOINTS), GOAL)
@@ -285,6 +286,7 @@ def test_a_hundred_plans_in_a_row_are_the_same(ur5e: System) -> None:
     assert np.ptp(energies) <= SAME_ENERGY * energies[0]
 
 
+@pytest.mark.long
 def test_the_example_prints_the_joules_of_a_plan() -> None:
     example = ROOT / "examples" / "ros2" / "plan_to_joints.py"
     with system(robot="ur5e") as own:
