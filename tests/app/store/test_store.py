@@ -108,8 +108,8 @@ def test_a_database_of_another_version_is_refused_with_what_to_do(url: str) -> N
 
 def test_several_processes_may_migrate_at_once(url: str) -> None:
     code = (
-        "import sys; from joulepath.app.store.database import *; "
-        "migrate(create_database_engine(sys.argv[1]))"
+        "import os, sys; from joulepath.app.store.database import *; "
+        "migrate(create_database_engine(sys.argv[1])); os._exit(0)"
     )
     processes = [Fork(("-c", code, url), os.environ, (0, 1, 2)) for _ in range(2)]
     assert [process.wait(60) for process in processes] == [0] * 2
