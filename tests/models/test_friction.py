@@ -64,6 +64,7 @@ def test_a_larger_knee_softens_the_reversal_only(robot: Robot, law: FrictionLaw)
     assert soft.torque(fast) == pytest.approx(law.torque(fast), rel=1e-3)
 
 
+@pytest.mark.long
 def test_stored_coefficients_are_the_fits(robot: Robot) -> None:
     fits = fit("ur5e")
     for law in robot.friction_laws.values():

@@ -148,6 +148,7 @@ def test_a_path_is_followed_from_angles_all_around() -> None:
     assert len(found) >= 8 * len(labels) and all(each.deferred for each in found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("both", long_but([True], [False, True]))
 def test_the_bound_beside_is_that_of_a_problem_without_the_path(both: bool) -> None:
     """Without the path, no problem has a free start: the bound needs another one."""

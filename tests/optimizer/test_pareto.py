@@ -143,6 +143,7 @@ def test_begins_with_the_shortest_and_ends_with_the_cheapest(
     assert objective(asked, front.points[-1]) <= objective(asked, optimize(asked)) * (1 + LOCAL)
 
 
+@pytest.mark.long
 def test_what_lies_between_passes_within_the_rectangles(
     asked_and_found: tuple[Problem, Front],
 ) -> None:

@@ -45,7 +45,8 @@ def result(name: str) -> Any:
             replace(problem(), duration_max=2.0), ["uniform_scaling", "bspline"]
         )
     if name == "Front":
-        return joulepath.pareto(replace(problem(), objective="mechanical", duration_max=2.0), 2)
+        asked = replace(problem(), objective="mechanical", method="time_scaling", duration_max=2.0)
+        return joulepath.pareto(asked, 2)
     if name == "WhatIf":
         heavier = replace(problem().arm, payload=joulepath.Payload(mass=3.0))
         return joulepath.what_if(result("Solution"), replace(problem(), arm=heavier))

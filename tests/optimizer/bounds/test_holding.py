@@ -117,7 +117,7 @@ def many_motions(
             yield t, q, v, a, simpson(np.eye(SAMPLES), dx=duration / (SAMPLES - 1)), duration
 
 
-@pytest.mark.parametrize("name", long_but(("plain friction", "uneven copper"), NAMES))
+@pytest.mark.parametrize("name", long_but(("uneven copper",), NAMES))
 def test_any_multipliers_bound_the_linear_energy(name: str) -> None:
     """With the copper loss as its tangent at the multipliers, which is less than it: what the proof
     says. Some of the multipliers are those of holding, and some motions are near the best."""

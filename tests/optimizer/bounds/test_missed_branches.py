@@ -111,6 +111,7 @@ def test_no_configuration_of_the_pose_is_below(given: dict[str, Any]) -> None:
     assert np.quantile(ratios, 0.6) > NEAR
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", long_but((3,), (3, 60)))
 def test_an_attack_without_curves_finds_none_below(
     count: int, monkeypatch: pytest.MonkeyPatch

@@ -147,6 +147,7 @@ def test_no_chain_has_less(seed: int, robot: str) -> None:
     assert bound > 0.85 * found
 
 
+@pytest.mark.long
 def test_fewer_cycles_give_a_weaker_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     asked, bounds = _cycle(0), []
     for cycles in (0, 6):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.free_order import FreeOrder
-from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.problem import MethodName, Problem
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.moves import ROBOT
 from tests.refusals import refusal_of
@@ -36,13 +36,16 @@ ASKED = pick_and_place(1, 2, windings=False, objective="mechanical", duration_ma
 
 
 @cache
-def found(time: float) -> CycleSolution:
-    return plan_cycle(replace(ASKED, duration_max=time))
+def found(time: float, method: MethodName = "bspline") -> CycleSolution:
+    return plan_cycle(replace(ASKED, duration_max=time, method=method))
 
 
-@pytest.mark.parametrize("time", long_but([TIME], [TIME, 2 * TIME]))
-def test_the_cycle_is_true(time: float) -> None:
-    round_ = found(time)
+@pytest.mark.parametrize(
+    ("time", "method"),
+    long_but([(TIME, "time_scaling")], product((TIME, 2 * TIME), ("time_scaling", "bspline"))),
+)
+def test_the_cycle_is_true(time: float, method: MethodName) -> None:
+    round_ = found(time, method)
     assert all(move.solution.certificate.valid for move in round_.moves)
     assert round_.duration == pytest.approx(time) and round_.joins < ROUNDING
     work = round_.energy.mechanical.total
@@ -91,7 +94,7 @@ def test_no_random_cycle_gets_below_the_bound() -> None:
     rng, layers, bound = (
         np.random.default_rng(0),
         list(layers_of(ASKED).values()),
-        found(TIME).lower_bound,
+        found(TIME, "time_scaling").lower_bound,
     )
     plants = [
         PreparedProblem.of(Problem(arm=move.arm, start=HOME, goal=HOME)) for move in ASKED.moves

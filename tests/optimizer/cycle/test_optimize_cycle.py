@@ -90,7 +90,7 @@ def energy_of(asked: Cycle, k: int, start: Array, goal: Array) -> float:
 @pytest.mark.parametrize("seed", long_but(range(1), range(100)))
 def test_it_is_the_least_of_all_chains(seed: int) -> None:
     """Two or three stops with two or three branches each, every chain by `optimize`."""
-    asked = pick_and_place(seed, 3, windings=False)
+    asked = pick_and_place(seed, 2 + seed % 2, windings=False)
     only = BranchFilter(elbow="up", wrist="no_flip" if seed % 2 else None)
     asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])
     found = planned(asked)

@@ -308,6 +308,7 @@ def test_a_place_to_wait_must_be_one() -> None:
         replace(ASKED, wait="nowhere")
 
 
+@pytest.mark.long
 def test_the_fastest_cycle_is_no_slower_than_ours_at_full_speed() -> None:
     search = CycleSearch(ASKED, still)
     own = search.run()

@@ -237,6 +237,7 @@ def test_a_damaged_library_is_noticed_and_rebuilt(
     assert workshop.compilations == 1  # and is whole now
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "names", long_but([["ur5e"]], [["ur5e"], []]), ids=lambda names: ", ".join(names) or "all"
 )

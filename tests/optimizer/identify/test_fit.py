@@ -80,6 +80,7 @@ def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() 
     assert errors.fitted.power.energy_max < errors.own.power.energy_max < errors.constant.energy_max
 
 
+@pytest.mark.long
 def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
     """All moves, once; what is left over has the size that the validation says."""
     _, found = run(options=IdentificationOptions())

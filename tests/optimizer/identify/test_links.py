@@ -45,6 +45,7 @@ def test_base_parameters_are_as_many_as_the_arm_has(name: str) -> None:
     assert tuple(base_parameters(model, rotors).count for rotors in (False, True)) == COUNTS[name]
 
 
+@pytest.mark.long
 def test_base_parameters_of_an_arm_of_a_users_own() -> None:
     place = folder()
     if place is None:
@@ -86,6 +87,7 @@ def test_nearness_is_a_distance_for_every_robot(name: str) -> None:
     assert np.linalg.eigvalsh(metric * np.outer(scale, scale))[0] > 0
 
 
+@pytest.mark.long
 def test_links_whose_published_parameters_are_no_real_bodies_are_refitted() -> None:
     robot = with_impossible_link(load_robot("panda"))
     least = np.linalg.eigvalsh(pseudo_inertias(body_parameters(robot.model)))[:, 0]

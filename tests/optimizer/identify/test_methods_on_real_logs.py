@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from benchmarks.identification_logs import tx40, ur3e
 from joulepath.models.robot import Array, Robot
@@ -59,6 +60,7 @@ def test_the_threshold_velocity_of_real_friction(place: Path) -> None:
         assert 0.09 <= velocity_threshold(v[use, joint], risen[use]) <= 0.26
 
 
+@pytest.mark.long
 def test_a_faster_threshold_leaves_fast_friction_as_it_is(place: Path) -> None:
     """Vuong: figures of the TX40 hardly depend on a threshold beyond the least speeds."""
     robot, log = tx40(place)
@@ -107,6 +109,7 @@ def test_what_a_real_log_tells_of_a_figure(place: Path) -> None:
     assert not wrist.identified and wrist.why
 
 
+@pytest.mark.long
 def test_the_condition_of_a_real_log(place: Path) -> None:
     """Verdonck: a log made to excite has a far better condition than one of ordinary moves, and
     excites all of it.

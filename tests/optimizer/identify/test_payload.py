@@ -86,6 +86,7 @@ def test_torque_constants_that_differ_make_the_mass_less_certain() -> None:
     assert np.sqrt(np.mean(np.square(off))) < 2
 
 
+@pytest.mark.long
 def test_what_the_log_says_of_its_payload_does_not_count() -> None:
     without, logs = (
         log_of(NOTHING, 0, NOTHING),

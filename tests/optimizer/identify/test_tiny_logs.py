@@ -90,6 +90,7 @@ def test_links_that_two_moves_do_not_tell_apart_are_not_identified() -> None:
     assert kept and all(each.value == each.previous and not each.identified for each in kept)
 
 
+@pytest.mark.long
 def test_torques_behind_the_gears_without_noise_predict_energies() -> None:
     """The priors alone tell the gains of the sensors from the masses of the links."""
     silent = recorded(ROBOT, truth_of(ROBOT, 3), moves=6, seed=3, noise=SILENT)

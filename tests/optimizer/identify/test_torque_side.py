@@ -98,6 +98,7 @@ def test_torques_behind_the_gears_identify_links_and_keep_the_drives(
     assert np.abs(near - weight).max() < 0.15 * np.abs(own - weight).max()
 
 
+@pytest.mark.long
 def test_gains_of_sensors_are_not_taken_for_links() -> None:
     truth, gain = truth_of(PANDA), np.array([0.0, 0.0, 0.0, 0.08, 0.0, -0.06, 0.0])
     log = behind_the_gears(PANDA, truth, recorded(PANDA, truth, moves=14), gain)

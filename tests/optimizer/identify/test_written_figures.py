@@ -183,7 +183,7 @@ def test_methods_without_links_write_the_other_figures_as_they_were_fitted(
     assert energy.electrical.total == pytest.approx(arm.energy(rows), rel=2e-3)
 
 
-@pytest.mark.parametrize("terms", long_but([CURVED], [DEFAULT_TERMS, CURVED]))
+@pytest.mark.parametrize("terms", [pytest.param(DEFAULT_TERMS, marks=pytest.mark.long), CURVED])
 def test_figures_of_power_beside_torques_behind_the_gears_are_written_as_they_were_fitted(
     terms: tuple[Term, ...],
 ) -> None:
@@ -255,7 +255,9 @@ def test_figures_of_power_alone_are_written_as_they_were_fitted() -> None:
     check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0)), log)
 
 
-@pytest.mark.parametrize("terms", long_but([CURVED], [("coulomb", "viscous", "offset"), CURVED]))
+@pytest.mark.parametrize(
+    "terms", [pytest.param(("coulomb", "viscous", "offset"), marks=pytest.mark.long), CURVED]
+)
 def test_refitted_links_are_written_as_they_were_fitted(terms: tuple[Term, ...]) -> None:
     log = log_of()
     options = IdentificationOptions(held_out=0.0, refit=True, terms=terms)

@@ -40,7 +40,7 @@ def skewed() -> Robot:
 ROBOTS = {"gen3": load_robot("gen3"), "skewed panda": skewed()}
 
 
-@pytest.fixture(params=list(ROBOTS), scope="module")
+@pytest.fixture(params=long_but(["gen3"], ROBOTS), scope="module")
 def robot(request: pytest.FixtureRequest) -> Robot:
     return ROBOTS[request.param]
 

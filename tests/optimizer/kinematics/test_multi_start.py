@@ -92,6 +92,7 @@ def answered(robot: Robot, from_pose: bool) -> tuple[float, float, str, bool]:
     return found.lower_bound, found.energy.electrical.total, found.status, found.complete
 
 
+@pytest.mark.long
 def test_an_answer_over_branches_that_may_be_missing_is_not_optimal() -> None:
     robot = replace(CHAIN, default_motion=None)
     bound, energy, status, complete = answered(robot, from_pose=False)

@@ -75,7 +75,7 @@ STRETCHED = np.array([-5.237985, 0.035838, 1.066330, -0.002736, -4.184650, -1.78
 AMPLE = 300.0
 
 
-@pytest.fixture(params=["gen3", "chain"], scope="module")
+@pytest.fixture(params=long_but(["chain"], ["gen3", "chain"]), scope="module")
 def robot(request: pytest.FixtureRequest) -> Robot:
     return {"gen3": GEN3, "chain": CHAIN}[request.param]
 

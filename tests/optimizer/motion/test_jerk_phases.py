@@ -5,6 +5,7 @@ are.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from joulepath.optimizer.motion.ruckig_motion import (
     time_optimal_spline,
 )
 from joulepath.optimizer.motion.spline import least_time_scale, sample
+from tests.selection import long_but
 
+NAMES = ("ur5e", "kr10_r1100", "panda")
 MOVES = 40
 # relative: jumps of jerk that become one change the jerk of short phases
 MOSTLY, ALWAYS = {False: 1e-4, True: 1e-3}, 0.02
@@ -25,8 +28,10 @@ HARDLY = 0.5  # the same as ALWAYS, of moves of which some joints move by a bill
 NEARLY = 1e-5  # relative, of limits that are nearly equal
 
 
-@pytest.mark.parametrize("name", ["ur5e", "kr10_r1100", "panda"])
-@pytest.mark.parametrize("nearly_equal", [False, True], ids=["own limits", "nearly equal limits"])
+@pytest.mark.parametrize(
+    ("name", "nearly_equal"),
+    long_but([("ur5e", False), ("panda", True)], product(NAMES, (False, True))),
+)
 def test_it_is_ruckigs_motion(name: str, nearly_equal: bool) -> None:
     """Under nearly equal limits, jumps of all joints are too close to be apart, and too far to be
     one.
@@ -55,7 +60,7 @@ def test_it_is_ruckigs_motion(name: str, nearly_equal: bool) -> None:
     assert max(scales) < 1 + ALWAYS
 
 
-@pytest.mark.parametrize("name", ["ur5e", "kr10_r1100", "panda"])
+@pytest.mark.parametrize("name", long_but(["kr10_r1100"], NAMES))
 def test_some_joints_hardly_move(name: str) -> None:
     """Their phases of jerk are too short to be apart; each still ends where it should."""
     limits, rng, scales = load_robot(name).limits, np.random.default_rng(1), []

@@ -62,13 +62,10 @@ def sources(tmp_path: Path) -> Path:
 
 def test_one_of_other_sources_is_never_called(sources: Path) -> None:
     """Whatever C file has changed: a structure of it may have another layout."""
-    load(build.build(sources))
     with (sources / "vectors.c").open("a", encoding="utf-8") as file:
         file.write("/* changed */\n")
-    # the loader of libraries takes a file that it knows for what it was
-    changed = sources.rename(sources.with_name("changed"))
     with pytest.raises(LibraryUnusable, match="was compiled from other sources"):
-        load(build.build(changed))
+        load(build.build(sources))
 
 
 @pytest.mark.long

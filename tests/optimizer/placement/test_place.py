@@ -63,6 +63,7 @@ def test_brute_force_finds_no_better_place() -> None:
     assert tolerance.lower <= 0 <= tolerance.upper
 
 
+@pytest.mark.long
 def test_a_symmetric_cell_is_served_as_well_from_either_side() -> None:
     """Turned by half a turn about the vertical through the middle of the stops, the cell is the
     same: the base is as good on one side as on the other, and the first joint only turns.

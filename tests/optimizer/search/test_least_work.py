@@ -106,6 +106,7 @@ def test_time_that_is_over_on_the_way() -> None:
     assert not any(each.deferred for each in own.state.candidates)
 
 
+@pytest.mark.long
 def test_coarse_motions_are_sought_once_also_beside_a_known_motion() -> None:
     own = run()
     own.warm_start(answer(False).trajectory.spline)

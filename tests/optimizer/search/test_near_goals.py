@@ -81,6 +81,7 @@ def test_a_goal_needs_no_more_than_a_configuration_of_it_beside_the_start(
     assert answer.lower_bound <= answer.energy.electrical.total <= known * (1 + SAME)
 
 
+@pytest.mark.long
 def test_what_is_activated_is_different_and_may_be_solved() -> None:
     problem, _ = task("xarm7", 3, "cone")
     run = prepared(problem)

@@ -29,6 +29,7 @@ from joulepath.optimizer.search.seeds import (
     estimates,
 )
 from tests.optimizer.search.runs import prepared
+from tests.selection import long_but
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -59,7 +60,7 @@ def seeded(name: str, index: int, both: bool = False) -> Run:
     return prepared(problem_of(name, index, both))
 
 
-@pytest.mark.parametrize("name", ["panda", "gen3"])
+@pytest.mark.parametrize("name", long_but(["gen3"], ["panda", "gen3"]))
 def test_estimates_are_above_the_lower_bounds_and_near_the_least_energy(name: str) -> None:
     run = seeded(name, 1)
     known = [each for each in run.state.candidates if each.deferred]
