@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import secrets
+import time
 import uuid
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -43,8 +45,14 @@ def now() -> datetime:
 
 
 def new_id() -> str:
-    """A unique id for a row."""
-    return str(uuid.uuid4())
+    """A unique id for a row (UUID of version 7, RFC 9562).
+
+    Ids that are made later sort later, to the millisecond: jobs take turns in the order in which
+    they came.
+    """
+    milliseconds = time.time_ns() // 1_000_000
+    version, variant = 7 << 76 | secrets.randbits(12) << 64, 2 << 62 | secrets.randbits(62)
+    return str(uuid.UUID(int=milliseconds << 80 | version | variant))
 
 
 def by_id(

@@ -148,6 +148,15 @@ async def test_a_short_job_does_not_wait_for_the_end_of_a_long_one(bench: Bench)
     assert [lease.job_id for lease in await bench.lease("a")] == [short]
 
 
+async def test_jobs_take_turns_in_the_order_in_which_they_came(bench: Bench) -> None:
+    """None waits behind later ones for ever; ids tell times apart by milliseconds."""
+    made = list[str]()
+    for _ in range(8):
+        made.append(await bench.create(1))
+        await asyncio.sleep(0.002)
+    assert [(await bench.lease("a"))[0].job_id for _ in made] == made
+
+
 async def test_cancelling_ends_what_waits_and_then_what_runs(bench: Bench) -> None:
     job_id = await bench.create(4)
     first, second = await bench.lease("a", 2)
