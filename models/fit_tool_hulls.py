@@ -11,8 +11,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from joulepath.models.hull_cover import hull_around
-from joulepath.models.hull_parts import divided, nowhere
 from joulepath.models.robot import Array
 from joulepath.models.tool_meshes import TOOL_MESHES
 from joulepath.models.tools.registry import tool_figures
@@ -36,7 +37,7 @@ def fitted_hulls(name: str, folder: Path) -> Iterator[Array]:
     reach = radius - meshes.sagitta(folder)
     for part in meshes.parts:
         swept = [each.reshape(-1, 3, 3) for each in meshes.swept(folder, part)]
-        for triangles in divided(swept, radius, nowhere, part.most):
+        for triangles in part.within(np.concatenate(swept)):
             yield hull_around(triangles.reshape(-1, 3), radius=reach)
 
 

@@ -27,10 +27,10 @@ class PartSettings:
 
     most: int = 8
     """Largest number of parts of a link. Every part adds a distance per obstacle."""
-    p99: float = 1.5e-3
+    p99: float = 1.2e-3
     """99th percentile of the excess of the parts' hulls, before they are grown, over the surface
     [m] from which on no part is divided."""
-    maximum: float = 5.5e-3
+    maximum: float = 4.5e-3
     """Largest such excess [m]."""
     free: float = 0.5e-3
     """Excess [m] that costs nothing: about the distance between the points of the surface."""
@@ -183,6 +183,29 @@ class Division:
                 attempt(turned, middle @ turned + spread * PARTS.shift * self.rng.normal())
         assert best is not None
         return best[3]
+
+
+@dataclass(frozen=True)
+class Rim:
+    """The rim of a hollow in the face of a flange. No single plane opens such a hollow."""
+
+    floor: float
+    """Height z in the link frame [m] beyond its floor by more than the overlap of parts, with the
+    sign of the side that the face is on."""
+    sectors: int
+    """Number of equal sectors about the z axis into which it is divided."""
+
+    def parts(self, triangles: Array) -> list[Array]:
+        """Triangles (k, 3, 3) [m] of the link behind the floor, then those of each sector."""
+        z = np.array([0.0, 0.0, np.sign(self.floor)])
+        rim = below(triangles, -z, PARTS.overlap - abs(self.floor))
+        found = [below(triangles, z, abs(self.floor))]
+        for begin in 2 * np.pi * np.arange(self.sectors) / self.sectors:
+            end = begin + 2 * np.pi / self.sectors
+            after = np.array([np.sin(begin), -np.cos(begin), 0.0])
+            before = np.array([-np.sin(end), np.cos(end), 0.0])
+            found.append(below(below(rim, after, PARTS.overlap), before, PARTS.overlap))
+        return found
 
 
 def divided(

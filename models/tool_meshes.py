@@ -15,11 +15,17 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
+from joulepath.models.hull_parts import below
 from joulepath.models.meshes import KINDS, in_package, surface
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
 
+Vector = tuple[float, float, float]
 MILLIMETRES = 1e-3
 """Unit of some of the files [m]."""
+FARTHEST: tuple[Vector, Vector] = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, np.inf)
+"""The cell that is the whole space."""
+FLANGE = 0.0315
+"""Radius of the flange to which the tools are bolted, ISO 9409-1-50-4-M6 [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +53,7 @@ class Piece:
     joints: tuple[Joint, ...]
     files: tuple[str, ...] = ()
     scale: float = 1.0
-    box: tuple[float, float, float] | None = None
+    box: Vector | None = None
 
     def triangles(self, folder: Path) -> Array:
         """Triangles (t, 3, 3) [m] in the frame of the last joint."""
@@ -78,10 +84,25 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Pieces of a tool that have hulls in common, and the largest number of these."""
+    """Pieces of a tool that have hulls in common, one per cell.
+
+    A cell is a box between two opposite corners in the flange frame [m]. Cells overlap, so that the
+    proof of the cover ends at triangles of the size of the overlap. Pieces that move have one
+    cell, the whole space, because a triangle on its way from one cell to the next is in no hull.
+    """
 
     pieces: tuple[Piece, ...]
-    most: int = 1
+    cells: tuple[tuple[Vector, Vector], ...] = (FARTHEST,)
+
+    def within(self, triangles: Array) -> list[Array]:
+        """The pieces (k, 3, 3) of triangles (t, 3, 3) [m] of the flange frame in each cell."""
+        found = []
+        for low, high in self.cells:
+            inside = triangles
+            for axis, begin, end in zip(np.eye(3), low, high, strict=True):
+                inside = below(below(inside, axis, end), -axis, -begin)
+            found.append(inside)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +111,6 @@ class ToolMeshes:
 
     parts: tuple[Part, ...]
     openings: Array
-
-    @property
-    def turns(self) -> bool:
-        """Whether any piece turns."""
-        pieces = [piece for part in self.parts for piece in part.pieces]
-        return any(joint.turn for piece in pieces for joint in piece.joints)
 
     def sagitta(self, folder: Path) -> float:
         """The largest distance [m] of any piece between two openings from the chords."""
@@ -123,6 +138,13 @@ def between(openings: Array) -> Array:
     if len(openings) == 1:
         return np.asarray(openings[0])
     return np.concatenate([openings[:-1], openings[1:]], axis=-1).reshape(-1, 3, 6)
+
+
+def on_flange(points: Array) -> Mask:
+    """Whether points (k, 3) [m] of the flange frame are in the flange of the arm, where no obstacle
+    can be.
+    """
+    return np.asarray((points[:, 2] < 0) & (np.hypot(points[:, 0], points[:, 1]) < FLANGE))
 
 
 def _placed(*xyz_yaw: float) -> pin.SE3:
@@ -159,20 +181,20 @@ def _robotiq_2f_85() -> ToolMeshes:
     def both(file: str) -> tuple[str, ...]:
         return tuple(f"{kind}/robotiq_arg2f_85_{file}" for kind in KINDS)
 
-    outer, inner = list[Piece](), list[Piece]()
+    knuckles, outer, inner, pads = list[Piece](), list[Piece](), list[Piece](), list[Piece]()
     for yaw in (0.0, np.pi):
         side = Joint(_placed(0.0, 0.0, 0.0, yaw))
         knuckle = base, side, Joint(_placed(0.0, 0.0306011, 0.054904), turn=1.0)
         finger = *knuckle, Joint(_placed(0.0, 0.0315, -0.0041))
         tip = *finger, Joint(_placed(0.0, 0.0061, 0.0471), turn=-1.0)
         link = base, side, Joint(_placed(0.0, 0.0127, 0.06142), turn=1.0)
-        outer += [
+        knuckles += [
             Piece(knuckle, both("outer_knuckle"), MILLIMETRES),
-            Piece(finger, both("outer_finger"), MILLIMETRES),
-        ]
-        inner += [
-            Piece(link, both("inner_knuckle"), MILLIMETRES),
             Piece(tip, both("inner_finger"), MILLIMETRES),
+        ]
+        outer.append(Piece(finger, both("outer_finger"), MILLIMETRES))
+        inner.append(Piece(link, both("inner_knuckle"), MILLIMETRES))
+        pads += [
             Piece(tip, ("visual/robotiq_arg2f_85_pad",), MILLIMETRES),
             Piece((*tip, Joint(_placed(0.0, -0.0220203, 0.03242))), box=(0.022, 0.00635, 0.0375)),
         ]
@@ -182,7 +204,11 @@ def _robotiq_2f_85() -> ToolMeshes:
         Piece((base,), both("base_link")),
     )
     return ToolMeshes(
-        (Part(housing), Part(tuple(outer)), Part(tuple(inner))),
+        (
+            Part(housing),
+            *(Part((piece,)) for piece in outer),
+            *(Part(tuple(pieces)) for pieces in (inner, knuckles, pads)),
+        ),
         np.linspace(0.0, 0.81, 15),
     )
 
@@ -200,20 +226,27 @@ def _onrobot_rg2() -> ToolMeshes:
     def piece(file: str, *joints: Joint) -> Piece:
         return Piece((mount, *joints), tuple(f"{kind}/{file}" for kind in KINDS))
 
-    fingers = list[Piece]()
+    outer, inner = list[Piece](), list[Piece]()
     for yaw in (0.0, np.pi):
         side = Joint(_placed(0.0, 0.0, 0.0, yaw))
-        outer = side, Joint(_placed(0.0, -0.017178, 0.125797), turn=-1.0)
-        inner = side, Joint(_placed(0.0, -0.007678, 0.142297), turn=-1.0)
-        tip = *outer, Joint(_placed(0.0, -0.039592, 0.038177), turn=1.0)
-        fingers += [
-            piece("outer_knuckle", *outer),
-            piece("inner_knuckle", *inner),
-            piece("inner_finger", *tip),
-        ]
+        knuckle = side, Joint(_placed(0.0, -0.017178, 0.125797), turn=-1.0)
+        link = side, Joint(_placed(0.0, -0.007678, 0.142297), turn=-1.0)
+        tip = *knuckle, Joint(_placed(0.0, -0.039592, 0.038177), turn=1.0)
+        outer += [piece("outer_knuckle", *knuckle), piece("inner_finger", *tip)]
+        inner.append(piece("inner_knuckle", *link))
     housing = Piece((mount,), ("visual/base_link",))
+    # foot, ring, column, its widening at the joints, and a rib on either side of the column
+    inf, over = np.inf, 1e-4
+    cells = (
+        ((-inf, -inf, -inf), (inf, inf, 0.0155)),
+        ((-inf, -inf, 0.0155 - over), (inf, inf, 0.0295)),
+        ((-0.0273, -inf, 0.0295 - over), (0.0273, inf, 0.104)),
+        ((-inf, -inf, 0.104 - over), (inf, inf, inf)),
+        ((0.0273 - over, -inf, 0.0295 - over), (inf, inf, 0.07)),
+        ((-inf, -inf, 0.0295 - over), (over - 0.0273, inf, 0.07)),
+    )
     return ToolMeshes(
-        (Part((housing,), most=4), Part(tuple(fingers))),
+        (Part((housing,), cells), Part(tuple(outer)), *(Part((each,)) for each in inner)),
         np.linspace(-0.558505, 0.785398, 21),
     )
 

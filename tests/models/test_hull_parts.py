@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,7 +11,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from joulepath.models.capsule_cover import TURNS, not_held, outside, turned_into
 from joulepath.models.hull_cover import hull_around
-from joulepath.models.hull_parts import PARTS, below, divided, nowhere
+from joulepath.models.hull_parts import PARTS, Rim, below, divided, nowhere
 from joulepath.models.meshes import sampled
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkHull, Mask
@@ -86,6 +88,34 @@ def test_what_needs_no_division_is_one_part() -> None:
     """A convex body, and a bent one where no obstacle can be."""
     assert len(divided([box((0, 0, 0), (0.05, 0.015, 0.015))], RADIUS, nowhere)) == 1
     assert len(divided([BENT], RADIUS, everywhere)) == 1
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_sectors_leave_the_hollow_of_a_flange_open(side: float) -> None:
+    """A rim of 6 mm around a hollow of 30 mm, on either side of the link: one hull fills the hollow,
+    and six sectors leave all but the segments beyond their chords.
+    """
+    turn = 2 * np.pi * np.arange(24) / 24
+    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(24)], axis=1)
+    profile = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.011), (0.015, 0.011), (0.015, 0.005), (0.0, 0.005)]
+    rings = [r * ring + np.array([0.0, 0.0, side * z]) for r, z in profile]
+    flange = np.concatenate(
+        [
+            np.stack(corners, axis=1)
+            for low, high in pairwise(rings)
+            for corners in (
+                (low, np.roll(low, -1, axis=0), high),
+                (np.roll(low, -1, axis=0), np.roll(high, -1, axis=0), high),
+            )
+        ]
+    )
+    hulls = hulls_of(Rim(side * 0.0052, 6).parts(flange))
+    assert len(hulls) == 7
+    assert not len(not_held(flange, hulls))
+    # within the chords of 60 degrees, and above the floor: by more than the radius of the hulls
+    within = np.array([[0.011 * np.cos(t), 0.011 * np.sin(t), side * 0.009] for t in turn])
+    assert outside(within, hulls).min() > 0
+    assert outside(within, hulls_of([flange])).max() < 0
 
 
 @pytest.mark.parametrize("name", ["ur5e", "gen3"])

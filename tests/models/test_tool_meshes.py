@@ -12,8 +12,16 @@ from benchmarks.covers import unproven
 from joulepath.models.capsule_cover import not_held
 from joulepath.models.fit_tool_hulls import fitted_hulls
 from joulepath.models.hull_cover import HULL_FIT, from_hull
-from joulepath.models.robot import Array, LinkCapsule, LinkHull
-from joulepath.models.tool_meshes import TOOL_MESHES, Joint, Piece, between
+from joulepath.models.robot import LinkCapsule, LinkHull
+from joulepath.models.tool_meshes import (
+    FARTHEST,
+    TOOL_MESHES,
+    Joint,
+    Part,
+    Piece,
+    between,
+    on_flange,
+)
 from joulepath.models.tools.registry import tool_figures, tool_names
 from tests.mesh_folders import meshes
 
@@ -77,20 +85,36 @@ def test_a_triangle_is_not_held_where_no_cover_holds_its_whole_way() -> None:
     assert not len(not_held(between(places), [LinkCapsule(0, np.concatenate(ends)[::2], 0.02)]))
 
 
-def _surfaces() -> list[Array]:
-    tool, folder = TOOL_MESHES[ROBOTIQ], meshes(ROBOTIQ)
-    return [swept for part in tool.parts for swept in tool.swept(folder, part)]
+def test_the_hulls_of_overlapping_cells_hold_a_piece() -> None:
+    """A cube of 2 cm, in two cells that overlap by 0.1 mm, and in two that leave a gap."""
+    cube = Piece((), box=(0.02, 0.02, 0.02)).triangles(meshes(ROBOTIQ))
+    for begin, held in ((-1e-4, True), (1e-3, False)):
+        low = FARTHEST[0], (1.0, 1.0, 0.0)
+        parts = Part((), (low, ((-1.0, -1.0, begin), FARTHEST[1]))).within(cube)
+        assert [each[..., 2].max() for each in parts] == pytest.approx([0.0, 0.01])
+        assert [each[..., 2].min() for each in parts] == pytest.approx([-0.01, begin])
+        covers = [LinkHull(0, each.reshape(-1, 3), 1e-6) for each in parts]
+        assert (len(not_held(cube, covers)) == 0) is held
+
+
+def test_only_points_below_the_face_of_the_flange_are_on_it() -> None:
+    points = np.array([[0.0, 0.03, -1e-3], [0.0, 0.03, 1e-3], [0.0, 0.033, -1e-3]])
+    assert on_flange(points).tolist() == [True, False, False]
 
 
 def test_the_hulls_of_the_robotiq_hold_it_at_every_opening_and_in_between() -> None:
-    """1 mm less, and every body leaves something out."""
-    covers, surfaces = hulls(ROBOTIQ), _surfaces()
-    sagitta = TOOL_MESHES[ROBOTIQ].sagitta(meshes(ROBOTIQ))
-    assert sum(unproven(surface, covers, sagitta) for surface in surfaces) == 0
-    ends = [surface[[0, -1]].reshape(1, -1, 3, 3) for surface in surfaces]
-    for each in covers:
-        smaller = [replace(c, radius=c.radius - 1e-3 * (c is each)) for c in covers]
-        assert any(unproven(end, smaller, 0.0) for end in ends)
+    """Those of a part hold its pieces; 1 mm less, and every one leaves something out."""
+    tool, folder, rest = TOOL_MESHES[ROBOTIQ], meshes(ROBOTIQ), hulls(ROBOTIQ)
+    sagitta = tool.sagitta(folder)
+    for part in tool.parts:
+        covers, rest = rest[: len(part.cells)], rest[len(part.cells) :]
+        surfaces = tool.swept(folder, part)
+        assert sum(unproven(surface, covers, sagitta) for surface in surfaces) == 0
+        ends = [surface[[0, -1]].reshape(1, -1, 3, 3) for surface in surfaces]
+        for each in covers:
+            smaller = [replace(c, radius=c.radius - 1e-3 * (c is each)) for c in covers]
+            assert any(unproven(end, smaller, 0.0) for end in ends)
+    assert not rest
 
 
 @pytest.mark.long

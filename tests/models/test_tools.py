@@ -158,7 +158,7 @@ def clearance(name: str, centre: list[float]) -> float:
     ("name", "beside"),
     [
         # beside the fingers, and beside the housing
-        ("robotiq_2f_85", [0.0131, 0.058, 0.15]),
+        ("robotiq_2f_85", [0.0101, 0.058, 0.15]),
         ("robotiq_2f_85", [0.0335, 0.0, 0.06]),
         ("onrobot_rg2", [0.056, 0.0128, 0.185]),
         ("onrobot_rg2", [0.0, 0.0211, 0.09]),
