@@ -92,8 +92,8 @@ def test_what_needs_no_division_is_one_part() -> None:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_sectors_leave_the_hollow_of_a_flange_open(side: float) -> None:
-    """A rim of 6 mm around a hollow of 30 mm, on either side of the link: one hull fills the hollow,
-    and six sectors leave all but the segments beyond their chords.
+    """A rim of 6 mm around a hollow of 30 mm, on either side of the link: one hull fills the
+    hollow, and six sectors leave all but the segments beyond their chords.
     """
     turn = 2 * np.pi * np.arange(24) / 24
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(24)], axis=1)
