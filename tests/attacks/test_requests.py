@@ -127,6 +127,7 @@ def test_points_rows_and_recordings_say_it_too(client: TestClient) -> None:
         assert found["tool"] >= DEPTH and found["payload"] >= DEPTH + BALL
 
 
+@pytest.mark.long
 def test_each_move_of_a_cycle_has_its_own_payload(client: TestClient) -> None:
     """The tool's end stays above the table: only the part on its way from pick to place reaches
     into it.

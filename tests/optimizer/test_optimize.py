@@ -113,6 +113,7 @@ def pairs(objective: str) -> Iterator[tuple[Problem, Problem]]:
         yield free, replace(free, method="time_scaling")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("objective", long_but(["electrical"], ["electrical", "mechanical"]))
 def test_a_bspline_spends_no_more_than_a_time_scaled_motion(objective: str) -> None:
     """In the same duration: the straight line is one of its choices."""

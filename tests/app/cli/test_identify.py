@@ -136,6 +136,7 @@ def test_power_is_refused_of_logs_without(here: Here, tmp_path: Path) -> None:
     checked(NoPowerChannel, content)
 
 
+@pytest.mark.long
 def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path: Path) -> None:
     output = tmp_path / "figures.json"
     command = ("identify", logs[0], "--payload", "0", "--term", "coulomb", "--term", "viscous")

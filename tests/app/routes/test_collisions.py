@@ -210,6 +210,7 @@ def least_gap(q: np.ndarray, points: np.ndarray) -> float:
     return float(least)
 
 
+@pytest.mark.long
 def test_many_points_are_answered_and_warned_of(client: TestClient) -> None:
     """A wall of 20,000 points; the warning names the obstacle, as of any other shape."""
     y, z = np.meshgrid(np.linspace(-0.8, 0.8, 200), np.linspace(0.0, 1.2, 100))

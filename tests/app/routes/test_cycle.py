@@ -367,6 +367,7 @@ def test_the_cycle_as_a_table(client: TestClient, answer: dict[str, Any]) -> Non
     }
 
 
+@pytest.mark.long
 def test_a_storage_is_charged_from_leg_to_leg(client: TestClient) -> None:
     bus = {"mode": "storage", "capacity": 30.0, "power": 500.0, "efficiency": 0.9}
     content = answered(client, a_cycle(bus=bus))

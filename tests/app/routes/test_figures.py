@@ -128,6 +128,7 @@ def test_every_request_about_a_motion_takes_them(client: TestClient, stored: str
     assert job.status_code in (201, 202), job.text
 
 
+@pytest.mark.long
 def test_a_study_keeps_its_figures(client: TestClient, stored: str) -> None:
     study = client.post(
         "/studies", json={"name": "With figures", "threshold": 1.0, "figures": stored}

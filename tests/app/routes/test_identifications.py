@@ -309,6 +309,7 @@ def test_links_from_a_log_with_the_wrench_beneath_the_base(client: TestClient) -
     assert all(abs(each.value - each.previous) <= FAR * each.sd for each in links)
 
 
+@pytest.mark.long
 def test_a_payload_is_the_difference_of_two_logs(client: TestClient, log: str) -> None:
     carried = Payload(2.0, np.array([0.01, -0.02, 0.05]))
     # what the log says of its payload is wrong

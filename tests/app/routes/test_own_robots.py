@@ -74,6 +74,7 @@ def test_the_mjcf_of_a_robot(mine: TestClient) -> None:
     refused(mine.get("/robots/nobody/mjcf"), UnknownRobot)
 
 
+@pytest.mark.long
 def test_the_joint_limits_of_a_robot(mine: TestClient) -> None:
     """Of an added robot and a bundled one; a lighter payload leaves more."""
     for name, joint in (("mine", "elbow"), ("ur5e", "elbow_joint")):

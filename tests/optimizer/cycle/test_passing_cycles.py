@@ -154,6 +154,7 @@ def test_routes_come_in_the_order_of_their_bounds_and_none_is_left_out() -> None
         assert run.state.candidates[0].lower_bound == pytest.approx(bound)
 
 
+@pytest.mark.long
 def test_a_cycle_of_passes_alone_comes_back() -> None:
     found = plan_cycle(of(*(Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(Q))))
     (move,) = found.moves

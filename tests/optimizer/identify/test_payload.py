@@ -95,6 +95,7 @@ def test_what_the_log_says_of_its_payload_does_not_count() -> None:
     assert found_in(without, logs[0]).mass == found_in(without, logs[1]).mass
 
 
+@pytest.mark.long
 def test_the_other_log_may_carry_something_that_is_known() -> None:
     half = Payload(1.5, np.array([0.0, 0.0, 0.03]))
     check(found_in(log_of(half, 1, half), log_of(PAYLOAD, 1, NOTHING, 50)))

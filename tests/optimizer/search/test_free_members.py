@@ -20,6 +20,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from joulepath.optimizer.search.ends import SAMPLING
 from joulepath.optimizer.search.errors import GoalInCollision, StartInCollision
+from tests.selection import long_but
 
 ROBOT = load_robot("panda")
 HOME = np.array([0, -0.785, 0, -2.356, 0, 1.571, 0.785])
@@ -43,7 +44,7 @@ def clearance(arm: Arm, q: Array) -> Array:
     return np.asarray(model.pair_distances(model.frames(q)).distance.min(axis=1))
 
 
-@pytest.mark.parametrize("end", ["start", "goal"])
+@pytest.mark.parametrize("end", long_but(["goal"], ["start", "goal"]))
 def test_a_posture_between_colliding_samples_is_found(end: str) -> None:
     arm = among(*BALLS)
     samples = required_inverse_kinematics(ROBOT, "goal").solve(

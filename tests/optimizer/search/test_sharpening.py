@@ -94,6 +94,7 @@ def test_nothing_is_solved_again_without_corners_or_even_spacing(given: dict[str
     assert best.spline is spline and state.solves == solves
 
 
+@pytest.mark.long
 def test_longest_duration_of_mechanical_work() -> None:
     """Rest costs nothing: a motion that may take longer takes all of the time."""
     state = explored(objective="mechanical", duration_max=2.0)

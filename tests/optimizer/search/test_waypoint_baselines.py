@@ -100,6 +100,7 @@ def test_short_moves_have_finite_ways_or_none(displacement: float) -> None:
         assert way.within_limits and 0 < way.electrical < 100 and 0 < way.duration < 1
 
 
+@pytest.mark.long
 def test_a_cycle_that_stands_at_a_stop_keeps_its_ways() -> None:
     """The way back from the last stop, at which the arm begins, is none."""
     task = example("over_a_post")
