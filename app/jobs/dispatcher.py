@@ -96,6 +96,8 @@ class Dispatcher:
         self._mean_of: dict[str, float] = {}
         self._more = True
         self._more_known = 0
+        self._served = dict[str | None, None]()
+        """Owners of leased requests, the latest one last."""
         self._draining = False
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -225,9 +227,17 @@ class Dispatcher:
         now = self._now()
         if self._more or await self._store.read(partial(leases.is_due, now=now)):
             lease = partial(
-                leases.lease, holder=self.holder, count=want, now=now, until=now + LEASE
+                leases.lease,
+                holder=self.holder,
+                count=want,
+                now=now,
+                until=now + LEASE,
+                served=tuple(self._served),
             )
             leased, changed = await self._store.write(lease)
+            for each in leased:
+                self._served.pop(each.owner, None)
+                self._served[each.owner] = None
             self._more = len(leased) == want
             self.changes.ring(changed)
             fresh = [Held(each, Found(each.attempt), dropped=self._draining) for each in leased]

@@ -96,7 +96,7 @@ def create(
     session.flush()
     fresh = {"state": "waiting", "attempt": 0, "deaths": 0, "preempted": 0}
     rows = [
-        {"job_id": job.id, "number": number, **vars(each), **fresh}
+        {"job_id": job.id, "number": number, "owner": owner, **vars(each), **fresh}
         for number, each in enumerate(new.requests)
     ]
     session.execute(insert(JobRequest), rows)

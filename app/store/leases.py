@@ -93,16 +93,28 @@ class Outcome:
 
 
 def lease(
-    session: Session, holder: str, count: int, now: datetime, until: datetime
+    session: Session,
+    holder: str,
+    count: int,
+    now: datetime,
+    until: datetime,
+    served: Sequence[str | None] = (),
 ) -> tuple[list[Lease], set[str]]:
-    """Leases up to `count` waiting requests to `holder`; returns them and the changed jobs."""
+    """Lease waiting requests. The owners of jobs take turns.
+
+    Args:
+        session: session of the database.
+        holder: who gets the leases.
+        count: largest number of leases.
+        now: present time.
+        until: end of the leases.
+        served: owners whose requests this holder has leased before, the latest one last.
+
+    Returns:
+        The leases in the order of work, and the jobs that have changed.
+    """
     _take_back(session, JobRequest.leased_until < now)
-    waiting = (
-        select(JobRequest)
-        .where(JobRequest.state == "waiting")
-        .order_by(JobRequest.number, JobRequest.job_id)
-    )
-    found = list(session.scalars(waiting.limit(count).with_for_update(skip_locked=True)))
+    found = _next(session, count, served)
     locked = _locked(session, (request.job_id for request in found))
     leased, changed = [], set()
     for request in found:
@@ -136,6 +148,29 @@ def lease(
         if locked[job_id].state == "cancelling":
             conclude(session, locked[job_id], now)
     return leased, changed
+
+
+def _next(session: Session, count: int, served: Sequence[str | None]) -> list[JobRequest]:
+    """The next waiting requests: the first one of each owner, then the second ones, and so on.
+
+    The owner that was served longest ago is the first.
+    """
+    waiting = select(JobRequest).where(JobRequest.state == "waiting")
+    owners = session.scalars(waiting.with_only_columns(JobRequest.owner).distinct())
+    turns = {owner: turn for turn, owner in enumerate(served)}
+    found = list[tuple[int, int, int, str, JobRequest]]()
+    for owner in owners:
+        own = waiting.where(JobRequest.owner == owner).order_by(
+            JobRequest.number, JobRequest.job_id
+        )
+        turn = turns.get(owner, -1)
+        found += [
+            (rank, turn, each.number, each.job_id, each)
+            for rank, each in enumerate(
+                session.scalars(own.limit(count).with_for_update(skip_locked=True))
+            )
+        ]
+    return [each for *_, each in sorted(found, key=lambda entry: entry[:-1])[:count]]
 
 
 def settle(

@@ -295,12 +295,17 @@ class JobRequest(Table):
     """One request of a job. `state` is `waiting`, `running`, `done`, `failed` or `cancelled`."""
 
     __tablename__ = "job_requests"
-    # Waiting requests with low numbers first: a new job precedes the rest of a long one.
-    __table_args__ = (Index(None, "state", "number", "job_id"), Index(None, "job_id", "state"))
+    # Of an owner, requests with low numbers first: a new job precedes the rest of a long one.
+    __table_args__ = (
+        Index(None, "state", "owner", "number", "job_id"),
+        Index(None, "job_id", "state"),
+    )
 
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
     """Index in the job, from 0."""
+    owner: Mapped[str | None] = mapped_column(String(LENGTHS.owner))
+    """Owner of the job; owners take turns."""
     name: Mapped[str | None] = mapped_column(String(LENGTHS.name))
     kind: Mapped[str] = mapped_column(String(32))
     """Endpoint of the request."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from functools import partial
 
@@ -34,17 +35,29 @@ class Bench:
         self.store, self.now = store, START
 
     async def create(
-        self, count: int = 3, key: str | None = None, keep_going: bool = True, most: int = MUCH
+        self,
+        count: int = 3,
+        key: str | None = None,
+        keep_going: bool = True,
+        most: int = MUCH,
+        owner: str | None = None,
     ) -> str:
         new = NewJob([NewRequest("optimize", BODY, 10.0)] * count, f"{count}", "name", keep_going)
         job_id, _ = await self.store.write(
-            partial(jobs.create, new=new, key=key, most_waiting=most)
+            partial(jobs.create, new=new, key=key, most_waiting=most, owner=owner)
         )
         return job_id
 
-    async def lease(self, holder: str, count: int = 1) -> list[Lease]:
+    async def lease(
+        self, holder: str, count: int = 1, served: Sequence[str | None] = ()
+    ) -> list[Lease]:
         work = partial(
-            leases.lease, holder=holder, count=count, now=self.now, until=self.now + SOON
+            leases.lease,
+            holder=holder,
+            count=count,
+            now=self.now,
+            until=self.now + SOON,
+            served=served,
         )
         return (await self.store.write(work))[0]
 
@@ -155,6 +168,29 @@ async def test_jobs_take_turns_in_the_order_in_which_they_came(bench: Bench) -> 
         made.append(await bench.create(1))
         await asyncio.sleep(0.002)
     assert [(await bench.lease("a"))[0].job_id for _ in made] == made
+
+
+async def test_owners_take_turns_however_many_jobs_they_have(bench: Bench) -> None:
+    for _ in range(20):
+        await bench.create(1, owner="many")
+    await bench.create(3, owner="few")
+    await bench.create(2)
+    owners = [lease.owner for lease in await bench.lease("a", 8)]
+    assert sorted(map(str, owners[:3])) == ["None", "few", "many"] and owners[3:6] == owners[:3]
+    assert owners[6:] == [owner for owner in owners[:3] if owner is not None]
+
+
+async def test_the_owner_that_was_served_last_comes_last(bench: Bench) -> None:
+    """One request at a time, as with a single worker."""
+    served = list[str | None]()
+    await bench.create(30, owner="long")
+    await bench.create(3, owner="short")
+    for _ in range(6):
+        (lease,) = await bench.lease("a", served=served)
+        served = [owner for owner in served if owner != lease.owner] + [lease.owner]
+        await bench.settle("a", done(lease))
+    assert len(await bench.lease("a", 99)) == 27
+    assert (await bench.lease("a", 1)) == []
 
 
 async def test_cancelling_ends_what_waits_and_then_what_runs(bench: Bench) -> None:
