@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -33,8 +35,10 @@ def energy(robot: str, displacement: float, duration: float | None) -> float:
     return joulepath.optimize(problem, progress=False).energy.electrical.total
 
 
-@pytest.mark.parametrize("robot", PLACES)
-@pytest.mark.parametrize("duration", [None, 1.0])
+@pytest.mark.parametrize(
+    ("robot", "duration"),
+    long_but([("ur5e", None), ("panda", 1.0)], product(PLACES, (None, 1.0))),
+)
 def test_a_displacement_of_nothing_needs_what_standing_still_needs(
     robot: str, duration: float | None
 ) -> None:
