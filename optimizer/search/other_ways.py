@@ -2,12 +2,13 @@
 
 The seeds of a redundant arm are chosen by straight lines in joints. Lines through obstacles say
 little about the work of the ways around them. Planned paths to the quickest posture on every
-self-motion are therefore initial guesses, too.
+self-motion, and to others apart from it, are therefore initial guesses, too.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from operator import methodcaller
 
 import numpy as np
@@ -28,6 +29,12 @@ class OtherWaysSettings:
     slack: float = 0.95
     """Largest ratio of a posture's shortest duration to the longest allowed one: faster motions do
     much work, and take long to find."""
+    postures: int = 3
+    """Number of postures on every pair of self-motions to which paths are planned. Before the
+    refinement, two instead of one saved 2.8 % of the work in the mean of ten scenes, and three up
+    to 5 % more in eleven."""
+    separation: float = 0.4
+    """Least displacement [rad] of some joint between these postures."""
     effort: Effort = field(default_factory=lambda: Effort(most_states=4_000))
     """Effort of a planning, which takes some 30 ms; the solves from its paths take 0.1 s each."""
     time_share: float = 0.2
@@ -51,20 +58,36 @@ def explore_other_ways(state: SearchState) -> None:
     ):
         return
     end, state.end = state.end, state.end.within(OTHER_WAYS.time_share * state.deadline.left)
-    for candidate in _quickest(state):
+    for candidate in quickest(state):
         if not state.deadline.passed:
             _solve_along_paths(state, candidate)
     state.end = end
 
 
-def _quickest(state: SearchState) -> list[Candidate]:
-    """The candidate of least shortest duration of every pair of self-motions."""
+def quickest(state: SearchState) -> list[Candidate]:
+    """Separate candidates of least shortest duration of every pair of self-motions.
+
+    The quickest candidates of all pairs come first.
+    """
     longest = OTHER_WAYS.slack * (state.problem.duration_max or np.inf)
-    found: dict[tuple[SelfMotion | None, SelfMotion | None], Candidate] = {}
+    found: dict[tuple[SelfMotion | None, SelfMotion | None], list[Candidate]] = {}
     for each in sorted(state.candidates, key=lambda each: each.shortest):
         if each.holdable and each.shortest <= longest:
-            found.setdefault((each.start.self_motion, each.goal.self_motion), each)
-    return list(found.values())
+            of_pair = found.setdefault((each.start.self_motion, each.goal.self_motion), [])
+            if len(of_pair) < OTHER_WAYS.postures and all(
+                _distance(each, other) > OTHER_WAYS.separation for other in of_pair
+            ):
+                of_pair.append(each)
+    ranks = zip_longest(*found.values())
+    return [each for rank in ranks for each in rank if each is not None]
+
+
+def _distance(first: Candidate, second: Candidate) -> float:
+    """Greatest displacement of a joint [rad] between the ends of two candidates."""
+    return max(
+        float(np.abs(first.q_start - second.q_start).max()),
+        float(np.abs(first.q_goal - second.q_goal).max()),
+    )
 
 
 def _solve_along_paths(state: SearchState, candidate: Candidate) -> None:

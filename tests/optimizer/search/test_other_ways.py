@@ -15,7 +15,7 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.search import stages
 from joulepath.optimizer.search.attempts import solve
-from joulepath.optimizer.search.other_ways import explore_other_ways
+from joulepath.optimizer.search.other_ways import OTHER_WAYS, explore_other_ways, quickest
 from joulepath.optimizer.search.seeds import estimates
 from joulepath.optimizer.search.state import SearchState
 from tests.optimizer.placement.cells import at
@@ -66,6 +66,25 @@ def test_a_better_posture_is_found_around_the_obstacle() -> None:
     assert state.prepared.surroundings.worst_violation(best.spline) is None
     reached = tcp_pose(ARM, best.spline.control_points[-1:])[0]
     np.testing.assert_allclose(reached, GOAL.T, atol=1e-6)
+
+
+def test_several_separate_postures_of_every_curve_are_tried_the_quickest_first() -> None:
+    state = SearchState.of(PROBLEM)
+    stages.prepare(state)
+    chosen = quickest(state)
+    curves = [each.goal.self_motion for each in chosen]
+    first = {curve: curves.index(curve) for curve in curves}
+    assert max(first.values()) < len(first)
+    for each in chosen:
+        same = [other for other in chosen if other.goal.self_motion is each.goal.self_motion]
+        assert len(same) <= OTHER_WAYS.postures
+        assert all(
+            np.abs(each.q_goal - other.q_goal).max() > OTHER_WAYS.separation
+            for other in same
+            if other is not each
+        )
+        assert chosen[first[each.goal.self_motion]].shortest <= each.shortest
+    assert max(curves.count(curve) for curve in first) == OTHER_WAYS.postures
 
 
 @pytest.mark.parametrize("other", ["electrical", "no obstacles"])
