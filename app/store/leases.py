@@ -155,22 +155,24 @@ def _next(session: Session, count: int, served: Sequence[str | None]) -> list[Jo
 
     The owner that was served longest ago is the first.
     """
-    waiting = select(JobRequest).where(JobRequest.state == "waiting")
-    owners = session.scalars(waiting.with_only_columns(JobRequest.owner).distinct())
+    waiting = JobRequest.state == "waiting"
     turns = {owner: turn for turn, owner in enumerate(served)}
-    found = list[tuple[int, int, int, str, JobRequest]]()
-    for owner in owners:
-        own = waiting.where(JobRequest.owner == owner).order_by(
-            JobRequest.number, JobRequest.job_id
+    places = list[tuple[int, int, int, str]]()
+    for owner in session.scalars(select(JobRequest.owner).where(waiting).distinct()):
+        # without the bodies, because most of these requests stay where they are
+        own = (
+            select(JobRequest.number, JobRequest.job_id)
+            .where(waiting, JobRequest.owner == owner)
+            .order_by(JobRequest.number, JobRequest.job_id)
+            .limit(count)
+            .with_for_update(skip_locked=True)
         )
         turn = turns.get(owner, -1)
-        found += [
-            (rank, turn, each.number, each.job_id, each)
-            for rank, each in enumerate(
-                session.scalars(own.limit(count).with_for_update(skip_locked=True))
-            )
-        ]
-    return [each for *_, each in sorted(found, key=lambda entry: entry[:-1])[:count]]
+        places += [(rank, turn, *key) for rank, key in enumerate(session.execute(own))]
+    keys = [place[2:] for place in sorted(places)[:count]]
+    rows = select(JobRequest).where(tuple_(JobRequest.number, JobRequest.job_id).in_(keys))
+    found = {(each.number, each.job_id): each for each in session.scalars(rows)}
+    return [found[key] for key in keys]
 
 
 def settle(
