@@ -22,6 +22,7 @@ from joulepath.optimizer.cycle.moves import moves_of
 from joulepath.optimizer.cycle.rest_energy import dwell_energies, rest_sensitivity
 from joulepath.optimizer.deadline import Clock
 from joulepath.optimizer.dynamics.interval import MotionEnergy, saving_interval
+from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
@@ -29,7 +30,7 @@ from joulepath.optimizer.problem.free_order import is_given_order_allowed
 from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.baselines import baselines, nearest, saving
+from joulepath.optimizer.search.baselines import baselines, nearest
 
 
 def move_by_move(search: CycleSearch) -> list[int] | None:

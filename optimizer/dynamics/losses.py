@@ -208,3 +208,9 @@ def share_of(value: float, energy: float) -> float | None:
     """A value over the amount of an energy [J]; None if that is below `ENERGY_FLOOR`, as of an arm
     at rest without idle power. Energies may be negative, as of a bus that takes energy back."""
     return value / abs(energy) if abs(energy) > ENERGY_FLOOR else None
+
+
+def saving(ours: float, theirs: float) -> float:
+    """1 - ours / theirs of two energies [J], with the right sign if they are negative; 0 if theirs
+    is below `ENERGY_FLOOR`."""
+    return share_of(theirs - ours, theirs) or 0.0

@@ -12,6 +12,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
@@ -36,7 +37,6 @@ from joulepath.optimizer.replay.replay_result import (
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.result.baseline import BaselineName
 from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.baselines import saving
 
 
 @overload

@@ -32,7 +32,7 @@ from joulepath.optimizer.dynamics.interval import (
     saving_intervals,
 )
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
-from joulepath.optimizer.dynamics.losses import breakdown, friction_torque
+from joulepath.optimizer.dynamics.losses import breakdown, friction_torque, saving
 from joulepath.optimizer.dynamics.sensitivity import energy_sensitivity, waiting_sensitivity
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE, excess_text, limit_ratios
 from joulepath.optimizer.motion.ruckig_motion import straight, time_optimal
@@ -238,11 +238,6 @@ def nearest(problem: Problem, q_start: Array, q_goals: Array) -> Array:
     times = (displacement / problem.arm.active_limits.v_max).max(axis=1)
     # times that differ by rounding are equal
     return np.asarray(q_goals[np.lexsort((displacement.sum(axis=1), np.round(times, 9)))[0]])
-
-
-def saving(ours: float, theirs: float) -> float:
-    """1 - ours / theirs, with the right sign for negative energies; 0 if theirs is 0."""
-    return (theirs - ours) / abs(theirs) if theirs else 0.0
 
 
 def motion_energy(

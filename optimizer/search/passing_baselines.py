@@ -9,12 +9,13 @@ from operator import add
 
 import numpy as np
 
+from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS, Problem
 from joulepath.optimizer.result.baseline import Baseline
-from joulepath.optimizer.search.baselines import baselines, saving
+from joulepath.optimizer.search.baselines import baselines
 
 
 def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -> list[Baseline]:

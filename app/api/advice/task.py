@@ -25,7 +25,7 @@ from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import Joules, Ratio, Seconds
 from joulepath.optimizer.dynamics.dwell import holding_power
-from joulepath.optimizer.dynamics.losses import share_of
+from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.exceptions import DeclaredError
 
@@ -61,7 +61,7 @@ class AdvisedChange:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "saving", self.instead_of - self.energy)
-        object.__setattr__(self, "share", share_of(self.saving, self.instead_of) or 0.0)
+        object.__setattr__(self, "share", saving(self.energy, self.instead_of))
 
 
 @dataclass(frozen=True, kw_only=True)

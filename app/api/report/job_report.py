@@ -32,6 +32,7 @@ from joulepath.app.api.report.rivals import (
     their_energy,
 )
 from joulepath.app.convert.given_answer import arm_of
+from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.picture.cell_picture import cell_picture
 
@@ -107,7 +108,7 @@ def _lead(bundle: Bundle) -> tuple[str, ...]:
         ". No usual way is known that keeps every limit: no saving is claimed."
         if not count
         else f". In the {_moves(count)} in which a usual way keeps every limit, the answers need "
-        f"{_against(share(theirs - ours, theirs))} the nearest such way of each, in the same time."
+        f"{_against(saving(ours, theirs))} the nearest such way of each, in the same time."
     )
     left = [row for row in bundle.moves if row["answer"] is None]
     have = "has" if len(left) == 1 else "have"
@@ -144,9 +145,9 @@ def _rivals(bundle: Bundle) -> tuple[Rival, ...]:
                 _moves(count),
                 f"{digits(theirs)} J",
                 max(ratios[name], 0.0) / most,
-                saved(share(theirs - ours, theirs)),
+                saved(saving(ours, theirs)),
                 True,
-                saves=share(theirs - ours, theirs) >= EQUAL,
+                saves=saving(ours, theirs) >= EQUAL,
             )
             for name, (count, theirs, ours) in sorted(
                 found.items(), key=lambda each: (each[0] != "nearest", -each[1][0])

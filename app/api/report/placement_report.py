@@ -21,6 +21,7 @@ from joulepath.app.api.report.placed import of_cycle, rows_at
 from joulepath.app.api.report.programs import program_of
 from joulepath.app.api.report.report import Fact, Report, Rival, Table
 from joulepath.app.api.report.rivals import EQUAL, above_least, parts_of, saved
+from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.placement.mounts import yaw_of
 from joulepath.optimizer.problem.pose import Pose
 
@@ -171,7 +172,7 @@ def _rivals(answer: Json) -> tuple[Rival, ...]:
                 time.get(name) or "",
                 f"{digits(energy)} J",
                 max(share(energy, dearest), 0.0),
-                saved(share(energy - best["energy"], energy)),
+                saved(saving(best["energy"], energy)),
                 True,
                 saves=best["energy"] < energy,
             )

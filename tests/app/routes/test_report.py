@@ -21,7 +21,7 @@ from joulepath.app.api.report.numbers import amount, counted, digits, down, perc
 from joulepath.app.api.report.pdf import pdf
 from joulepath.app.api.report.rivals import their_energy
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.optimizer.search.baselines import saving
+from joulepath.optimizer.dynamics.losses import saving
 from tests.app.live import ROOT
 from tests.app.requests import HOME, NEAR, move
 

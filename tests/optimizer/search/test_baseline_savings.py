@@ -13,6 +13,7 @@ import pytest
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.interval import MotionEnergy
+from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.motion.ruckig_motion import straight, time_optimal
 from joulepath.optimizer.motion.time_scalings import (
     SampledMotion,
@@ -28,7 +29,6 @@ from joulepath.optimizer.search.baselines import (
     broken_limits,
     guesses,
     motion_energy,
-    saving,
     standing,
     with_savings,
 )
