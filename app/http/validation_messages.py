@@ -89,8 +89,6 @@ def _message(error: Mapping[str, Any]) -> str:
         bound = context["max_length" if is_long else "min_length"]
         items = f"{bound} item{'' if bound == 1 else 's'}"
         return f"Give at {'most' if is_long else 'least'} {items}, not {context['actual_length']}"
-    if error["type"] == "less_than_equal" and error["loc"][-1] == "deadline":
-        return f"Give at most {context['le']:g} s, or less where the operator has set less"
     return str(_MESSAGES.get(error["type"], error["msg"]))
 
 

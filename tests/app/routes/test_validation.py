@@ -359,11 +359,6 @@ def test_a_deadline_in_a_query_is_named_there(client: TestClient, deadline: floa
     assert [error["loc"] for error in problem["errors"]] == [["query", "deadline"]]
 
 
-def test_the_longest_deadline_is_told_with_the_operator_s(client: TestClient) -> None:
-    problem = client.post("/optimize", json=move(deadline=7200)).json()
-    assert "where the operator has set less" in problem["errors"][0]["msg"]
-
-
 def test_fields_of_an_iteration_have_its_path(client: TestClient) -> None:
     study = client.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]
     for wrong, loc in (({"deadline": 599.0}, "deadline"), ({"friction": "butter"}, "friction")):
