@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -41,7 +40,7 @@ def from_hull(points: Array, corners: Array, within: float = np.inf) -> Array:
     Returns:
         Signed distances, shape (k,) [m]; inside, minus the distance from the nearest face.
     """
-    hull = _hull_of(np.asarray(corners, dtype=float).tobytes())
+    hull = ConvexHull(corners)
     planes = hull.equations
     found = np.concatenate(
         [
@@ -58,12 +57,6 @@ def from_hull(points: Array, corners: Array, within: float = np.inf) -> Array:
         exact = [_from_faces(distinct[k : k + BATCH], hull) for k in batches]
         found[is_open] = np.concatenate(exact)[which.ravel()]
     return np.asarray(found)
-
-
-@lru_cache(maxsize=512)
-def _hull_of(corners: bytes) -> ConvexHull:
-    """The hull of points (m, 3) [m] of double precision, which many calls have in common."""
-    return ConvexHull(np.frombuffer(corners).reshape(-1, 3))
 
 
 def _from_faces(points: Array, hull: ConvexHull) -> Array:
