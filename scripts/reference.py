@@ -82,7 +82,7 @@ def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[
 
 def _slug(schema: dict[str, Any]) -> str:
     """The last part of a problem's type; empty for other schemas."""
-    kind = str(schema.get("properties", {}).get("type", {}).get("const", ""))
+    kind = str(schema.get("properties", {}).get("type", {}).get("enum", [""])[0])
     return kind.removeprefix("/problems/") if kind.startswith("/problems/") else ""
 
 
@@ -97,7 +97,7 @@ def _problem(schema: dict[str, Any]) -> str:
         [
             f"## {_slug(schema)}",
             "",
-            f"{own['title']['const']}, status {own['status']['const']}. "
+            f"{own['title']['enum'][0]}, status {own['status']['enum'][0]}. "
             f"{_cell(schema['description'])}",
             "",
             *([*fields, ""] if fields else []),
@@ -139,10 +139,8 @@ def _type(node: dict[str, Any], page: str = "") -> str:
     options = [*node.get("anyOf", ()), *node.get("oneOf", ())]
     if options:
         return " or ".join(dict.fromkeys(_type(option, page) for option in options))
-    if "enum" in node or "const" in node:
-        return ", ".join(
-            f"`{json.dumps(value)}`" for value in node.get("enum", [node.get("const")])
-        )
+    if "enum" in node:
+        return ", ".join(f"`{json.dumps(value)}`" for value in node["enum"])
     if node.get("type") == "array":
         return f"list of {_type(node['items'], page)}" if "items" in node else "list"
     return str(node.get("type", "any"))

@@ -23,6 +23,7 @@ from joulepath.app.exceptions.queue import Busy, TooManyRequests
 from joulepath.app.exceptions.transport import HeadTooLarge
 from joulepath.app.http.answer_examples import add_examples
 from joulepath.app.http.authentication import SCHEME
+from joulepath.app.http.openapi_generators import rewrite_for_generators
 from joulepath.app.http.openapi_pages import add_groups, add_pages
 from joulepath.app.http.problems import model_of_problem, path_of, problem_of
 from joulepath.app.http.sites import PROBES
@@ -149,6 +150,8 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
         deadline["maximum"] = settings.max_deadline
         if "default" in deadline:
             deadline["default"] = min(deadline["default"], settings.max_deadline)
+    rewrite_for_generators(document["paths"])
+    rewrite_for_generators(schemas)
     return document
 
 

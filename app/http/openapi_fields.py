@@ -55,9 +55,8 @@ def _type(node: Json) -> str:
     options = [*node.get("anyOf", ()), *node.get("oneOf", ())]
     if options:
         return " or ".join(dict.fromkeys(_type(each) for each in options))
-    if "enum" in node or "const" in node:
-        values = node.get("enum", [node.get("const")])
-        return " or ".join(f"`{as_text(each)}`" for each in values)
+    if "enum" in node:
+        return " or ".join(f"`{as_text(each)}`" for each in node["enum"])
     if node.get("type") == "array":
         inner = _type(node.get("items", {}))
         return f"list of {_PLURALS.get(inner, inner)}"
@@ -74,9 +73,8 @@ def example_of(node: Json, schemas: Json, depth: int = _DEEPEST) -> Any:
     for key in ("examples", "enum"):
         if node.get(key):
             return node[key][0]
-    for key in ("const", "default"):
-        if key in node:
-            return node[key]
+    if "default" in node:
+        return node["default"]
     if "$ref" in node:
         return example_of(schemas[node["$ref"].rpartition("/")[2]], schemas, depth)
     options = [*node.get("anyOf", ()), *node.get("oneOf", ())]

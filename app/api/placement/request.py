@@ -78,7 +78,8 @@ def _by_places(value: Any) -> str | None:
 
 
 RegionOrPlaces = Annotated[
-    Annotated[Region, Tag("by ranges")] | Annotated[Places, Tag("by places")],
+    # clients that try one after the other would read any object as ranges
+    Annotated[Places, Tag("by places")] | Annotated[Region, Tag("by ranges")],
     Discriminator(
         _by_places,
         custom_error_type="region",
