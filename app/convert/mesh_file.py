@@ -11,9 +11,11 @@ import struct
 import threading
 from typing import Literal
 
+import numpy as np
 from cachetools import LRUCache, cached
 
 from joulepath.app.convert.base64_data import decoded
+from joulepath.models.shape_sizes import SIZES
 from joulepath.models.uploads.glb import check_glb
 from joulepath.models.uploads.limits import UnreadableFile
 from joulepath.models.uploads.mesh import read_mesh
@@ -57,4 +59,11 @@ def _mesh(file_format: Format, content: bytes, scale: float) -> TriangleMesh:
         raise InvalidProblem(
             "data", f"data has no triangles: give a {file_format} file of a mesh with faces."
         )
-    return TriangleMesh(corners[triangles] * scale)
+    corners = corners * scale
+    if (farthest := np.abs(corners).max()) > SIZES.largest:
+        raise InvalidProblem(
+            "scale",
+            f"scale {scale:g} m makes the mesh reach {farthest:.4g} m from its origin, and at most "
+            f"{SIZES.largest:g} m are possible: give 0.001 for a file in millimetres.",
+        )
+    return TriangleMesh(corners[triangles])

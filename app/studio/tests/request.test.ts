@@ -10,15 +10,24 @@ import {
   withRobot,
   withStop,
 } from "../src/store/edits";
+import { extentOf } from "../src/picture/shapes";
 import { at, located, put } from "../src/store/pointer";
-import { kindOf, lackOf, rowsOf, sixOf, targetAt, withNumber } from "../src/store/request";
+import {
+  kindOf,
+  lackOf,
+  likelyUnit,
+  rowsOf,
+  sixOf,
+  targetAt,
+  withNumber,
+} from "../src/store/request";
 import type { ApiRequest, Pose, Robot } from "../src/store/types";
 import { MOVE } from "./cells";
 
 const round = withStop(
-  withStop(asKind(MOVE, "round"), { q: [1, 2, 3, 4, 5, 6] }, "pick"),
+  withStop(asKind(MOVE, "round"), { q: [1, 2, 3, 4, 5, 6] }, "pick 1"),
   null,
-  "pick",
+  "pick 1",
 );
 const names = (request: ApiRequest) => rowsOf(request).map(({ name }) => name);
 const row = (request: ApiRequest, name: string) =>
@@ -124,7 +133,22 @@ it("errors are located at the field that a request has", () => {
 
 it("obstacles have names of their own", () => {
   const two = withObstacle(withObstacle(MOVE, { shape: "box" }, "box"), { shape: "box" }, "box");
-  expect(two.scene?.obstacles?.map(({ name }) => name)).toEqual(["table", "box 1", "box 2"]);
+  expect(two.scene?.obstacles?.map(({ name }) => name)).toEqual(["table", "box", "box 2"]);
+});
+
+it("names that a table or a file gives stay as they are", () => {
+  const listed = withStop(withStop(asKind(MOVE, "round"), null, "press"), null, "press");
+  expect(names(listed).slice(-2)).toEqual(["press", "press 2"]);
+});
+
+it("a mesh file larger than any fixture in metres is one in millimetres", async () => {
+  const facet = (x: number, y: number) =>
+    `facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex ${x} 0 0\nvertex 0 ${y} 40\nendloop\nendfacet\n`;
+  const read = (text: string) => extentOf("stl", new TextEncoder().encode(text));
+  const extent = await read(`solid cad\n${facet(300, 200)}endsolid cad\n`);
+  expect(extent).toEqual([300, 200, 40]);
+  expect([likelyUnit(extent!), likelyUnit([0.3, 0.2, 0.04])]).toEqual([0.001, 1]);
+  expect(await read("solid empty\nendsolid empty\n").catch(() => null)).toBeNull();
 });
 
 it("another robot takes what fits it", () => {

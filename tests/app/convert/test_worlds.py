@@ -189,7 +189,7 @@ def test_too_many_triangles_are_refused() -> None:
         ),
         ({"shape": "mesh_file", "format": "stl", "data": "AAAAA"}, "data"),
         ({"shape": "mesh_file", "format": "obj", "data": MESH_FILE}, "data"),
-        ({"shape": "mesh_file", "format": "stl", "data": MESH_FILE, "scale": 1000.0}, "data"),
+        ({"shape": "mesh_file", "format": "stl", "data": MESH_FILE, "scale": 1000.0}, "scale"),
     ],
 )
 def test_bad_obstacles_name_the_field(fields: dict[str, Any], field: str) -> None:

@@ -233,7 +233,7 @@ function withBox(asked: ApiRequest, frame: Matrix, first: number[], last: number
   const position = first.map((value, axis) => rounded((value + last[axis]!) / 2));
   const obstacles = listOf<Obstacle>(asked.scene?.obstacles);
   const name = freshName(
-    "box",
+    "box 1",
     obstacles.map((each) => each.name),
   );
   const pose = { position: [...position, HEIGHT / 2], rotvec: [0, 0, 0] };

@@ -174,6 +174,12 @@ export function readMeshes(format: string, bytes: Uint8Array): Promise<THREE.Obj
   return read ? read(bytes) : Promise.reject(new Error(`There is no reader of ${format}.`));
 }
 
+/** The sides of the box around a file's meshes, in the file's own unit; null without meshes. */
+export async function extentOf(format: string, bytes: Uint8Array): Promise<number[] | null> {
+  const box = new THREE.Box3().setFromObject(await readMeshes(format, bytes.slice()));
+  return box.isEmpty() ? null : box.getSize(new THREE.Vector3()).toArray();
+}
+
 /** A group that fills itself. */
 function meshFile(
   { format = "", data = "", scale = 1 }: Fields,

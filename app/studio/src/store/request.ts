@@ -134,12 +134,18 @@ export function poseOfSix(six: number[], before?: Pose): Pose {
 
 export const targetOf = (row: Row, pose: Pose): unknown => (row.bare ? pose : { pose });
 
-/** A name that none of the others has: the same with the next number. */
+const LARGEST = 10; // of a fixture in metres; CAD writes STL in millimetres
+
+/** The likely unit [m] of a mesh file, whose format does not tell it, by the sides of its box. */
+export const likelyUnit = (extent: number[]): number => (Math.max(...extent) > LARGEST ? 1e-3 : 1);
+
+/** A name that none of the others has: the name itself, or the same with the next number. */
 export function freshName(name: string, others: unknown[]): string {
+  if (!others.includes(name)) return name;
   const stem = name.replace(/ ?\d+$/, "") || name;
-  let number = 1;
+  let number = name === stem ? 2 : 1;
   while (others.includes(`${stem} ${number}`)) number += 1;
-  return others.includes(name) || name === stem ? `${stem} ${number}` : name;
+  return `${stem} ${number}`;
 }
 
 /** What the request lacks before it can be sent; null if nothing. */

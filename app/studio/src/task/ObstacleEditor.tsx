@@ -10,6 +10,15 @@ import type { Obstacle, Pose } from "../store/types";
 import { PoseCells } from "./PoseCells";
 
 const AXES = ["X", "Y", "Z"];
+const UNITS: [number, string][] = [
+  [0.001, "mm"],
+  [0.01, "cm"],
+  [0.0254, "inch"],
+  [1, "m"],
+];
+/** The units to choose from, with that of the request. */
+const unitsWith = (scale: number): [number, string][] =>
+  UNITS.some(([known]) => known === scale) ? UNITS : [...UNITS, [scale, `${scale} m`]];
 
 /** The fields of one obstacle. */
 export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
@@ -20,6 +29,7 @@ export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
   const pose: Pose = isObject(given.pose)
     ? { ...given.pose, position: listOf<number>(given.pose.position) }
     : { position: [0, 0, 0], rotvec: [0, 0, 0] };
+  const scale = typeof given.scale === "number" ? given.scale : 1;
   const cell = (
     label: string,
     field: string,
@@ -57,10 +67,29 @@ export function ObstacleEditor({ pointer }: { pointer: Pointer }) {
           {cell("Length", "length")}
         </div>
       )}
+      {given.shape === "mesh_file" && (
+        <label class="field">
+          <span>Unit of the file</span>
+          <select
+            value={scale}
+            onChange={(event) =>
+              edit(put(request.value, `${pointer}/scale`, Number(event.currentTarget.value)))
+            }
+          >
+            {unitsWith(scale).map(([scale, text]) => (
+              <option key={scale} value={scale}>
+                {text}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
       <p class="hint">
         {given.shape === "half_space"
           ? "A point of its surface; its z points out of it"
-          : "Its middle, in the base frame"}
+          : given.shape === "mesh_file"
+            ? "The origin of the file, in the base frame"
+            : "Its middle, in the base frame"}
       </p>
       <PoseCells
         name={String(given.name)}

@@ -4,15 +4,18 @@ import { Errors } from "../ui/Errors";
 import { Menu } from "../ui/Menu";
 import { Section } from "../ui/Section";
 import { tool } from "../picture/drag";
+import { extentOf } from "../picture/shapes";
 import { OBSTACLES, withObstacle, withoutObstacle } from "../store/edits";
 import { join } from "../store/pointer";
-import { DEFAULT_MARGIN, obstaclesListed } from "../store/request";
+import { DEFAULT_MARGIN, likelyUnit, obstaclesListed } from "../store/request";
 import { base64 } from "../store/share";
-import { changes, edit, request, selected } from "../store/state";
+import { changes, edit, request, selected, toast } from "../store/state";
 import { figure, words } from "../store/units";
 import { ObstacleEditor } from "./ObstacleEditor";
 
 const MOST = 60; // obstacles that are listed
+const counted = (count: number) =>
+  count ? `${count} obstacle${count > 1 ? "s" : ""}` : "nothing around the arm";
 
 /** What stands around the arm. */
 export function SceneList() {
@@ -32,7 +35,7 @@ export function SceneList() {
           size: name === "box" ? [...OBSTACLES.box.size] : undefined,
           pose: place,
         },
-        name === "half_space" ? "table" : name,
+        name === "half_space" ? "table" : `${name} 1`,
       ),
       {},
     );
@@ -45,21 +48,34 @@ export function SceneList() {
     if (!["stl", "obj", "glb"].includes(format ?? ""))
       return setWhy("Choose an STL, OBJ or GLB file.");
     setWhy("");
-    const data = base64(new Uint8Array(await file.arrayBuffer()));
+    const bytes = new Uint8Array(await file.arrayBuffer());
+    const extent = await extentOf(format!, bytes).catch(() => null);
+    if (!extent) return setWhy(`${file.name} is no ${format!.toUpperCase()} file with triangles.`);
+    const scale = likelyUnit(extent);
     edit(
       withObstacle(
         request.value,
-        { shape: "mesh_file", format, data, pose: { position: [0.5, 0, 0], rotvec: [0, 0, 0] } },
+        {
+          shape: "mesh_file",
+          format,
+          data: base64(bytes),
+          scale,
+          pose: { position: [0.5, 0, 0], rotvec: [0, 0, 0] },
+        },
         file.name.replace(/\.\w+$/, "").slice(0, 40),
       ),
       {},
     );
+    setOpen(obstacles.length);
+    selected.value = join("scene", "obstacles", obstacles.length);
+    const sides = extent.map((side) => figure(side * scale * 1000)).join(" × ");
+    toast.value = `Read in ${scale < 1 ? "millimetres" : "metres"}: ${sides} mm.`;
   };
   return (
     <Section
       title="Scene"
       id="scene"
-      note={obstacles.length ? `${obstacles.length} obstacles` : "nothing around the arm"}
+      note={counted(obstacles.length)}
       action={
         <Menu label="Add" icon="plus" quiet>
           <Button kind="quiet" onClick={() => add("box")}>
