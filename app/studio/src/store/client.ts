@@ -15,14 +15,14 @@ export class Problem extends Error {
 /** The dialog that asks for an API key: called with the key, or null. */
 export const keyAsked = signal<((key: string | null) => void) | null>(null);
 
-export const get = async <T>(path: string, signal?: AbortSignal): Promise<T> =>
-  (await send(path, { signal })).json() as Promise<T>;
+export const get = <T>(path: string, signal?: AbortSignal): Promise<T> =>
+  json<T>(send(path, { signal }));
 
-export const post = async <T>(path: string, body: unknown, signal?: AbortSignal): Promise<T> =>
-  (await send(path, posting(body, signal))).json() as Promise<T>;
+export const post = <T>(path: string, body: unknown, signal?: AbortSignal): Promise<T> =>
+  json<T>(send(path, posting(body, signal)));
 
-export const patch = async <T>(path: string, body: unknown): Promise<T> =>
-  (await send(path, { ...posting(body), method: "PATCH" })).json() as Promise<T>;
+export const patch = <T>(path: string, body: unknown): Promise<T> =>
+  json<T>(send(path, { ...posting(body), method: "PATCH" }));
 
 /** A page of a list, with the parameters that have a value. Throws Problem. */
 export const listed = <T>(path: string, query: Record<string, string | undefined>): Promise<T> => {
@@ -57,7 +57,7 @@ export async function send(path: string, options: RequestInit): Promise<Response
   try {
     response = await fetch(path.replace(/^\//, ""), { ...options, headers });
   } catch (error) {
-    if (error instanceof DOMException && error.name === "AbortError") throw error;
+    if (isAbort(error)) throw error;
     throw new Problem({
       title: "The service does not answer",
       detail: "The service cannot be reached: is it running? Your work is saved here.",
@@ -66,6 +66,26 @@ export async function send(path: string, options: RequestInit): Promise<Response
   if (response.ok) return response;
   if (response.status === 401 && (await askForKey())) return send(path, options);
   throw new Problem(await problemOf(response));
+}
+
+const isAbort = (error: unknown) => error instanceof DOMException && error.name === "AbortError";
+
+/** What to throw where an answer ended too early, in an error of the connection or without one. */
+export const brokenOff = (error?: unknown) =>
+  isAbort(error)
+    ? error
+    : new Problem({
+        title: "The answer broke off",
+        detail:
+          "The connection to the service ended before the answer was complete. Your work is saved " +
+          "here: send the request again.",
+      });
+
+async function json<T>(response: Promise<Response>): Promise<T> {
+  const arrived = await response;
+  return arrived.json().catch((error: unknown) => {
+    throw brokenOff(error);
+  }) as Promise<T>;
 }
 
 async function problemOf(response: Response): Promise<ProblemDetails> {
@@ -89,7 +109,7 @@ export async function stream(
   const accept = { Accept: "text/event-stream, application/json;q=0.9" };
   const response = await send(path, posting(body, signal, accept));
   if (!response.headers.get("Content-Type")?.startsWith("text/event-stream")) {
-    event("answer", await response.json());
+    event("answer", await json(Promise.resolve(response)));
     return;
   }
   await read(response, event);
@@ -108,7 +128,9 @@ async function read(
   const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
   for (;;) {
-    const { value, done } = await reader.read();
+    const { value, done } = await reader.read().catch((error: unknown) => {
+      throw brokenOff(error);
+    });
     if (done) return;
     text += value.replaceAll("\r\n", "\n");
     const blocks = text.split("\n\n");

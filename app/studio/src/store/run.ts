@@ -1,7 +1,7 @@
 // The way of a request to the service and back, with its progress.
 import { batch } from "@preact/signals";
 import { obstaclesOf } from "./chain";
-import { patch, Problem, stream } from "./client";
+import { brokenOff, patch, Problem, stream } from "./client";
 import { cycleAnswered } from "./cycle";
 import { askedFor } from "./persist";
 import { robotOf } from "./service";
@@ -126,10 +126,7 @@ async function streamed(endpoint: string, body: unknown, signal: AbortSignal): P
     signal,
   );
   if (answer) return answer;
-  throw new Problem({
-    title: "The answer broke off",
-    detail: "The connection ended before the answer came: send the request again.",
-  });
+  throw brokenOff();
 }
 
 function progressed(now: Run, name: string, data: Record<string, number>): Run {
