@@ -36,7 +36,7 @@ from joulepath.optimizer.evaluate.piecewise_motion import (
 )
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, Recording, Waypoints
 from joulepath.optimizer.evaluate.sampler import Sampler
-from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.motion.quadrature import lobatto_panels
 from joulepath.optimizer.motion.spline import Spline
@@ -102,6 +102,12 @@ def evaluate(
     """
     end = Deadline.after(deadline, clock)
     given = motion.trajectory.spline if isinstance(motion, Solution) else motion
+    if not isinstance(given, Waypoints | Recording | Spline):
+        raise InvalidProblem(
+            "motion",
+            f"motion must be a solution, Recording.of(t, q), or Waypoints(q, times), and is of "
+            f"type {type(given).__name__}.",
+        )
     evaluator = _Evaluator(arm, given, sample_period)
     try:
         with watch(end), progress_bar("Evaluating", tell, progress) as tell:

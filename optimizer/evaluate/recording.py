@@ -139,6 +139,12 @@ class Recording:
     edges: Sequence[float] = ()
     cycles: Sequence[int] = ()
 
+    def __post_init__(self) -> None:
+        if isinstance(self.blocks, np.ndarray):
+            raise InvalidProblem(
+                "trajectory", "A Recording takes blocks of rows: use Recording.of(t, q) for arrays."
+            )
+
     @classmethod
     def of(
         cls,

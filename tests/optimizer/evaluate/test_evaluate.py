@@ -282,3 +282,16 @@ def test_keeps_its_deadline() -> None:
     assert evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 11.9)).segment_count == 2
     with pytest.raises(DeadlineExceeded):
         evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 12.1))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        lambda: evaluate(ARM, START),
+        lambda: evaluate(ARM, ([0.0, 1.0], [START, GOAL])),
+        lambda: evaluate(ARM, Recording(np.array([0.0, 1.0]), np.array([START, GOAL]))),
+    ],
+)
+def test_arrays_that_are_no_motion_name_the_constructor(given: Any) -> None:
+    with pytest.raises(InvalidProblem, match=r"Recording\.of\(t, q\)"):
+        given()
