@@ -27,4 +27,6 @@ async def page(request: Request) -> Response:
 @router.get("/studio/{path:path}")
 async def asset(request: Request, path: str) -> Response:
     """A script, a style sheet or the first example of the page."""
+    if not path:  # /studio/: the page's own addresses hold without the slash only
+        return RedirectResponse("../studio", status_code=307)
     return answer(request, FOLDER, path)

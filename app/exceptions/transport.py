@@ -15,7 +15,7 @@ class NotFound(ServiceError):
     status = 404
     title = "Not found"
     remedy = "Use one of the paths that `GET /openapi.json` lists."
-    detail = "This path does not exist: GET /openapi.json lists all paths."
+    detail = "This path does not exist: leave out a slash at its end; GET /openapi.json lists all."
 
 
 class PagesNotBuilt(ServiceError):

@@ -67,7 +67,7 @@ def test_a_file_is_sent_once(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", ["nothing.js", "", "licences.txt", "../main.js", "%2e%2e/__init__.py", "x" * 5000]
+    "path", ["nothing.js", "licences.txt", "../main.js", "%2e%2e/__init__.py", "x" * 5000]
 )
 def test_nothing_else_is_served(client: TestClient, path: str) -> None:
     refused(client.get(f"/studio/{path}"), NotFound)
@@ -120,3 +120,10 @@ def test_the_urdf_of_a_robot(client: TestClient) -> None:
         and len(robot.findall("joint[@type='revolute']")) == 6
     )
     refused(client.get("/robots/none/urdf"), UnknownRobot)
+
+
+def test_a_slash_behind_the_address_leads_to_the_page(client: TestClient) -> None:
+    answer = client.get("/studio/", follow_redirects=False)
+    # relative: it holds behind a proxy's path, too
+    assert (answer.status_code, answer.headers["location"]) == (307, "../studio")
+    assert "leave out a slash" in client.post("/optimize/", json={}).json()["detail"]
