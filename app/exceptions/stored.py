@@ -11,8 +11,8 @@ from joulepath.optimizer.declared import Internal, Unit
 StoreFault = Literal["full", "read-only", "locked", "deleted", "other-version", "unreachable"]
 """Faults of the database."""
 _FAULTS: dict[StoreFault, str] = {
-    "full": "The disk of the database is full: delete studies that are not needed, or enlarge the "
-    "disk. Deleting works.",
+    "full": "The disk of the database is full: delete answers, jobs, logs or studies that are "
+    "not needed, or enlarge the disk. Deleting works.",
     "read-only": "The database is read-only: reading works, and the operator of the service must "
     "make it writable.",
     "locked": "Another process locks the database: try again later, or ask the operator of the "

@@ -37,7 +37,7 @@ const SAVED = {
 /** Puts the cell into the address of the page, and the address into the clipboard. */
 async function share(): Promise<void> {
   const address = await link(presentCell(), location.href);
-  history.replaceState(null, "", address);
+  history.replaceState(history.state, "", address);
   try {
     await navigator.clipboard.writeText(address);
     toast.value = "The link is copied. It is the address of this page now.";

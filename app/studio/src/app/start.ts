@@ -3,6 +3,7 @@ import { play } from "../picture/clock";
 import { followRobot } from "../picture/pictured";
 import { followAdvice } from "../answer/advice";
 import { followPostures } from "../answer/postures";
+import { followHistory } from "./history";
 import { alone, embedded } from "../store/alone";
 import { openCell, openFirst, openKept, openLast } from "../store/open";
 import { followChanges } from "../store/persist";
@@ -22,6 +23,7 @@ export async function start(): Promise<void> {
   followChanges();
   followPostures();
   followAdvice();
+  followHistory();
   window.addEventListener(
     "hashchange",
     () => /^#(r|answer)=/.test(location.hash) && location.reload(),

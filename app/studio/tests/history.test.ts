@@ -1,0 +1,22 @@
+// The back button leads through the pages of the studio, and not out of it.
+import { expect, it, vi } from "vitest";
+import { followHistory } from "../src/app/history";
+import { page } from "../src/store/state";
+
+it("the back button leads from the library to the cell", () => {
+  const entries: unknown[] = [null];
+  let back: (event: { state: unknown }) => void = () => undefined;
+  vi.stubGlobal("history", {
+    replaceState: (state: unknown) => (entries[entries.length - 1] = state),
+    pushState: (state: unknown) => entries.push(state),
+  });
+  vi.stubGlobal("window", {
+    addEventListener: (_: string, listener: typeof back) => (back = listener),
+  });
+  followHistory();
+  page.value = "library";
+  expect(entries).toEqual([{ page: "cell" }, { page: "library" }]);
+  back({ state: entries[0] });
+  expect(page.value).toBe("cell");
+  expect(entries).toHaveLength(2);
+});
