@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer, CompareRequest, CompareTask
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
-from joulepath.app.api.shared.parameters import deadline_of
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
-from joulepath.app.api.shared.reply import BY_EVENTS, ServiceReply
+from joulepath.app.api.shared.reply import BY_EVENTS, ServiceTasks
 from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 
@@ -28,14 +26,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
         **problem_responses(*MOTION_PROBLEMS, KeyReused),
     },
 )
-async def compare(
-    request: Request,
-    body: CompareRequest,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
-    later: ServiceLater,
-    reply: ServiceReply,
-) -> Response:
+async def compare(body: CompareRequest, tasks: ServiceTasks, later: ServiceLater) -> Response:
     """Solves one request with several methods, one after another. The answer is a table of their
     energies, durations and solve times, with certified motions. The row of a method without a
     motion has its problem. If no method finds a motion, the answer is the problem of the first
@@ -43,6 +34,4 @@ async def compare(
     then the answer."""
     if later.wanted:
         return await later.respond("compare", body)
-    task = CompareTask(body, request.state.id)
-    deadline = deadline_of(body, settings.max_deadline)
-    return await reply.of(lambda tell: engine.run(task, deadline, tell))
+    return await tasks.search("compare", CompareTask(body, tasks.request_id), body)

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import CycleAnswer, CycleTask
-from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
-    ServiceCache,
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceCache
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
-from joulepath.app.api.shared.parameters import WantedFormat, deadline_of
+from joulepath.app.api.shared.parameters import WantedFormat
 from joulepath.app.api.shared.problem_lists import CYCLE_PROBLEMS
-from joulepath.app.api.shared.reply import BY_EVENTS, ServiceReply
+from joulepath.app.api.shared.reply import BY_EVENTS, ServiceTasks
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.store.store_answers import keep_answer, store_answers
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.app.tasks.request_key import cell_of
 from joulepath.optimizer.progress import Tell
@@ -41,15 +34,10 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     },
 )
 async def cycle(
-    request: Request,
     body: CycleRequest,
     wanted: WantedFormat,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
-    store: ServiceStore,
-    client: ServiceClient,
+    tasks: ServiceTasks,
     later: ServiceLater,
-    reply: ServiceReply,
     cache: ServiceCache,
 ) -> Response:
     """Finds the arm configurations at all stops of a cycle, and the motions between them, with the
@@ -63,11 +51,8 @@ async def cycle(
     cell = None if isinstance(body, HeldBody) else cell_of(body)
 
     async def work(tell: Tell) -> TaskResult:
-        task = CycleTask(body, request.state.id, wanted, await cache.motions(cell))
-        result = await engine.run(task, deadline_of(body, settings.max_deadline), tell)
-        result = await store_answers(store, settings, "optimize", result, client.owner, cell)
-        if result.kept_as is None:  # a table
-            return result
-        return await keep_answer(store, settings, "cycle", result, client.owner)
+        task = CycleTask(body, tasks.request_id, wanted, await cache.motions(cell))
+        result = await tasks.engine.run(task, tasks.deadline(body), tell)
+        return await tasks.kept("cycle", result, cell=cell)
 
-    return await reply.of(work)
+    return await tasks.respond(work)

@@ -8,7 +8,6 @@ from fastapi import APIRouter, Request, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer, EvaluateTask
-from joulepath.app.api.shared.dependencies import ServiceSettings
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater, deadlines
 from joulepath.app.api.shared.parameters import WantedFormat, is_fresh
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
@@ -83,7 +82,6 @@ def _kind_of(file: IO[bytes]) -> _Kind:
 async def evaluate(
     request: Request,
     wanted: WantedFormat,
-    settings: ServiceSettings,
     tasks: ServiceTasks,
     later: ServiceLater,
 ) -> Response:
@@ -101,10 +99,9 @@ async def evaluate(
         if kind == "json" and request.query_params:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         if later.wanted and kind == "json":
-            body = JobBodyTask(
-                path, deadlines(settings), tasks.request_id, is_fresh(request), evaluate=True
-            )
+            longest = deadlines(tasks.settings)
+            body = JobBodyTask(path, longest, tasks.request_id, is_fresh(request), evaluate=True)
             return await later.respond_with(await later.validated(body))
-        query, longest = dict(request.query_params), settings.max_deadline
-        task = EvaluateTask(path, kind, query, wanted, tasks.request_id, longest)
+        query, deadline = dict(request.query_params), tasks.deadline()
+        task = EvaluateTask(path, kind, query, wanted, tasks.request_id, deadline)
         return await tasks.answer(task)

@@ -13,11 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from joulepath.app.api.figures.models import FiguresDetail, FiguresList, FiguresSummary
 from joulepath.app.api.figures.request import FiguresDocument
 from joulepath.app.api.figures.task import FiguresTask
-from joulepath.app.api.shared.dependencies import (
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
@@ -58,21 +54,19 @@ async def put(
     request: Request,
     response: Response,
     body: FiguresDocument,
-    settings: ServiceSettings,
     tasks: ServiceTasks,
-    store: ServiceStore,
-    client: ServiceClient,
 ) -> FiguresDetail:
     """Stores figures identified on one arm, in the form of `GET /figures/{id}` of this or another
     server. The id follows from the content: the same figures are stored once.
     Their first owner keeps them."""
     result = await tasks.result(FiguresTask(body, tasks.request_id))
-    new = figures.new_figures(body.robot, orjson.loads(result.document), client.owner)
-    row, is_new = await store.create(partial(figures.put, figures=new, most=settings.max_figures))
+    new = figures.new_figures(body.robot, orjson.loads(result.document), tasks.client.owner)
+    most = tasks.settings.max_figures
+    row, is_new = await tasks.store.create(partial(figures.put, figures=new, most=most))
     if is_new:
         response.status_code = 201
     set_location(request, response, f"/figures/{row.id}")
-    return await _detail(store, row)
+    return await _detail(tasks.store, row)
 
 
 @router.get(

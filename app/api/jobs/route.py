@@ -8,13 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from joulepath.app.api.shared.dependencies import (
-    ServiceClient,
-    ServiceClientEngine,
-    ServiceJobs,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceJobs, ServiceStore
 from joulepath.app.api.shared.later import deadlines
 from joulepath.app.api.shared.parameters import (
     CREATED_HEADERS,
@@ -23,6 +17,7 @@ from joulepath.app.api.shared.parameters import (
     is_fresh,
     set_location,
 )
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.api.shared.uploads import received
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
@@ -34,7 +29,6 @@ from joulepath.app.exceptions.stored import (
     UnknownJob,
 )
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout, UnsupportedMediaType
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.event_stream import EVENT_SCHEMA, EVENT_STREAM, EVENT_STREAM_HEADERS
 from joulepath.app.http.json_route import UNDECLARED, JsonRoute, media_type
 from joulepath.app.http.openapi import problem_responses
@@ -97,10 +91,8 @@ _OF_ONE = (UnknownJob, StoreUnavailable)
 async def create(
     request: Request,
     response: Response,
-    settings: ServiceSettings,
-    engine: ServiceClientEngine,
+    tasks: ServiceTasks,
     jobs: ServiceJobs,
-    client: ServiceClient,
     key: Key = None,
 ) -> Job:
     """Accepts up to 10,000 requests and computes them in the background. All requests are
@@ -109,10 +101,10 @@ async def create(
     if media_type(request.headers) not in (JSON, *UNDECLARED):
         raise UnsupportedMediaType
     async with received(request) as (_, path):
-        task = JobBodyTask(path, deadlines(settings), request.state.id, is_fresh(request))
-        result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+        task = JobBodyTask(path, deadlines(tasks.settings), tasks.request_id, is_fresh(request))
+        result = await tasks.result(task)
     assert isinstance(result, Validated)
-    job_id, again = await jobs.create(result.job, key, client.owner)
+    job_id, again = await jobs.create(result.job, key, tasks.client.owner)
     set_location(request, response, f"/jobs/{job_id}", again)
     return Job(**summary(await jobs.view(job_id)))
 

@@ -13,11 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from joulepath.app.api.logs.models import LogDetail, LogList, LogPage, LogSummary
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.api.logs.task import ReadLogTask
-from joulepath.app.api.shared.dependencies import (
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import WORKER_PROBLEMS
 from joulepath.app.api.shared.query_settings import query_parameters, settings_of
@@ -74,10 +70,7 @@ _SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", 
 async def add(
     request: Request,
     response: Response,
-    settings: ServiceSettings,
     tasks: ServiceTasks,
-    store: ServiceStore,
-    client: ServiceClient,
 ) -> LogDetail:
     """Adds a log of one arm for the identification of its friction, rotors and powers: a CSV file,
     plain or compressed with gzip, or a bag of ROS 2. The columns of a CSV file follow
@@ -87,23 +80,22 @@ async def add(
         raise UnsupportedMediaType
     asked = settings_of(LogSettings, request)
     async with received(request) as (file, path):
-        result = await tasks.result(
-            ReadLogTask(path, asked, settings.max_upload_bytes, tasks.request_id)
-        )
+        task = ReadLogTask(path, asked, tasks.settings.max_upload_bytes, tasks.request_id)
+        result = await tasks.result(task)
         body = await run_in_threadpool(_packed, file)
     log = StoredLog(
         id=new_id(),
         name=asked.name,
         robot=asked.robot,
         created=now(),
-        owner=client.owner,
+        owner=tasks.client.owner,
         settings=asked.model_dump(mode="json"),
         report=orjson.loads(result.document),
         size=len(body),
         body=body,
     )
     detail = _detail(log)
-    await store.write(partial(logs.add, log=log, most=settings.logs_max_bytes))
+    await tasks.store.write(partial(logs.add, log=log, most=tasks.settings.logs_max_bytes))
     set_location(request, response, f"/logs/{detail.id}")
     return detail
 

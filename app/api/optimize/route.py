@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer, OptimizeTask
-from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
-    ServiceCache,
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceCache
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
-from joulepath.app.api.shared.parameters import CACHED_HEADERS, deadline_of
+from joulepath.app.api.shared.parameters import CACHED_HEADERS
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
-from joulepath.app.api.shared.reply import BY_EVENTS, ServiceReply
+from joulepath.app.api.shared.reply import BY_EVENTS, ServiceTasks
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.stored import KeyReused
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.app.store.store_answers import keep_answer
 from joulepath.optimizer.progress import Tell, no_listener
 from joulepath.optimizer.search.errors import PathInfeasible
 
@@ -40,15 +33,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     },
 )
 async def optimize(
-    request: Request,
-    body: OptimizeRequest,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
-    store: ServiceStore,
-    client: ServiceClient,
-    later: ServiceLater,
-    reply: ServiceReply,
-    cache: ServiceCache,
+    body: OptimizeRequest, tasks: ServiceTasks, later: ServiceLater, cache: ServiceCache
 ) -> Response:
     """Finds the motion of least energy from standstill at `start` to standstill at `goal`, over all
     arm configurations. The answer has its energy breakdown, and a certificate that the motion is
@@ -57,18 +42,16 @@ async def optimize(
     text/event-stream` returns events while the search runs, and then the answer."""
     if later.wanted:
         return await later.respond("optimize", body)
-    task = OptimizeTask(body, request.state.id)
+    task = OptimizeTask(body, tasks.request_id)
 
     async def work(tell: Tell) -> TaskResult:
-        deadline = deadline_of(body, settings.max_deadline)
+        deadline = tasks.deadline(body)
         asked = await cache.asked("optimize", body, deadline)
 
         async def compute(left: float) -> TaskResult:
-            result = await engine.run(task, left, tell)
-            return await keep_answer(store, settings, "optimize", result, client.owner, asked)
+            return await tasks.kept("optimize", await tasks.engine.run(task, left, tell), asked)
 
-        return await cache.answer(
-            asked, request.state.id, deadline, compute, tell is not no_listener
-        )
+        is_heard = tell is not no_listener
+        return await cache.answer(asked, tasks.request_id, deadline, compute, is_heard)
 
-    return await reply.of(work)
+    return await tasks.respond(work)

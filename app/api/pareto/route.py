@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.pareto.task import ParetoAnswer, ParetoRequest, ParetoTask
-from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
-from joulepath.app.api.shared.parameters import WantedFormat, deadline_of
+from joulepath.app.api.shared.parameters import WantedFormat
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
-from joulepath.app.api.shared.reply import BY_EVENTS, ServiceReply
-from joulepath.app.engine.result import TaskResult
+from joulepath.app.api.shared.reply import BY_EVENTS, ServiceTasks
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.store.store_answers import store_answers
-from joulepath.optimizer.progress import Tell
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -37,15 +28,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     },
 )
 async def pareto(
-    request: Request,
-    body: ParetoRequest,
-    wanted: WantedFormat,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
-    store: ServiceStore,
-    client: ServiceClient,
-    later: ServiceLater,
-    reply: ServiceReply,
+    body: ParetoRequest, wanted: WantedFormat, tasks: ServiceTasks, later: ServiceLater
 ) -> Response:
     """Finds the Pareto front of duration and energy over all arm configurations, from the fastest
     motion to the motion of least energy. Each point refers to its complete answer.
@@ -53,10 +36,4 @@ async def pareto(
     search runs, and then the answer."""
     if later.wanted:
         return await later.respond("pareto", body)
-    task = ParetoTask(body, request.state.id, wanted)
-
-    async def work(tell: Tell) -> TaskResult:
-        result = await engine.run(task, deadline_of(body, settings.max_deadline), tell)
-        return await store_answers(store, settings, "optimize", result, client.owner)
-
-    return await reply.of(work)
+    return await tasks.search("pareto", ParetoTask(body, tasks.request_id, wanted), body)

@@ -11,7 +11,6 @@ from fastapi import APIRouter, Body, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
-from joulepath.app.access.client import Client
 from joulepath.app.api.robots.files import Name
 from joulepath.app.api.robots.models import (
     Friction,
@@ -22,19 +21,14 @@ from joulepath.app.api.robots.models import (
 )
 from joulepath.app.api.robots.request import NewRobot, OwnArm, OwnName, RobotQuery, RobotTitle
 from joulepath.app.api.robots.task import OwnRobotTask
-from joulepath.app.api.shared.dependencies import (
-    ServiceClient,
-    ServiceClientEngine,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location
 from joulepath.app.api.shared.problem_lists import ADDING_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, StoreUnavailable
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.own_arm import TITLE_EXAMPLES
 from joulepath.app.store import robots
@@ -105,17 +99,14 @@ async def add(
     request: Request,
     response: Response,
     body: NewRobot,
-    settings: ServiceSettings,
-    engine: ServiceClientEngine,
-    store: ServiceStore,
-    client: ServiceClient,
+    tasks: ServiceTasks,
 ) -> RobotDetail:
     """Adds an arm of your own, from its URDF and further parameters. Missing parameters follow from
     documented rules, carry the trust letter E, and are listed in `warnings`."""
     robots.check_own(body.name)
-    robot = await _computed(request, body.name, body, engine, settings.max_deadline, client)
+    robot = await _computed(tasks, body.name, body)
     try:
-        await store.write(partial(robots.add, robot=robot, most=settings.max_robots))
+        await tasks.store.write(partial(robots.add, robot=robot, most=tasks.settings.max_robots))
     except IntegrityError:  # another process has just added a robot of this name
         raise RobotExists from None
     set_location(request, response, f"/robots/{body.name}")
@@ -150,18 +141,14 @@ async def put(
     response: Response,
     name: NewName,
     body: OwnArm,
-    settings: ServiceSettings,
-    engine: ServiceClientEngine,
-    store: ServiceStore,
-    client: ServiceClient,
+    tasks: ServiceTasks,
 ) -> RobotDetail:
     """Adds an arm of your own under this name, or replaces it. Subsequent requests use the new
     arm; stored answers remain unchanged."""
     robots.check_own(name)
-    robot = await _computed(request, name, body, engine, settings.max_deadline, client)
-    is_new = await store.create(
-        partial(robots.put, robot=robot, most=settings.max_robots, client=client)
-    )
+    robot = await _computed(tasks, name, body)
+    most, client = tasks.settings.max_robots, tasks.client
+    is_new = await tasks.store.create(partial(robots.put, robot=robot, most=most, client=client))
     if is_new:
         response.status_code = 201
         set_location(request, response, f"/robots/{name}")
@@ -198,20 +185,11 @@ async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None
     await store.write(partial(robots.delete, name=name, client=client), frees=True)
 
 
-async def _computed(
-    request: Request,
-    name: str,
-    arm: OwnArm,
-    engine: ServiceClientEngine,
-    deadline: float,
-    client: Client,
-) -> OwnRobot:
+async def _computed(tasks: ServiceTasks, name: str, arm: OwnArm) -> OwnRobot:
     """Compute the row of a user's arm in a worker. Raises InvalidProblem."""
-    task = OwnRobotTask(name, arm, request.state.id)
-    content = orjson.loads(
-        (await unless_disconnected(request, engine.run(task, deadline))).document
-    )
-    return OwnRobot(name=name, created=now(), owner=client.owner, **content)
+    result = await tasks.result(OwnRobotTask(name, arm, tasks.request_id))
+    content = orjson.loads(result.document)
+    return OwnRobot(name=name, created=now(), owner=tasks.client.owner, **content)
 
 
 def _of_user(row: OwnRobot) -> RobotDetail:

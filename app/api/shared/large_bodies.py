@@ -11,8 +11,7 @@ from fastapi import Depends, Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel
 
-from joulepath.app.api.shared.dependencies import ServiceClientEngine, ServiceSettings
-from joulepath.app.http.disconnect import unless_disconnected
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.http.json_route import JsonRoute, media_type, strictly
 from joulepath.app.http.weights import JSON
 from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
@@ -61,11 +60,9 @@ def _taking_held(
 ) -> Callable[..., Any]:
     """The endpoint, with its body from a worker."""
 
-    async def body(
-        request: Request, settings: ServiceSettings, engine: ServiceClientEngine
-    ) -> HeldBody:
-        task = ReadBodyTask(model, await strictly(request).parts(), request.state.id)
-        return held(await unless_disconnected(request, engine.run(task, settings.max_deadline)))
+    async def body(request: Request, tasks: ServiceTasks) -> HeldBody:
+        parts = await strictly(request).parts()
+        return held(await tasks.result(ReadBodyTask(model, parts, tasks.request_id)))
 
     @wraps(endpoint)
     async def taking_held(**arguments: Any) -> Any:

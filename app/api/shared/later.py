@@ -10,15 +10,10 @@ from typing import Annotated, Any
 import orjson
 from fastapi import Depends, Header, Request, Response
 
-from joulepath.app.api.shared.dependencies import (
-    ServiceClient,
-    ServiceClientEngine,
-    ServiceJobs,
-    ServiceSettings,
-)
+from joulepath.app.api.shared.dependencies import ServiceJobs, ServiceSettings
 from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, is_fresh, set_location
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.convert.packed import unpacked
-from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import PROBLEM_MEDIA_TYPE
 from joulepath.app.jobs.answers import summary
 from joulepath.app.schemas.common import Request as RequestModel
@@ -60,10 +55,8 @@ class Later:
     wait: int
     """Time for which the response waits for the answer [s]."""
     jobs: ServiceJobs
-    engine: ServiceClientEngine
-    client: ServiceClient
+    tasks: ServiceTasks
     key: str | None
-    request: Request
 
     async def respond(self, kind: str, asked: RequestModel | HeldBody) -> Response:
         """Create a job of one validated request, and respond to the request.
@@ -82,12 +75,13 @@ class Later:
             StoreUnavailable: the store cannot be read or written.
         """
         longest = deadlines(self.jobs.settings)
+        fresh = is_fresh(self.tasks.request)
         if isinstance(asked, HeldBody):
             new = await self.validated(
-                JobOfOneTask(kind, asked, longest, self.request.state.id, is_fresh(self.request))
+                JobOfOneTask(kind, asked, longest, self.tasks.request_id, fresh)
             )
         else:
-            new = job_of_one(kind, asked, longest, is_fresh(self.request))
+            new = job_of_one(kind, asked, longest, fresh)
         return await self.respond_with(new)
 
     async def validated(self, task: JobBodyTask | JobOfOneTask) -> NewJob:
@@ -99,15 +93,13 @@ class Later:
         Raises:
             InvalidRequest: the body is malformed; further errors as of `Engine.run`.
         """
-        result = await unless_disconnected(
-            self.request, self.engine.run(task, self.jobs.settings.max_deadline)
-        )
+        result = await self.tasks.result(task)
         assert isinstance(result, Validated)
         return result.job
 
     async def respond_with(self, new: NewJob) -> Response:
         """Create a job, and respond to its request; errors as of `respond`."""
-        job_id, again = await self.jobs.create(new, self.key, self.client.owner)
+        job_id, again = await self.jobs.create(new, self.key, self.tasks.client.owner)
         view = await self.jobs.ended(job_id, self.wait)
         if self.wait and view.job.ended is not None:
             response = await self._ended(job_id)
@@ -117,7 +109,7 @@ class Later:
             response = Response(content, 202, media_type="application/json")
             applied = "respond-async" + (f", wait={self.wait}" if self.wait else "")
         response.headers["Preference-Applied"] = applied
-        set_location(self.request, response, f"/jobs/{job_id}", again)
+        set_location(self.tasks.request, response, f"/jobs/{job_id}", again)
         return response
 
     async def _ended(self, job_id: str) -> Response:
@@ -132,7 +124,7 @@ class Later:
             return Response(
                 Job(**summary(view)).model_dump_json(), 202, media_type="application/json"
             )
-        content = orjson.dumps(request.problem | {"instance": self.request.state.id})
+        content = orjson.dumps(request.problem | {"instance": self.tasks.request_id})
         return Response(content, request.problem["status"], media_type=PROBLEM_MEDIA_TYPE)
 
 
@@ -146,8 +138,7 @@ def deadlines(settings: ServiceSettings) -> Deadlines:
 async def _later(
     request: Request,
     jobs: ServiceJobs,
-    engine: ServiceClientEngine,
-    client: ServiceClient,
+    tasks: ServiceTasks,
     prefer: Annotated[str | None, _PREFER] = None,
     key: Key = None,
 ) -> Later:
@@ -160,7 +151,7 @@ async def _later(
     ]
     longest = int(jobs.settings.max_deadline)
     wanted = "respond-async" in preferences
-    return Later(wanted, min(*waits, longest) if waits else 0, jobs, engine, client, key, request)
+    return Later(wanted, min(*waits, longest) if waits else 0, jobs, tasks, key)
 
 
 ServiceLater = Annotated[Later, Depends(_later)]

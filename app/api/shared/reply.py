@@ -1,5 +1,5 @@
-"""How a request is answered: at once when its work is done, or by events from the begin of the work
-on.
+"""How the tasks of a request are run, and how it is answered: at once when its work is done, or by
+events from the begin of the work on.
 """
 
 from __future__ import annotations
@@ -9,8 +9,14 @@ from typing import Annotated, Any
 
 from fastapi import Depends, Request, Response
 
-from joulepath.app.api.shared.dependencies import ServiceArmEngine, ServiceSettings
+from joulepath.app.api.shared.dependencies import (
+    ServiceArmEngine,
+    ServiceClient,
+    ServiceSettings,
+    ServiceStore,
+)
 from joulepath.app.api.shared.parameters import WithDeadline, deadline_of
+from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task
 from joulepath.app.http.disconnect import unless_disconnected
@@ -18,7 +24,8 @@ from joulepath.app.http.event_stream import EVENT_STREAM, EventStream, Work
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.weights import is_wanted
 from joulepath.app.schemas.examples.progress import EVENTS
-from joulepath.app.tasks.arm_engine import ArmEngine
+from joulepath.app.store.cache import Asked
+from joulepath.app.store.store_answers import keep_answer, store_answers
 from joulepath.optimizer.progress import no_listener
 
 BY_EVENTS: dict[str, Any] = {EVENT_STREAM: {"schema": {"type": "string"}, "example": EVENTS}}
@@ -26,36 +33,14 @@ BY_EVENTS: dict[str, Any] = {EVENT_STREAM: {"schema": {"type": "string"}, "examp
 
 
 @dataclass(frozen=True)
-class Reply:
-    """The answer that the client of a request wants."""
-
-    request: Request
-    by_events: bool
-
-    async def of(self, work: Work) -> Response:
-        """The response with what `work` returns. If the client closes the connection, the work is
-        cancelled.
-        """
-        if self.by_events:
-            return EventStream(self.request, work)
-        return result_response(await unless_disconnected(self.request, work(no_listener)))
-
-
-async def _reply(request: Request) -> Reply:
-    return Reply(request, is_wanted(request, EVENT_STREAM))
-
-
-ServiceReply = Annotated[Reply, Depends(_reply)]
-
-
-@dataclass(frozen=True)
 class Tasks:
     """Runs the tasks of a request, until its client closes the connection."""
 
     request: Request
-    engine: ArmEngine
-    longest: float
-    """Longest time of a task [s]."""
+    engine: ServiceArmEngine
+    store: ServiceStore
+    settings: ServiceSettings
+    client: ServiceClient
 
     @property
     def request_id(self) -> str:
@@ -63,22 +48,80 @@ class Tasks:
         request_id: str = self.request.state.id
         return request_id
 
+    def deadline(self, body: WithDeadline | None = None) -> float:
+        """The time for a request with this body [s]; None: the longest time.
+
+        Raises InvalidRequest for a later deadline.
+        """
+        longest = self.settings.max_deadline
+        return longest if body is None else deadline_of(body, longest)
+
     async def result(self, task: Task, body: WithDeadline | None = None) -> TaskResult:
         """The result of a task, by the deadline of the request's body; None: in the longest time.
 
         Raises InvalidRequest for a later deadline, ClientDisconnected, and what `ArmEngine.run`
         raises.
         """
-        deadline = self.longest if body is None else deadline_of(body, self.longest)
-        return await unless_disconnected(self.request, self.engine.run(task, deadline))
+        return await unless_disconnected(self.request, self.engine.run(task, self.deadline(body)))
 
     async def answer(self, task: Task, body: WithDeadline | None = None) -> Response:
         """The response with the result of a task, as `result`."""
         return result_response(await self.result(task, body))
 
+    async def kept(
+        self,
+        kind: str,
+        result: TaskResult,
+        asked: Asked | None = None,
+        cell: str | None = None,
+        parts: str = "optimize",
+    ) -> TaskResult:
+        """Store the answers to which a result refers, and the result itself if it is to be kept.
 
-async def _tasks(request: Request, engine: ServiceArmEngine, settings: ServiceSettings) -> Tasks:
-    return Tasks(request, engine, settings.max_deadline)
+        Args:
+            kind: endpoint of the result.
+            result: the result.
+            asked: what equal requests are known by; None: none is answered by this result.
+            cell: cell whose motions are kept.
+            parts: endpoint of the answers to which it refers.
+
+        Returns:
+            The result to send.
+
+        Raises:
+            StoreUnavailable: the answers to which the result refers cannot be stored.
+        """
+        store, settings, owner = self.store, self.settings, self.client.owner
+        result = await store_answers(store, settings, parts, result, owner, cell)
+        if result.kept_as is None:
+            return result
+        return await keep_answer(store, settings, kind, result, owner, asked)
+
+    async def search(self, kind: str, task: Task, body: WithDeadline) -> Response:
+        """The response with the result of a search, which is stored as `kept` has it."""
+
+        async def work(tell: Listener) -> TaskResult:
+            return await self.kept(kind, await self.engine.run(task, self.deadline(body), tell))
+
+        return await self.respond(work)
+
+    async def respond(self, work: Work) -> Response:
+        """The response with what `work` returns, by events if the client wants them. If the client
+        closes the connection, the work is cancelled.
+        """
+        if is_wanted(self.request, EVENT_STREAM):
+            return EventStream(self.request, work)
+        return result_response(await unless_disconnected(self.request, work(no_listener)))
+
+
+async def _tasks(
+    request: Request,
+    engine: ServiceArmEngine,
+    store: ServiceStore,
+    settings: ServiceSettings,
+    client: ServiceClient,
+) -> Tasks:
+    return Tasks(request, engine, store, settings, client)
 
 
 ServiceTasks = Annotated[Tasks, Depends(_tasks)]

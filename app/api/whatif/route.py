@@ -5,11 +5,6 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from joulepath.app.answers.declared import model_of
-from joulepath.app.api.shared.dependencies import (
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.later import ACCEPTED, ServiceLater
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
@@ -19,7 +14,6 @@ from joulepath.app.api.whatif.task import WhatifRequest, WhatifTask
 from joulepath.app.exceptions.stored import KeyReused, StoreUnavailable, UnknownLog
 from joulepath.app.http.handlers import result_response
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.store.store_answers import store_answers
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.search.errors import PathInfeasible
 
@@ -42,14 +36,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
         ),
     },
 )
-async def whatif(
-    body: WhatifRequest,
-    settings: ServiceSettings,
-    tasks: ServiceTasks,
-    store: ServiceStore,
-    client: ServiceClient,
-    later: ServiceLater,
-) -> Response:
+async def whatif(body: WhatifRequest, tasks: ServiceTasks, later: ServiceLater) -> Response:
     """Compares one motion on the arm as it is with the same task on changed arms: lighter links,
     another payload, other drives or limits. Each change has two results, as differences from the
     base: the base's motion on the changed arm, and the best motion of the changed arm. A given
@@ -57,5 +44,5 @@ async def whatif(
     if later.wanted:
         return await later.respond("whatif", body)
     result = await tasks.result(WhatifTask(body, tasks.request_id), body)
-    kind = "evaluate" if body.optimize is None else "optimize"
-    return result_response(await store_answers(store, settings, kind, result, client.owner))
+    parts = "evaluate" if body.optimize is None else "optimize"
+    return result_response(await tasks.kept("whatif", result, parts=parts))

@@ -12,22 +12,11 @@ from fastapi import APIRouter, Path, Request, Response
 from joulepath.app.access.rules import check_owner
 from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.optimize.task import OptimizeTask
-from joulepath.app.api.shared.dependencies import (
-    ServiceArmEngine,
-    ServiceCache,
-    ServiceClient,
-    ServiceSettings,
-    ServiceStore,
-)
+from joulepath.app.api.shared.dependencies import ServiceCache, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
-from joulepath.app.api.shared.parameters import (
-    CREATED_HEADERS,
-    Key,
-    StudyId,
-    deadline_of,
-    set_location,
-)
+from joulepath.app.api.shared.parameters import CREATED_HEADERS, Key, StudyId, set_location
 from joulepath.app.api.shared.problem_lists import MOTION_PROBLEMS
+from joulepath.app.api.shared.reply import ServiceTasks
 from joulepath.app.api.shared.uploads import upload
 from joulepath.app.api.studies.iterations.task import (
     StudyStep,
@@ -48,7 +37,6 @@ from joulepath.app.store.tables import Study
 from joulepath.app.studies.answers import detail
 from joulepath.app.tasks.answer_cache import AnswerCache
 from joulepath.app.tasks.answer_figures import figures_of
-from joulepath.app.tasks.arm_engine import ArmEngine
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.search.errors import PathInfeasible
@@ -84,29 +72,22 @@ async def add(
     response: Response,
     id: StudyId,
     body: IterationBody,
-    settings: ServiceSettings,
-    engine: ServiceArmEngine,
-    store: ServiceStore,
-    client: ServiceClient,
+    tasks: ServiceTasks,
     cache: ServiceCache,
     key: Key = None,
 ) -> Any:
     """Computes the next iteration and stores the request and the complete answer. Returns its
     energy and the changes from the previous and the best iteration. A failed request returns its
     problem, and the study does not record it."""
+    store, client = tasks.store, tasks.client
     study = (await store.read(partial(studies.state, study_id=id))).study
     check_owner(client, study.owner)
-    step = await unless_disconnected(
-        request, _step(body, study, request.state.id, engine, settings)
-    )
+    step = await _step(body, study, tasks)
     known = await store.read(
         partial(studies.known_step, study_id=id, kind=step.kind, request=step.sent, key=key)
     )
     if known is None:
-        work = _located(
-            step.kind, _made(step, request.state.id, engine, settings.max_deadline, cache)
-        )
-        made = await unless_disconnected(request, work)
+        made = await unless_disconnected(request, _located(step.kind, _made(step, tasks, cache)))
         number, again = await store.write(
             partial(studies.add, study_id=id, step=made, key=key, client=client)
         )
@@ -116,13 +97,7 @@ async def add(
     return detail(await store.read(partial(studies.entry, study_id=id, number=number)))
 
 
-async def _step(
-    body: IterationBody | HeldBody,
-    study: Study,
-    request_id: str,
-    engine: ArmEngine,
-    settings: ServiceSettings,
-) -> StudyStep:
+async def _step(body: IterationBody | HeldBody, study: Study, tasks: ServiceTasks) -> StudyStep:
     """Complete the request by the robot, figures and objective of the study.
 
     Raises:
@@ -130,8 +105,8 @@ async def _step(
     """
     if not isinstance(body, HeldBody):
         return study_step(body, study.robot, study.figures, study.objective)
-    task = StudyStepTask(body, study.robot, study.figures, study.objective, request_id)
-    return large_step(await engine.run(task, settings.max_deadline))
+    task = StudyStepTask(body, study.robot, study.figures, study.objective, tasks.request_id)
+    return large_step(await tasks.result(task))
 
 
 async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
@@ -153,23 +128,21 @@ async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
         raise InvalidProblem(f"{kind}.{error.field}", str(error)) from None
 
 
-async def _made(
-    step: StudyStep, request_id: str, engine: ArmEngine, max_deadline: float, cache: AnswerCache
-) -> studies.Step:
+async def _made(step: StudyStep, tasks: ServiceTasks, cache: AnswerCache) -> studies.Step:
     """Compute the iteration by its endpoint, or copy the stored answer of an equal request."""
+    request_id = tasks.request_id
     if step.optimize is None:
         with upload() as (file, path):
             file.write(step.evaluate)
-            task = EvaluateTask(path, "json", {}, "json", request_id, max_deadline)
-            return _iteration(step, await engine.run(task, max_deadline))
-    deadline = deadline_of(step.optimize, max_deadline)
+            task = EvaluateTask(path, "json", {}, "json", request_id, tasks.deadline())
+            return _iteration(step, await tasks.engine.run(task, tasks.deadline()))
+    deadline = tasks.deadline(step.optimize)
     asked = await cache.asked("optimize", step.optimize, deadline)
     copy = await cache.copy(asked, request_id)
     if copy is not None:
         return _iteration(step, copy)
-    return _iteration(
-        step, await engine.run(OptimizeTask(step.optimize, request_id), deadline), asked
-    )
+    made = await tasks.engine.run(OptimizeTask(step.optimize, request_id), deadline)
+    return _iteration(step, made, asked)
 
 
 @router.get(
