@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
+
+from joulepath.optimizer.context_value import assigned
 
 Clock = Callable[[], float]
 
@@ -97,18 +99,13 @@ _stop_condition: ContextVar[Callable[[], bool] | None] = ContextVar(
 )
 
 
-@contextmanager
-def stoppable(is_stopped: Callable[[], bool]) -> Iterator[None]:
+def stoppable(is_stopped: Callable[[], bool]) -> AbstractContextManager[None]:
     """Context in which a computation can be stopped.
 
     Once `is_stopped` returns True, every deadline has passed and `checkpoint` raises Stopped. The
     function is called often, must be fast, and must never return to False.
     """
-    before = _stop_condition.set(is_stopped)
-    try:
-        yield
-    finally:
-        _stop_condition.reset(before)
+    return assigned(_stop_condition, is_stopped)
 
 
 def is_stopped() -> bool:
@@ -134,17 +131,12 @@ class DeadlinePassed(Exception):
 _watched: ContextVar[Deadline | None] = ContextVar("watched deadline", default=None)
 
 
-@contextmanager
-def watch(deadline: Deadline) -> Iterator[None]:
+def watch(deadline: Deadline) -> AbstractContextManager[None]:
     """Context in which `checkpoint` raises DeadlinePassed after `deadline`.
 
     Of nested contexts the innermost one counts. Every thread watches its own deadline.
     """
-    before = _watched.set(deadline)
-    try:
-        yield
-    finally:
-        _watched.reset(before)
+    return assigned(_watched, deadline)
 
 
 def checkpoint(needed: float = 0.0) -> None:

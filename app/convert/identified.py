@@ -7,11 +7,11 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
-from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.stored import UnknownFigures
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.robot import Robot
 from joulepath.models.uncertainty.document import merged
+from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.exceptions import InvalidProblem
 
 
@@ -29,7 +29,7 @@ _FIGURES: ContextVar[Identified | None] = ContextVar("identified figures", defau
 
 def identified_as(figures: Identified) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name these figures."""
-    return at_hand(_FIGURES, figures)
+    return assigned(_FIGURES, figures)
 
 
 def with_figures(robot: Robot, id: str) -> Robot:

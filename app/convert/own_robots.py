@@ -6,10 +6,10 @@ from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
-from joulepath.app.convert.at_hand import at_hand
 from joulepath.models.own_arm.robots import own_robot
 from joulepath.models.robot import Robot
 from joulepath.models.shape_sizes import WrongSize
+from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.exceptions import InvalidProblem
 
 _ROBOT: ContextVar[tuple[str, dict[str, Any]] | None] = ContextVar("own robot", default=None)
@@ -17,7 +17,7 @@ _ROBOT: ContextVar[tuple[str, dict[str, Any]] | None] = ContextVar("own robot", 
 
 def own_robot_named(name: str, figures: dict[str, Any]) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name this robot."""
-    return at_hand(_ROBOT, (name, figures))
+    return assigned(_ROBOT, (name, figures))
 
 
 def own_figures_of(name: str) -> dict[str, Any] | None:

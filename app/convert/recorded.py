@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.convert.arm import inertia_row, robot_named, to_payload
-from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.stored import UnknownLog
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
+from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
@@ -67,7 +67,7 @@ _LOG: ContextVar[GivenLog | None] = ContextVar("stored log", default=None)
 
 def log_given(log: GivenLog) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name this log."""
-    return at_hand(_LOG, log)
+    return assigned(_LOG, log)
 
 
 def stored_log(id: str) -> GivenLog:

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.convert.pose import to_matrix
 from joulepath.app.convert.scene import to_capsules
 from joulepath.app.schemas import scene as asked
 from joulepath.app.schemas.common import Pose
 from joulepath.models.robot import Array
+from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.scene import Attachment
 from joulepath.optimizer.problem.tool import load_tool
@@ -55,4 +55,4 @@ def with_tool(tool: str | asked.Tool, part: Payload) -> Payload:
 
 def tool_of_mass(share: float) -> AbstractContextManager[None]:
     """Within the context, and its thread, tools with a name have this share of their mass."""
-    return at_hand(_SHARE, share)
+    return assigned(_SHARE, share)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
+from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.progress import no_listener
 
 Listener = Callable[[Any], None]
@@ -14,14 +15,9 @@ Listener = Callable[[Any], None]
 _tell: ContextVar[Listener] = ContextVar("tell", default=no_listener)
 
 
-@contextmanager
-def listening(tell: Listener) -> Iterator[None]:
+def listening(tell: Listener) -> AbstractContextManager[None]:
     """A context in which `tell` receives the events of tasks."""
-    before = _tell.set(tell)
-    try:
-        yield
-    finally:
-        _tell.reset(before)
+    return assigned(_tell, tell)
 
 
 def listener() -> Listener:

@@ -16,7 +16,7 @@ from joulepath.app.access.rules import check_owner
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import AnswerInUse, UnknownAnswer
-from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.paging import having, page_of
 from joulepath.app.store.tables import Answer, Iteration, Job, JobRequest, by_id, now
 
 _WITHOUT_DOCUMENTS = [
@@ -120,8 +120,7 @@ def page(
     """Up to `limit` answers without their documents, newest first, and the `after` of the next
     page; None on the last page."""
     query = wanted.of(select(Answer)).options(*_WITHOUT_DOCUMENTS)
-    found = session.scalars(newest_first(query, Answer, limit, after)).all()
-    return list(found[:limit]), following(found, limit)
+    return page_of(session, query, Answer, limit, after)
 
 
 def rename(

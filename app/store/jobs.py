@@ -24,7 +24,7 @@ from joulepath.app.store.job_events import (
     request_ended,
     set_state,
 )
-from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.paging import following, having, newest_first, page_of
 from joulepath.app.store.tables import Answer, Job, JobRequest, by_id, new_id, now
 
 _AT_A_TIME = 50
@@ -136,9 +136,9 @@ def page(
     session: Session, limit: int, after: str | None, wanted: Wanted
 ) -> tuple[list[JobView], str | None]:
     """Up to `limit` jobs, newest first, and the `after` of the next page; None on the last page."""
-    jobs = session.scalars(newest_first(wanted.of(select(Job)), Job, limit, after)).all()
-    counts = counts_of(session, [job.id for job in jobs[:limit]])
-    return [JobView(job, counts[job.id]) for job in jobs[:limit]], following(jobs, limit)
+    jobs, following = page_of(session, wanted.of(select(Job)), Job, limit, after)
+    counts = counts_of(session, [job.id for job in jobs])
+    return [JobView(job, counts[job.id]) for job in jobs], following
 
 
 def page_of_kind(

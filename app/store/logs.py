@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, defer
 from joulepath.app.access.client import Client
 from joulepath.app.access.rules import check_owner
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
-from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.paging import having, page_of
 from joulepath.app.store.tables import StoredLog, by_id
 
 _LIGHT = defer(StoredLog.body, raiseload=True)
@@ -43,8 +43,7 @@ def page(
     query = select(StoredLog).options(_LIGHT)
     if search is not None:
         query = query.where(having(search, StoredLog.name, StoredLog.robot))
-    found = session.scalars(newest_first(query, StoredLog, limit, after)).all()
-    return list(found[:limit]), following(found, limit)
+    return page_of(session, query, StoredLog, limit, after)
 
 
 def rename(session: Session, log_id: str, name: str | None, client: Client) -> StoredLog:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any, Protocol, TypeVarTuple
+from typing import Any, Protocol, TypeVar, TypeVarTuple
 
 from sqlalchemy import ColumnElement, Select, and_, or_
-from sqlalchemy.orm import InstrumentedAttribute
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from joulepath.app.store.tables import Answer, Job, StoredLog, Study
 
+R = TypeVar("R", Answer, Job, StoredLog, Study)
 Ts = TypeVarTuple("Ts")
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -39,6 +40,16 @@ def newest_first(
         older = and_(table.created == created, table.id < row_id)
         query = query.where(or_(table.created < created, older))
     return query.order_by(table.created.desc(), table.id.desc()).limit(limit + 1)
+
+
+def page_of(
+    session: Session, query: Select[R], table: type[R], limit: int, after: str | None
+) -> tuple[list[R], str | None]:
+    """Up to `limit` rows of a query, newest first, and the `after` of the next page; None on the
+    last page.
+    """
+    rows = session.scalars(newest_first(query, table, limit, after)).all()
+    return list(rows[:limit]), following(rows, limit)
 
 
 def following(rows: Sequence[Listed], limit: int) -> str | None:

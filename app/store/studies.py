@@ -15,7 +15,7 @@ from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import KeyReused, UnknownIteration, UnknownStudy
 from joulepath.app.store import answers, cache
 from joulepath.app.store.cache import Answered
-from joulepath.app.store.paging import following, having, newest_first
+from joulepath.app.store.paging import having, page_of
 from joulepath.app.store.tables import Iteration, Study, by_id, new_id, now
 
 _LIGHT = defer(Iteration.request, raiseload=True)
@@ -113,22 +113,20 @@ def page(
     query = select(Study)
     if search is not None:
         query = query.where(having(search, Study.name, Study.robot))
-    studies = session.scalars(newest_first(query, Study, limit, after)).all()
-    return [_state(session, study) for study in studies[:limit]], following(studies, limit)
+    studies, following = page_of(session, query, Study, limit, after)
+    return [_state(session, study) for study in studies], following
 
 
 def rename(session: Session, study_id: str, name: str, client: Client) -> State:
     """Gives a study another name. Raises UnknownStudy or NotOwner."""
-    study = _study(session, study_id)
-    check_owner(client, study.owner)
+    study = _of_client(session, study_id, client)
     study.name = name
     return _state(session, study)
 
 
 def delete(session: Session, study_id: str, client: Client) -> None:
     """Deletes a study, its iterations and their answers. Raises UnknownStudy or NotOwner."""
-    study = _study(session, study_id)
-    check_owner(client, study.owner)
+    study = _of_client(session, study_id, client)
     session.execute(delete_from(Study).where(Study.id == study.id))
 
 
@@ -159,7 +157,7 @@ def add(
 
     Raises UnknownStudy, NotOwner or KeyReused.
     """
-    check_owner(client, _study(session, study_id).owner)
+    _of_client(session, study_id, client)
     # Lock the study in PostgreSQL, so that numbers have no gaps; SQLite has only one writer.
     study = session.scalar(select(Study).where(Study.id == study_id).with_for_update())
     if study is None:
@@ -236,6 +234,12 @@ def new_study(
 
 def _study(session: Session, study_id: str) -> Study:
     return by_id(session, Study, study_id, UnknownStudy)
+
+
+def _of_client(session: Session, study_id: str, client: Client) -> Study:
+    study = _study(session, study_id)
+    check_owner(client, study.owner)
+    return study
 
 
 def _state(session: Session, study: Study) -> State:

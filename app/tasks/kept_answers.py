@@ -9,9 +9,9 @@ from typing import Any
 
 import orjson
 
-from joulepath.app.convert.at_hand import at_hand
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import PartsNeeded
+from joulepath.optimizer.context_value import assigned
 
 _KEPT: ContextVar[Mapping[str, bytes] | None] = ContextVar("kept answers", default=None)
 
@@ -20,7 +20,7 @@ def answers_given(kept: Mapping[str, bytes]) -> AbstractContextManager[None]:
     """Within the context, and its thread, requests may name these answers (JSON), by their ids or
     paths.
     """
-    return at_hand(_KEPT, kept)
+    return assigned(_KEPT, kept)
 
 
 def kept_answers(names: list[str]) -> list[Any]:

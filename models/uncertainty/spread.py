@@ -129,7 +129,7 @@ class _Sources:
         return Spread(
             mean,
             draws * certain - mean,
-            _root(np.sum(list(covariances.values()), axis=0)),
+            root_of(np.sum(list(covariances.values()), axis=0)),
             covariances,
             moves,
             move_sd,
@@ -221,7 +221,7 @@ class _Sources:
         at = [index(name, joint, nq) for name, joint in known.places(self.law)]
         covariance = np.zeros((self._size, self._size))
         covariance[np.ix_(at, at)] = known.matrix[np.ix_(chosen, chosen)]
-        root = _root(covariance)
+        root = root_of(covariance)
         normal = np.empty((DRAWS, root.shape[1]))
         for column in normal.T:
             column[:] = self._normal()
@@ -239,11 +239,15 @@ class _Sources:
         return result
 
 
-def _root(covariance: Array) -> Array:
-    """A matrix R (p, r) with R Rᵀ equal to the covariance (p, p), up to rounding."""
+def root_of(covariance: Array, least: float = SETTINGS.rounding) -> Array:
+    """A matrix R (p, r) with R Rᵀ equal to the covariance (p, p) of p figures.
+
+    Common errors are left out whose variance, with figures of unit deviation, is at most `least` of
+    the largest one.
+    """
     # Figures have different units: scale them by their standard deviations.
     sd = np.sqrt(np.diag(covariance))
     scale = np.where(sd > 0, sd, 1.0)
     size, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    kept = size > SETTINGS.rounding * size[-1]
+    kept = size > least * size[-1]
     return np.asarray(scale[:, None] * vectors[:, kept] * np.sqrt(size[kept]))

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.deadline import checkpoint
+from joulepath.optimizer.problem.scene import rotation_to
 
 
 @dataclass(frozen=True)
@@ -149,10 +150,7 @@ def coal_shape(core: Core) -> tuple[coal.CollisionGeometry, float, coal.Transfor
         local[:3, 3] = points.mean(axis=0)
         if length == 0:
             return coal.Sphere(COAL.skin), COAL.skin, _transform(local)
-        z = along / length
-        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-        x /= np.linalg.norm(x)
-        local[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+        local[:3, :3] = rotation_to(along / length)
         return coal.Capsule(COAL.skin, length), COAL.skin, _transform(local)
     vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for vertex in points:

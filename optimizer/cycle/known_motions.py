@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AnySet
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.robot import MOST_ROBOTS, Robot
+from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
@@ -99,14 +100,9 @@ class KnownMotions:
 _in_use: ContextVar[KnownMotions | None] = ContextVar("known motions", default=None)
 
 
-@contextmanager
-def knowing(motions: KnownMotions) -> Iterator[None]:
+def knowing(motions: KnownMotions) -> AbstractContextManager[None]:
     """Context in which cycles recall and store motions."""
-    before = _in_use.set(motions)
-    try:
-        yield
-    finally:
-        _in_use.reset(before)
+    return assigned(_in_use, motions)
 
 
 def known_motions() -> KnownMotions:

@@ -91,15 +91,13 @@ def _bound_of_free_poses(leg: Leg, enough: float, deadline: Deadline) -> float:
     prepared = leg.prepared.beside(problem)
     if start.free_pose is not None and goal.free_pose is not None:
         return bound_between_free_ends(prepared, start.free_pose, goal.free_pose, deadline, enough)
-    if goal.free_pose is not None:
-        q = np.array([end.q for end in start.ends])
-        limits = SearchLimits(deadline=deadline, enough=enough)
-        return family_bound(prepared, goal.free_pose, q, limits)
-    assert start.free_pose is not None
-    back = PreparedProblem.of(reversed_problem(problem, problem.goal, problem.start))
-    q = np.array([end.q for end in goal.ends])
-    limits = SearchLimits(deadline=deadline, enough=enough)
-    return family_bound(back, start.free_pose, q, limits)
+    free, fixed = goal, start
+    if goal.free_pose is None:
+        free, fixed = start, goal
+        prepared = PreparedProblem.of(reversed_problem(problem, problem.goal, problem.start))
+    assert free.free_pose is not None
+    q = np.array([end.q for end in fixed.ends])
+    return family_bound(prepared, free.free_pose, q, SearchLimits(deadline=deadline, enough=enough))
 
 
 def _bound_of_self_motions(leg: Leg, deadline: Deadline) -> float:

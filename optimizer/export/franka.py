@@ -9,11 +9,9 @@ The header holds a motion generator: a callable from `franka::RobotState` and `f
 from __future__ import annotations
 
 from dataclasses import dataclass
-from io import StringIO
 from typing import Literal
 
-import numpy as np
-
+from joulepath.optimizer.export.csv_table import csv_text
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.facts import WrittenFile, check_joints, header
 from joulepath.optimizer.export.program import Program
@@ -75,14 +73,8 @@ def to_franka(program: Program, options: FrankaOptions | None = None) -> Written
         "limits of the FR3 that depend on the joint positions are not checked",
     )
     if options.form == "csv":
-        names = [
-            "t",
-            *(f"{kind}{joint}" for kind in "qv" for joint in range(1, program.robot.nq + 1)),
-        ]
-        text = StringIO()
-        text.write(",".join(names) + "\n")
-        np.savetxt(text, np.column_stack([t, q, v]), fmt=["%.3f"] + ["%.12f"] * 14, delimiter=",")
-        return WrittenFile.of_text(text.getvalue(), "text/csv", "csv", notes)
+        text = csv_text(t, {"q": q, "v": v}, ["%.3f"] + ["%.12f"] * 14)
+        return WrittenFile.of_text(text, "text/csv", "csv", notes)
     rows = "\n".join("    {{" + ", ".join(f"{x:.12f}" for x in row) + "}}," for row in q)
     head = "\n".join(
         f"// {line}" for line in header(program, "motion generator for libfranka", notes)

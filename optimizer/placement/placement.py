@@ -10,7 +10,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.placement.region import Group, Moved, Region
-from joulepath.optimizer.problem.arrays import placement
+from joulepath.optimizer.problem.arrays import check_seconds, placement
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
@@ -100,8 +100,7 @@ class Placement:
         least, most = PLACEMENT_RANGES.finest, PLACEMENT_RANGES.coarsest
         if self.resolution is not None and not least <= self.resolution <= most:
             raise InvalidProblem("resolution", f"resolution must be from {least:g} to {most:g} m.")
-        if not (np.isfinite(self.deadline) and self.deadline > 0):
-            raise InvalidProblem("deadline", "deadline must be a positive number of seconds.")
+        check_seconds(self, "deadline")
         self._check_cycles()
         self._check_moved()
         for k, each in enumerate(self.moved):

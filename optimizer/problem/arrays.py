@@ -115,3 +115,10 @@ def placement(values: object, field: str) -> Array:
     if np.abs(T[:3, 3]).max() > SIZES.largest:
         raise InvalidProblem(field, f"{field} must lie within {SIZES.largest:g} m of the origin.")
     return T
+
+
+def check_seconds(asked: object, *names: str) -> None:
+    """Check attributes that are times [s]. Raises InvalidProblem unless they are positive."""
+    for name in names:
+        if not (np.isfinite(getattr(asked, name)) and getattr(asked, name) > 0):
+            raise InvalidProblem(name, f"{name} must be a positive number of seconds.")

@@ -12,6 +12,7 @@ import numpy as np
 
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arrays import check_seconds
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.dwell import Dwell, Hold
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
@@ -133,9 +134,7 @@ class Cycle:
                 f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass
             )
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
-        for name in ("sample_period", "deadline"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
+        check_seconds(self, "sample_period", "deadline")
         if self.order is not None:
             check_order(self.order, self.stops, self.arm.payload)
         self._check_passes()

@@ -11,6 +11,7 @@ import numpy as np
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arrays import check_seconds
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
@@ -131,9 +132,7 @@ class Problem:
                 "The mechanical objective has no best duration of its own: give a duration or a "
                 "duration.max.",
             )
-        for name in ("sample_period", "deadline"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
+        check_seconds(self, "sample_period", "deadline")
 
     @property
     def has_fixed_duration(self) -> bool:

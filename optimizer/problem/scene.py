@@ -227,9 +227,12 @@ def capsule_between(
     T[:3, 3] = ends.mean(axis=0)
     if length < SIZES.smallest:
         return Attachment(Sphere(radius + length / 2), T, touches)
-    z = along / length
-    # any x axis orthogonal to z
+    T[:3, :3] = rotation_to(along / length)
+    return Attachment(Capsule(radius, length), T, touches)
+
+
+def rotation_to(z: Array) -> Array:
+    """A rotation (3, 3) whose z axis is a given unit vector (3,), about which it is free."""
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
-    T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    return Attachment(Capsule(radius, length), T, touches)
+    return np.column_stack([x, np.cross(z, x), z])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
+from joulepath.models.uncertainty.spread import root_of
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm, with_torques
 from joulepath.optimizer.identify.arm.logged_torque import logged_torque
@@ -144,7 +145,7 @@ def _with_torque(
             return changed
         return replace(changed, link_change=matrix @ (values[of_links] - before))
 
-    errors = _independent_errors(found.prior_covariance)
+    errors = root_of(found.prior_covariance, FIT.min_error_share).T
     without = tuple(arm(values) for values in found.replicates)
     result = replace(
         fitted,
@@ -178,7 +179,7 @@ def _with_wrench(
         return replace(fitted.arm, link_change=values - own)
 
     without = tuple(arm(values) for values in found.replicates)
-    errors = _independent_errors(found.prior_covariance)
+    errors = root_of(found.prior_covariance, FIT.min_error_share).T
     return replace(
         fitted,
         arm=arm(found.value),
@@ -187,16 +188,6 @@ def _with_wrench(
         row_error_arms=without,
         prior_error_arms=tuple(arm(found.value + error) for error in errors),
     )
-
-
-def _independent_errors(covariance: Array) -> Array:
-    """Independent errors (k, p) of parameters (p,), whose squares add up to their covariance up to
-    rounding errors."""
-    sd = np.sqrt(np.diag(covariance))
-    scale = np.where(sd > 0, sd, 1.0)
-    sizes, directions = np.linalg.eigh(covariance / np.outer(scale, scale))
-    kept = sizes > FIT.min_error_share * sizes[-1]
-    return np.asarray(np.sqrt(sizes[kept])[:, None] * directions[:, kept].T * sd)
 
 
 def _with_power(

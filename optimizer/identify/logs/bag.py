@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from io import RawIOBase
 from itertools import chain, islice
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -18,6 +17,7 @@ import numpy as np
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidTable
 from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
+from joulepath.optimizer.identify.logs.piece_reader import PieceReader
 
 _MAGIC = {b"SQLite format 3\x00": ".db3", b"\x89MCAP0\r\n": ".mcap"}
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -43,44 +43,20 @@ def kind_of_bag(head: bytes) -> str | None:
     return next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
 
 
-class BagText(RawIOBase):
+def bag_text(file: BinaryIO, kind: str, max_bytes: int) -> PieceReader:
     """The JointState messages of a bag as a CSV file with names of joints.
 
     Args:
         file: the bag, unpacked.
         kind: suffix of the files of its kind.
         max_bytes: largest size of the bag [bytes].
+
+    Returns:
+        The CSV file. Its reading raises InvalidTable if the bag is broken or has no JointState
+        messages, and LogTooLarge if it is too large.
     """
-
-    def __init__(self, file: BinaryIO, kind: str, max_bytes: int) -> None:
-        self._lines = _lines(file, kind, max_bytes)
-        self._rest = b""
-
-    def readable(self) -> bool:
-        """Always true."""
-        return True
-
-    def readinto(self, buffer: Any, /) -> int:
-        """Read into a buffer.
-
-        Raises:
-            InvalidTable: the bag is broken, or has no JointState messages.
-            LogTooLarge: the bag is too large.
-        """
-        view = memoryview(buffer)
-        while not self._rest:
-            line = next(self._lines, None)
-            if line is None:
-                return 0
-            self._rest = line
-        count = min(len(view), len(self._rest))
-        view[:count], self._rest = self._rest[:count], self._rest[count:]
-        return count
-
-    def close(self) -> None:
-        """Close the bag."""
-        self._lines.close()
-        super().close()
+    lines = _lines(file, kind, max_bytes)
+    return PieceReader(lambda size: next(lines, b""), lines.close)
 
 
 def _lines(file: BinaryIO, kind: str, max_bytes: int) -> Generator[bytes]:

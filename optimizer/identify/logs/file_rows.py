@@ -5,10 +5,9 @@ from __future__ import annotations
 import gzip
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from io import BufferedIOBase, BufferedReader, BytesIO, RawIOBase
+from io import BufferedIOBase, BufferedReader, BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO
 from zlib import error as ZlibError
 
 import numpy as np
@@ -18,9 +17,10 @@ from joulepath.optimizer.csv_table import line_of, names_of, numbers_of, with_po
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.bag import BagText, kind_of_bag
+from joulepath.optimizer.identify.logs.bag import bag_text, kind_of_bag
 from joulepath.optimizer.identify.logs.head import HEAD, Head, is_comment
 from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
+from joulepath.optimizer.identify.logs.piece_reader import PieceReader
 
 _GZIP_MAGIC = b"\x1f\x8b"
 
@@ -41,49 +41,6 @@ class FileSettings:
 FILE = FileSettings()
 
 
-class _DeadlineFile(RawIOBase):
-    """A file that checks the deadline at every read: gzip files may have millions of empty
-    members."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-
-    def readable(self) -> bool:
-        """Always true."""
-        return True
-
-    def readinto(self, buffer: Any, /) -> int:
-        """Read into a buffer; raises DeadlinePassed."""
-        checkpoint()
-        view = memoryview(buffer)
-        data = self._file.read(len(view))
-        view[: len(data)] = data
-        return len(data)
-
-    def close(self) -> None:
-        """Close this and the underlying file."""
-        self._file.close()
-        super().close()
-
-
-class _CarriageReturns(RawIOBase):
-    """A file whose lines end with carriage returns alone, as with line feeds."""
-
-    def __init__(self, file: BufferedReader) -> None:
-        self._file = file
-
-    def readable(self) -> bool:
-        """Always true."""
-        return True
-
-    def readinto(self, buffer: Any, /) -> int:
-        """Read into a buffer."""
-        view = memoryview(buffer)
-        data = self._file.read1(len(view)).replace(b"\r", b"\n")
-        view[: len(data)] = data
-        return len(data)
-
-
 class LogSource:
     """Lines of a log, unpacked if the file is gzip; those of a bag of ROS 2 are made of its
     messages.
@@ -94,11 +51,13 @@ class LogSource:
     """
 
     def __init__(self, source: Path | bytes, max_bytes: int = FILE.max_bytes) -> None:
-        self._raw = BufferedReader(
-            _DeadlineFile(
-                BytesIO(source) if isinstance(source, bytes) else source.open("rb", buffering=0)
-            )
-        )
+        file = BytesIO(source) if isinstance(source, bytes) else source.open("rb", buffering=0)
+
+        def read(size: int) -> bytes:
+            checkpoint()  # gzip files may have millions of empty members
+            return file.read(size)
+
+        self._raw = BufferedReader(PieceReader(read, file.close))
         packed = self._raw.peek(2)[:2] == _GZIP_MAGIC
         self._file: BufferedIOBase = gzip.GzipFile(fileobj=self._raw) if packed else self._raw
         self._max_bytes, self._read, self._begun = max_bytes, 0, False
@@ -137,9 +96,11 @@ class LogSource:
         head = file.peek(FILE.head_bytes)[: FILE.head_bytes]
         kind = kind_of_bag(head)
         if kind is not None:
-            self._file = BufferedReader(BagText(file, kind, self._max_bytes))
+            self._file = BufferedReader(bag_text(file, kind, self._max_bytes))
         elif b"\r" in head and b"\n" not in head:
-            self._file = BufferedReader(_CarriageReturns(file))
+            self._file = BufferedReader(
+                PieceReader(lambda size: file.read1(size).replace(b"\r", b"\n"))
+            )
         else:
             self._file = file
 

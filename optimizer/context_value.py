@@ -1,4 +1,4 @@
-"""Context variables with the items of the database that accompany a task."""
+"""Values of context variables within a block of code."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ T = TypeVar("T")
 
 
 @contextmanager
-def at_hand(variable: ContextVar[T], value: T) -> Iterator[None]:
-    """Within the context, and its thread, the variable has this value."""
+def assigned(variable: ContextVar[T], value: T) -> Iterator[None]:
+    """Context in which a variable has a value; other threads have their own values."""
     before = variable.set(value)
     try:
         yield
