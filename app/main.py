@@ -13,7 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
-from joulepath.app.api import cluster, docs, health, help, metrics, problems, studio
+from joulepath.app.api import docs, health, help, metrics, problems, studio
 from joulepath.app.api.advice import route as advice
 from joulepath.app.api.answers import route as answers
 from joulepath.app.api.compare import route as compare
@@ -24,7 +24,6 @@ from joulepath.app.api.export import route as export
 from joulepath.app.api.figures import route as figures
 from joulepath.app.api.identifications import route as identifications
 from joulepath.app.api.ik import route as ik
-from joulepath.app.api.ik.path import route as ik_path
 from joulepath.app.api.jobs import route as jobs
 from joulepath.app.api.logs import route as logs
 from joulepath.app.api.optimize import route as optimize
@@ -66,7 +65,6 @@ ROUTES = (
     evaluate,
     replay,
     ik,
-    ik_path,
     jobs,
     studies,
     iterations,
@@ -83,7 +81,6 @@ ROUTES = (
     figures,
     health,
     metrics,
-    cluster,
     problems,
     docs,
     help,

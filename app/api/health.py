@@ -1,4 +1,4 @@
-"""GET /healthz and GET /readyz."""
+"""GET /healthz, GET /readyz and GET /cluster."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Literal
 
 from fastapi import APIRouter
 
-from joulepath.app.api.shared.dependencies import ServiceEngine, ServiceStore
-from joulepath.app.exceptions.queue import NotReady
+from joulepath.app.api.shared.dependencies import ServiceCluster, ServiceEngine, ServiceStore
+from joulepath.app.exceptions.queue import ClusterUnavailable, NotReady
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.schemas.common import Response, described
+from joulepath.app.schemas.common import Response, described, part
 
 router = APIRouter(tags=["health"])
 
@@ -51,3 +51,41 @@ async def readyz(engine: ServiceEngine, store: ServiceStore) -> Ready:
     if store.fault is not None:
         raise StoreUnavailable(store.fault)
     return Ready(status="ready", workers=engine.warm_workers)
+
+
+class Machine(Response):
+    """One machine of a cluster."""
+
+    address: str = described(
+        "Address at which the scheduler reaches it.", None, "tcp://10.0.0.7:41555"
+    )
+    workers: int = described("Requests that it computes at the same time.", "1", 8)
+
+
+class ClusterState(Response):
+    """The cluster for jobs."""
+
+    scheduler: str | None = described(
+        "Address of the scheduler; null if the service's own workers work on jobs.",
+        None,
+        "tcp://scheduler:8786",
+    )
+    machines: list[Machine] = part("The machines that are there now.")
+
+
+@router.get(
+    "/cluster",
+    summary="Machines that work on jobs",
+    response_model=ClusterState,
+    responses=problem_responses(ClusterUnavailable),
+)
+async def show(cluster: ServiceCluster) -> ClusterState:
+    """The machines of the cluster for the requests of jobs. Without a cluster, the service's own
+    workers compute them."""
+    if cluster is None:
+        return ClusterState(scheduler=None, machines=[])
+    machines = [
+        Machine(address=address, workers=count)
+        for address, count in sorted(cluster.workers.items())
+    ]
+    return ClusterState(scheduler=cluster.address, machines=machines)

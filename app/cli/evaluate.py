@@ -11,7 +11,7 @@ import orjson
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, write
-from joulepath.app.cli.table import table
+from joulepath.app.cli.terminal import table
 
 Kind = Literal["json", "csv"]
 

@@ -13,7 +13,7 @@ import click
 
 from joulepath.app.cli import terminal
 from joulepath.app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
-from joulepath.app.cli.table import table
+from joulepath.app.cli.terminal import table
 from joulepath.optimizer.identify.choices import DEFAULT_TERMS, Estimator, Method, Target, Term
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import orjson
 from joulepath.app.cli.answer import FILE, OUTPUT, write
 from joulepath.app.cli.exit_codes import PROBLEM
 from joulepath.app.cli.service import SERVICE, answered, connect, json_of
-from joulepath.app.cli.table import table
+from joulepath.app.cli.terminal import table
 
 if TYPE_CHECKING:
     from joulepath.app.client.client import Client

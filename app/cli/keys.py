@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from joulepath.app.cli.answer import write
-from joulepath.app.cli.table import table
+from joulepath.app.cli.terminal import table
 
 if TYPE_CHECKING:
     from joulepath.app.access.key_file import ApiKey

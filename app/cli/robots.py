@@ -11,7 +11,7 @@ import click
 
 from joulepath.app.cli.answer import OUTPUT, refused, write
 from joulepath.app.cli.store import in_store
-from joulepath.app.cli.table import table
+from joulepath.app.cli.terminal import table
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session

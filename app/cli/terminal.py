@@ -1,9 +1,9 @@
-"""Progress and summaries for terminals, on standard error."""
+"""Progress and summaries for terminals, on standard error; and rows of text, aligned."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -92,3 +92,13 @@ def summary(lines: Callable[[], dict[str, str]]) -> None:
     sys.stdout.flush()
     for title, value in found.items():
         print(f"{title:{width}}  {value}", file=sys.stderr)
+
+
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """One line per row, its columns as wide as their longest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = (
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
+    return "\n".join(lines)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from joulepath.app.cli.answer import refused, write
-from joulepath.app.cli.table import table
+from joulepath.app.cli.terminal import table
 
 
 @click.command(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import orjson
 
 from joulepath.app.convert.identified import with_figures
 from joulepath.app.convert.own_robots import own_figures_of, own_robot_of
@@ -13,6 +15,7 @@ from joulepath.app.convert.pose import to_base
 from joulepath.app.convert.scene import to_attachment, to_scene
 from joulepath.app.convert.tool import to_tcp, to_tool, with_tool
 from joulepath.app.schemas import arm as asked
+from joulepath.app.schemas.arm import ArmRequest
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.exceptions import InvalidProblem, UnknownRobot
@@ -123,3 +126,21 @@ def _per_joint(field: str, value: float | list[float] | None, nq: int) -> Array 
     if isinstance(value, list) and len(value) != nq:
         raise InvalidProblem(field, f"{field} must be one number or a list of {nq}, one per joint.")
     return np.full(nq, value, dtype=float)
+
+
+LARGEST = 1 << 16
+"""Largest repeated arm [byte of JSON]; a front repeats it a hundred times."""
+_NAMES = set(ArmRequest.model_fields) - {"robot"}
+
+
+def arm_fields(request: ArmRequest, **instead: Any) -> dict[str, Any] | None:
+    """The arm fields set by the request, without the robot; None if they are large.
+
+    `instead` replaces some fields.
+    """
+    content = request.model_dump(mode="json", exclude_unset=True, include=_NAMES) | instead
+    return (
+        content
+        if len(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)) <= LARGEST
+        else None
+    )

@@ -1,7 +1,10 @@
-"""Attributes of the library's dataclasses as JSON fields."""
+"""Fields of requests and answers: the library's attributes as JSON, errors at their paths in a
+request, and bytes in base64.
+"""
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -53,3 +56,15 @@ def fields(source: object, *names: str) -> dict[str, Any]:
         name: np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value
         for name, value in values.items()
     }
+
+
+def decoded(data: str, field: str) -> bytes:
+    """The bytes of a base64 field. Raises InvalidProblem at the field."""
+    try:
+        return base64.b64decode(data, validate=True)
+    except ValueError:
+        raise InvalidProblem(
+            field,
+            f"{field} is not valid base64: use its alphabet only, and fill it to a multiple of 4 "
+            "characters.",
+        ) from None

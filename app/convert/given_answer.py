@@ -17,8 +17,8 @@ from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.export.program import Move, Program, Rest
+from joulepath.optimizer.motion.joined import spline_through
 from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 

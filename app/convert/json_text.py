@@ -1,13 +1,15 @@
-"""JSON of clients: a strict reader, with line and column of errors and no duplicate names; and
-requests as they were sent.
+"""JSON of clients: a strict reader, with line and column of errors and no duplicate names; requests
+as they were sent; and query parameters in JSON or as bare words.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import jiter
+import orjson
 from pydantic import BaseModel
 
 from joulepath.app.exceptions.base import InvalidRequest
@@ -78,3 +80,15 @@ def _refused(message: str) -> InvalidRequest:
 def sent(request: BaseModel) -> bytes:
     """The JSON of a request as it was sent, without defaults."""
     return request.model_dump_json(exclude_unset=True).encode()
+
+
+def query_values(query: Mapping[str, str]) -> dict[str, Any]:
+    """The values of query parameters."""
+    return {name: _value(text) for name, text in query.items()}
+
+
+def _value(text: str) -> Any:
+    try:
+        return orjson.loads(text)
+    except orjson.JSONDecodeError:
+        return text

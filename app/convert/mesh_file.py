@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from cachetools import LRUCache, cached
 
-from joulepath.app.convert.base64_data import decoded
+from joulepath.app.convert.fields import decoded
 from joulepath.models.shape_sizes import SIZES
 from joulepath.models.uploads.glb import check_glb
 from joulepath.models.uploads.limits import UnreadableFile

@@ -7,10 +7,11 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
+from joulepath.app.convert.fields import decoded
 from joulepath.app.convert.mesh_file import mesh_from_file
 from joulepath.app.convert.pose import to_base, to_matrix
-from joulepath.app.convert.voxels import occupied_cells
 from joulepath.app.schemas import scene as asked
 from joulepath.app.schemas import shapes
 from joulepath.models.robot import Array, Robot
@@ -88,3 +89,30 @@ def _named(field: str, make: Callable[[], Made]) -> Made:
         return make()
     except InvalidProblem as error:
         raise InvalidProblem(f"{field}.{error.field}", str(error)) from None
+
+
+def occupied_cells(given: shapes.Voxels) -> npt.NDArray[np.int64]:
+    """Occupied cells (n, 3). Raises InvalidProblem with the field."""
+    if (given.cells is None) == (given.bits is None):
+        raise InvalidProblem("cells", "Give the occupied cells either as `cells` or as `bits`.")
+    return np.array(given.cells, dtype=np.int64) if given.bits is None else _from_bits(given.bits)
+
+
+def _from_bits(bits: shapes.VoxelBits) -> npt.NDArray[np.int64]:
+    count = int(np.prod(bits.dimensions))
+    if count > shapes.MOST_CELLS:
+        raise InvalidProblem(
+            "bits.dimensions",
+            f"bits.dimensions must make at most {shapes.MOST_CELLS} cells: use larger ones.",
+        )
+    data = decoded(bits.data, "bits.data")
+    if len(data) != -(-count // 8):
+        raise InvalidProblem(
+            "bits.data",
+            f"bits.data holds {len(data)} bytes, but {count} cells need {-(-count // 8)}: one bit "
+            "per cell, eight to a byte.",
+        )
+    numbers = np.flatnonzero(
+        np.unpackbits(np.frombuffer(data, dtype=np.uint8), count=count, bitorder="little")
+    )
+    return np.stack(np.unravel_index(numbers, bits.dimensions, order="F"), axis=1).astype(np.int64)

@@ -21,7 +21,6 @@ from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.queue import Busy, TooManyRequests
 from joulepath.app.exceptions.transport import HeadTooLarge
-from joulepath.app.http.answer_examples import add_examples
 from joulepath.app.http.authentication import SCHEME
 from joulepath.app.http.openapi_generators import rewrite_for_generators
 from joulepath.app.http.openapi_pages import add_groups, add_pages
@@ -212,3 +211,25 @@ def _schema_of(parameter: dict[str, Any]) -> dict[str, Any]:
         parameter.get("schema") or parameter["content"]["application/json"]["schema"]
     )
     return schema
+
+
+def add_examples(schemas: dict[str, Any], node: dict[str, Any], example: Any) -> None:
+    """Gives fields without an example their value in an example of the whole node."""
+    if isinstance(example, list):
+        example = next(iter(example), None)
+    if example is None:
+        return
+    for name in references(node):
+        for field, own in schemas[name]["properties"].items():
+            if field not in example:
+                continue
+            if references(own):
+                add_examples(schemas, own, example[field])
+            elif "examples" not in own:
+                own["examples"] = [example[field]]
+
+
+def references(node: dict[str, Any]) -> list[str]:
+    """Names of the schemas of a node: its own, of list entries, and of alternatives."""
+    parts = [node, node.get("items", {}), *node.get("anyOf", ())]
+    return [part["$ref"].rpartition("/")[2] for part in parts if "$ref" in part]

@@ -1,10 +1,10 @@
-"""Headers with weighted preferences of a client (RFC 9110, section 12.4.2)."""
+"""Headers of a client: weighted preferences (RFC 9110, section 12.4.2), and what it has already."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 
-from starlette.requests import Request
+from fastapi import Request
 
 JSON = "application/json"
 
@@ -27,3 +27,11 @@ def is_wanted(request: Request, media_type: str) -> bool:
     accepted = weights(", ".join(request.headers.getlist("accept")))
     weight = accepted.get(media_type, 0.0)
     return weight > 0 and weight >= accepted.get(JSON, 0.0)
+
+
+def is_known(tag: str, request: Request) -> bool:
+    """Whether `If-None-Match` names a tag, weak tags of compressed answers included."""
+    return tag in {
+        each.strip().removeprefix("W/")
+        for each in request.headers.get("if-none-match", "").split(",")
+    }

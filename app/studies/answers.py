@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from joulepath.app.engine.result import csv_document
 from joulepath.app.schemas import studies as schemas
 from joulepath.app.store.studies import Entry, History, State, energy_of
 from joulepath.app.store.tables import Iteration, Study
-from joulepath.app.studies.progress import progress, step
 
 _COLUMNS = {
     "number": "iteration",
@@ -97,3 +96,32 @@ def _columns_of(iteration: Iteration) -> dict[str, Any]:
 
 def _reached(study: Study, iteration: Iteration) -> schemas.IterationEnergy:
     return schemas.IterationEnergy(number=iteration.number, energy=energy_of(study, iteration))
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One step. Changes [J] are negative if energy was saved; None at the first step."""
+
+    change_from_last: float | None
+    change_from_best: float | None
+    threshold_met: bool
+
+
+def step(energy: float, last: float | None, best: float | None, threshold: float) -> Progress:
+    """The progress of one step of `energy` [J], from the previous energy and the least of all
+    before; None: no step.
+    """
+    return Progress(
+        change_from_last=None if last is None else energy - last,
+        change_from_best=None if best is None else energy - best,
+        threshold_met=energy <= threshold,
+    )
+
+
+def progress(energies: Sequence[float], threshold: float) -> list[Progress]:
+    """The progress of all steps, from their energies [J]."""
+    steps, last, best = [], None, None
+    for energy in energies:
+        steps.append(step(energy, last, best, threshold))
+        last, best = energy, energy if best is None else min(best, energy)
+    return steps

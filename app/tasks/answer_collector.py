@@ -1,14 +1,19 @@
-"""Collection of the complete answers referenced by the result of a task."""
+"""Answers of tasks: those to which a result refers, the check of their certificates, and their
+figures in lists.
+"""
 
 from __future__ import annotations
 
 import uuid
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
-from joulepath.app.answers.envelope import Answer
+from joulepath.app.answers.envelope import Answer, AnswerFigures
 from joulepath.app.engine.result import StoredAnswer, json_document
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.optimizer.presentation.declared_fields import shown_fields
+from joulepath.optimizer.result.solution import Solution
 
 MOST_BYTES = 1 << 26
 """Largest total size [byte] of the answers of one result, before compression."""
@@ -45,3 +50,33 @@ class AnswerCollector:
     def stored(self) -> tuple[StoredAnswer, ...]:
         """The answers so far."""
         return tuple(self._answers)
+
+
+def certified(solution: Solution) -> Solution:
+    """The solution. Raises AssertionError if its certificate is not valid: the optimizer returns
+    certified motions.
+    """
+    if not solution.certificate.valid:
+        raise AssertionError(
+            f"The certificate of the optimizer's motion is not valid: {solution.certificate}"
+        )
+    return solution
+
+
+def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
+    """The figures of the JSON answer of any endpoint.
+
+    The energy of a motion or cycle is the one of its objective, electrical for `evaluate`; that of
+    a placement is the one of the best place.
+    """
+    best = answer.get("best")
+    if isinstance(best, Mapping):
+        return AnswerFigures(answer["robot"], best["energy"], best["duration"], answer["status"])
+    given = answer.get("total", answer)
+    energy, objective = given.get("energy"), answer.get("objective", "electrical")
+    return AnswerFigures(
+        robot=answer.get("robot"),
+        energy=energy and energy[objective]["total"],
+        duration=None if energy is None else answer["duration"],
+        status=answer.get("status"),
+    )

@@ -28,7 +28,7 @@ from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.store.answers import packed_answer
 from joulepath.app.store.leases import FoundFigures
-from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.answer_collector import figures_of
 from joulepath.optimizer.deadline import Deadline
 
 IDENTIFY = "identify"

@@ -16,8 +16,8 @@ from joulepath.models.own_arm.description import PLAUSIBLE, Description, Invalid
 from joulepath.models.own_arm.figure import assumed, stated
 from joulepath.models.own_arm.link_shapes import LinkShapes, Rows, check_near
 from joulepath.models.own_arm.meeting_pairs import MeetingPairs, pairs_that_meet
+from joulepath.models.own_arm.robot_xml import robot_element
 from joulepath.models.own_arm.rules import RULES
-from joulepath.models.own_arm.srdf import disabled_pairs
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain
 from joulepath.models.shape_sizes import WrongSize, check_lengths
@@ -157,4 +157,15 @@ def _given_pairs(
     return [
         list(pair)
         for pair in sorted({(min(pair), max(pair)) for pair in known if abs(pair[0] - pair[1]) > 1})
+    ]
+
+
+def disabled_pairs(text: str, checkpoint: Checkpoint) -> list[tuple[str, str]]:
+    """Pairs of links of all `<disable_collisions>`. Raises InvalidArm for other text.
+
+    Such lists come from sampling; they are accepted as a statement of the user.
+    """
+    root = robot_element(text, "srdf", checkpoint)
+    return [
+        (each.get("link1", ""), each.get("link2", "")) for each in root.iter("disable_collisions")
     ]

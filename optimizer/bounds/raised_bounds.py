@@ -14,15 +14,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Protocol
+
+import numpy as np
 
 from joulepath.optimizer.bounds.duration_cells import DurationCells
 from joulepath.optimizer.bounds.grid_cells import Spacing
-from joulepath.optimizer.bounds.omitted_turns import bound_of_omitted_turns
+from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.bounds.pair import Pair
 from joulepath.optimizer.bounds.pair_bounds import Effort, PairBounds
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.dwell import LinearDwell, linear_dwells
+from joulepath.optimizer.kinematics.end_configuration import EQUAL_DISPLACEMENT, joint_options
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import DURATIONS
@@ -197,3 +201,27 @@ class _RaisedPair:
             cells.raise_bounds(effort, deadline)
         least = min((cells.least for cells in self._pieces), default=self.target)
         self.bound = max(self.bound, min(least, self._bound_of_omitted_turns))
+
+
+def bound_of_omitted_turns(prepared: PreparedProblem, pair: Pair) -> float:
+    """Least plain bound of motions between a pair's branches with omitted full turns [J].
+
+    Without `windings`, the candidates exclude longer motions by full turns and, between two poses,
+    displacements beyond one turn (`search.candidates.pairs`). The plain bound rises with the
+    displacement of every joint, so that of a candidate also holds for the omitted turns; a bound
+    raised by other means does not necessarily. The bound is inf if no full turn is omitted.
+    """
+    start, goal, windings = pair.start, pair.goal, prepared.problem.windings
+    fixed = start.fixed or goal.fixed
+    nearest, omitted = list[float](), list[float]()
+    for starts, goals in zip(start.choices, goal.choices, strict=True):
+        kept = [g - s for s, g in joint_options(starts, goals, fixed, windings)]
+        every = [g - s for s, g in product(starts, goals)]
+        others = [abs(d) for d in every if all(abs(d - k) > EQUAL_DISPLACEMENT for k in kept)]
+        nearest.append(min(map(abs, every)))
+        omitted.append(min(others, default=np.inf))
+    gain = prepared.potential(pair.q_goal) - prepared.potential(pair.q_start)
+    bound = LeastBound(prepared).of_other_turns(
+        np.array([nearest]), np.array([omitted]), np.array([gain])
+    )
+    return float(bound[0])

@@ -25,13 +25,9 @@ from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH
 from joulepath.optimizer.cycle.cycle_solution import CycleBaseline, CycleSolution
 from joulepath.optimizer.cycle.errors import NoSequence
-from joulepath.optimizer.cycle.known_motions import knowing, known_motions
-from joulepath.optimizer.cycle.move_problem import MOVE
-from joulepath.optimizer.cycle.neighbouring_configurations import (
-    has_free_postures,
-    with_neighbours,
-)
-from joulepath.optimizer.cycle.successive_moves import successively_chosen
+from joulepath.optimizer.cycle.known_motions import KnownMotion, knowing, known_motions
+from joulepath.optimizer.cycle.move_problem import MOVE, problem_of
+from joulepath.optimizer.cycle.neighbouring_configurations import has_free_postures, with_neighbours
 from joulepath.optimizer.cycle.tool_turns import (
     Turns,
     evenly_from,
@@ -50,8 +46,10 @@ from joulepath.optimizer.exceptions import (
     UnreachableTargets,
 )
 from joulepath.optimizer.problem.cycle import Cycle
+from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.search.run import Run
 
 Search = Callable[[Cycle], CycleSolution]
 
@@ -276,3 +274,49 @@ def _with_single_targets(move: CycleMove, places: set[str]) -> CycleMove:
     }
     passes = [replace(at, target=0) if at.stop in places else at for at in move.passes]
     return replace(move, solution=replace(move.solution, **single), passes=passes)
+
+
+def successively_chosen(cycle: Cycle, end: Deadline, clock: Clock) -> Cycle | None:
+    """The cycle with the joint positions chosen by successive moves as targets.
+
+    Only for cycles in their own time and order, with moves from stop to stop alone. A cycle chooses
+    among given orientations and postures, a single move searches its own: the moves are those of
+    successive calls of `optimize`, and are kept as known motions.
+
+    Args:
+        cycle: the cycle.
+        end: deadline of all moves.
+        clock: function that returns the time [s].
+
+    Returns:
+        The cycle; None if a move has no motion in its share of the time.
+    """
+    start, stops = cycle.start, list[Stop]()
+    for k, (stop, move) in enumerate(zip(cycle.stops, cycle.moves, strict=False)):
+        if end.passed:
+            return None
+        left, share = end.left, end.left / (len(cycle.stops) - k)
+        problem = Problem(
+            arm=move.arm,
+            start=start,
+            goal=stop.target,
+            branch=stop.branch,
+            method=cycle.method,
+            windings=cycle.windings,
+            sample_period=cycle.sample_period,
+            deadline=share,
+        )
+        try:
+            found = Run(problem, (), clock).solution()
+        except JoulepathError:
+            return None
+        if k == 0:
+            cycle = replace(cycle, start=found.start.q)
+        start = found.goal.q
+        if end.left > left - share / 2:
+            # not limited by the deadline: more time would not improve the motion
+            own, motions = problem_of(cycle, move, found.start.q, start, share), known_motions()
+            motion = KnownMotion(found.trajectory.spline, found.solver.stationarity)
+            motions.keep(motions.key("finished", own, []), motion)
+        stops.append(replace(stop, target=start))
+    return replace(cycle, stops=stops)

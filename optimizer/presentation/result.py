@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from enum import Enum
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from joulepath.optimizer.presentation.chart import Chart, as_svg, plotted
-from joulepath.optimizer.presentation.dictionary import plain
+from joulepath.optimizer.presentation.declared_fields import is_declared, shown_fields
 from joulepath.optimizer.presentation.equality import Comparable
 from joulepath.optimizer.presentation.extras import data_frame
 from joulepath.optimizer.presentation.files import Saved
@@ -102,3 +106,26 @@ def _html_table(rows: Rows) -> str:
 def per_joint(name: str, values: Any) -> dict[str, Any]:
     """The columns of an array (n, nq), named by the quantity and the joint's number from 1."""
     return {f"{name}{j}": column for j, column in enumerate(values.T, 1)}
+
+
+def plain(value: Any) -> Any:
+    """A value as dictionaries, lists, texts and numbers; None for a number that is not finite.
+
+    Args:
+        value: a value of a declared class, an array, or a collection of these. Internal fields are
+            left out.
+    """
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    kind: type = type(value)
+    if is_declared(kind):
+        return {name: plain(getattr(value, name)) for name in shown_fields(kind)}
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value

@@ -14,17 +14,19 @@ from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.dynamics.plant import Plant
+from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.progress_bar import progress_bar
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
+from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
 from joulepath.optimizer.replay.controller import ControlName, command, gains
-from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.outcome import Outcome, outcome, played_energy
-from joulepath.optimizer.replay.planned import PlannedMotion
+from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.play import Played, play
-from joulepath.optimizer.replay.reference import Reference, reference
+from joulepath.optimizer.replay.reference import Reference, course_of, reference
 from joulepath.optimizer.replay.replay_result import (
     AsPlanned,
     Quantity,
@@ -36,6 +38,7 @@ from joulepath.optimizer.replay.replay_result import (
 )
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.result.baseline import BaselineName
+from joulepath.optimizer.result.energy import Objective
 from joulepath.optimizer.result.solution import Solution
 
 
@@ -280,3 +283,39 @@ class _Replayer:
                 )
             )
         return found
+
+
+def planned_motion(solution: Solution, arm: Arm, objective: Objective) -> PlannedMotion:
+    """The planned motion of a solution.
+
+    Args:
+        solution: solution of a problem.
+        arm: arm of the problem.
+        objective: objective of the problem, to which the savings refer.
+
+    Returns:
+        The motion, with the baselines whose motions are known.
+
+    Raises:
+        NotCertified: the solution does not belong to the arm.
+    """
+    samples, energy = solution.trajectory, solution.energy
+    torques = PlannedTorques(samples.q, samples.v, samples.a, samples.tau)
+    check_samples(arm, samples.spline, samples.t, (samples.q, samples.v, samples.a, samples.tau))
+    reported = [
+        ReportedBaseline(each.name, each.duration, each.electrical, each.mechanical, each.saving)
+        for each in solution.baselines
+    ]
+    goals: Sequence[Array] = [solution.goal.q, *(each.q_goal for each in solution.candidates)]
+    return PlannedMotion(
+        arm=arm,
+        course=course_of(samples.spline),
+        duration=solution.duration,
+        electrical=energy.electrical.total - energy.electrical.dwell,
+        mechanical=energy.mechanical.total,
+        objective=objective,
+        waiting=energy.electrical.dwell,
+        compared=bool(reported),
+        torques=torques,
+        baselines=planned_baselines(arm, solution.start.q, goals, solution.duration, reported),
+    )

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from joulepath.app.api.cluster import ClusterState
+from joulepath.app.api.health import ClusterState
 from joulepath.app.exceptions.queue import ClusterUnavailable
 from tests.app.job_clients import ended, evaluation, over, sent, shown
 from tests.app.live import (

@@ -13,7 +13,7 @@ from benchmarks.checks import allowed, beats, errors_found, refusal_errors
 from benchmarks.motion import SplineMotion, replay
 from benchmarks.tasks import RequestTask, request_task
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.arm import arm_fields
 from joulepath.app.convert.request import to_problem
 from joulepath.app.engine.result import json_document
 from joulepath.app.schemas.request import OptimizeRequest

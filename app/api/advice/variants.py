@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from joulepath.app.api.advice.request import AdviceName
-from joulepath.app.api.cycle.request import CycleRequest
-from joulepath.app.api.cycle.stop import StopRequest
+from joulepath.app.api.cycle.request import CycleRequest, StopRequest
 from joulepath.app.schemas.request import Dwell, Holding, OptimizeRequest
 
 Task = OptimizeRequest | CycleRequest

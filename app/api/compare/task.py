@@ -11,14 +11,14 @@ from pydantic_core import PydanticCustomError
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.arm import arm_fields
 from joulepath.app.convert.request import to_problem
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.http.problems import problem_of
 from joulepath.app.schemas.common import described
 from joulepath.app.schemas.request import MotionRequest, OptimizeRequest
-from joulepath.app.tasks.certified import certified
+from joulepath.app.tasks.answer_collector import certified
 from joulepath.optimizer.compare import Compared, Comparison, compare
 from joulepath.optimizer.declared import Count, Joules, NotEmpty, Ratio, Seconds
 from joulepath.optimizer.presentation.gap import optimality_gap

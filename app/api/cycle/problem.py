@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from joulepath.app.api.cycle.request import CycleRequest, TimeRange
-from joulepath.app.api.cycle.stop import StopRequest
+from joulepath.app.api.cycle.request import CycleRequest, StopRequest, TimeRange
 from joulepath.app.convert.arm import to_arm, to_limits, to_payload
 from joulepath.app.convert.pose import to_base
 from joulepath.app.convert.request import to_branch, to_target, to_target_pose, to_tool_path

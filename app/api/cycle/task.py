@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from joulepath.app.answers.envelope import Answer, AnswerFigures
-from joulepath.app.api.cycle.arms import arms_of_moves
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
-from joulepath.app.api.cycle.table import cycle_rows
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.convert.arm import arm_fields
 from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.known_motions import to_kept, to_known_motions
 from joulepath.app.convert.unlikely_units import unlikely_units
 from joulepath.app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.tasks.answer_collector import AnswerCollector
-from joulepath.app.tasks.certified import certified
+from joulepath.app.schemas.arm import Payload
+from joulepath.app.tasks.answer_collector import AnswerCollector, certified
+from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution, SolvedCycle
 from joulepath.optimizer.cycle.known_motions import knowing
 from joulepath.optimizer.declared import NotEmpty
 from joulepath.optimizer.plan_cycle import plan_cycle
+from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.cycle import LegReport
 
@@ -134,3 +135,75 @@ def _divided(found: CycleSolution) -> list[tuple[str, float]]:
         if path is not None and path.section is not None
     ]
     return [(name, section.last) for name, section in parts if section.last < 1]
+
+
+Row = list[float | str]
+
+
+def cycle_rows(found: CycleSolution) -> Iterator[Row]:
+    """Rows with the columns t, leg, kind, then q, v, a, tau_motor of every joint, and power.
+
+    Units as in the JSON answer. A rest has its mean power, and no torques: motors or brakes may
+    hold the arm.
+    """
+    joints = range(1, found.moves[0].planned.arm.robot.nq + 1)
+    names = ("q", "v", "a", "tau_motor")
+    yield ["t", "leg", "kind", *(f"{name}{joint}" for name in names for joint in joints), "power"]
+    legs = ((move, leg) for move in found.moves for leg in move.legs(found.objective))
+    for number, (move, leg) in enumerate(legs):
+        rests = leg.kind in ("dwell", "wait")
+        yield from _of_rest(leg, number) if rests else _of_move(move, number)
+
+
+def _of_move(move: CycleMove, number: int) -> list[Row]:
+    samples, kind = move.solution.trajectory, move.planned.kind
+    table = zip(
+        (samples.t + move.t0).tolist(),
+        *(getattr(samples, name).tolist() for name in ("q", "v", "a", "tau_motor")),
+        samples.power.tolist(),
+        strict=True,
+    )
+    return [[t, number, kind, *q, *v, *a, *tau, power] for t, q, v, a, tau, power in table]
+
+
+def _of_rest(leg: LegReport, number: int) -> list[Row]:
+    q, power = leg.goal.q.tolist(), leg.electrical / leg.duration
+    still: Row = [0.0] * len(q)
+    ends = (leg.t0, leg.t0 + leg.duration)
+    return [[t, number, leg.kind, *q, *still, *still, *[""] * len(q), power] for t in ends]
+
+
+def arms_of_moves(request: CycleRequest, found: CycleSolution) -> list[dict[str, Any] | None]:
+    """The result of `arm_fields` for every move as a request of its own."""
+    stops = {stop.name or str(k): stop for k, stop in enumerate(request.stops, 1)}
+    carried, arms = request.payload, list[dict[str, Any] | None]()
+    for move in found.moves:
+        arms.append(_arm(request, move.planned.arm, carried))
+        stop = stops.get(move.planned.goal) if move.planned.at_stop else None
+        if stop is not None and "payload" in stop.model_fields_set:
+            carried = stop.payload
+    return arms
+
+
+def _arm(request: CycleRequest, arm: Arm, carried: Payload | None) -> dict[str, Any] | None:
+    limits, own = arm.active_limits, arm.robot.limits
+    given = request.limits.model_dump(mode="json", exclude_unset=True)
+    for public, name in LIMIT_NAMES.items():
+        value = getattr(limits, name)
+        if (value < getattr(own, name)).any():
+            given[public] = value.tolist()
+    # A storage begins a move with the final charge of the previous one.
+    stored = request.bus.mode == "storage" and {
+        "bus": request.bus.model_dump(mode="json", exclude_unset=True)
+        | {"initial": arm.bus.initial}
+    }
+    given |= {"tcp_speed": arm.tcp_speed, "elbow_speed": arm.elbow_speed}
+    counted = [each for each in request.scene.obstacles if each.name in arm.scene.names]
+    return arm_fields(
+        request,
+        limits=given,
+        payload=None if carried is None else carried.model_dump(mode="json", exclude_unset=True),
+        scene=request.scene.model_dump(mode="json", exclude_unset=True)
+        | {"obstacles": [each.model_dump(mode="json", exclude_unset=True) for each in counted]},
+        **(stored or {}),
+    )

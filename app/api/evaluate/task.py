@@ -15,12 +15,10 @@ from pydantic import ValidationError
 from joulepath.app.answers.declared import as_json
 from joulepath.app.answers.envelope import AnswerFigures, MotionAnswer
 from joulepath.app.api.evaluate.motion_csv import MotionCsv
-from joulepath.app.convert.arm import to_arm
-from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.arm import arm_fields, to_arm
 from joulepath.app.convert.fields import location
 from joulepath.app.convert.given_motion import own_times, to_motion, to_waypoints
-from joulepath.app.convert.json_text import parsed_json
-from joulepath.app.convert.query import query_values
+from joulepath.app.convert.json_text import parsed_json, query_values
 from joulepath.app.convert.recorded import as_logged, read_csv, reading_of, told_by
 from joulepath.app.convert.unlikely_units import unlikely_units
 from joulepath.app.convert.until import until

@@ -34,4 +34,4 @@ async def excitation(
     """A periodic motion from rest to rest for a log with separable friction, rotor inertias and
     base parameters, within all limits and free of collisions. `Accept: text/csv` returns its
     samples as a table for `/evaluate`."""
-    return await tasks.answer(ExcitationTask(body, wanted, tasks.request_id), body)
+    return await tasks.answer(ExcitationTask(body, tasks.request_id, wanted), body)

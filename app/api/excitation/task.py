@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from joulepath.app.answers.envelope import MotionAnswer
-from joulepath.app.convert.arm import to_arm
-from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.arm import arm_fields, to_arm
 from joulepath.app.convert.until import time_left, until
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
@@ -114,11 +113,11 @@ class ExcitationAnswer(Excitation, MotionAnswer):
 
 @dataclass(frozen=True)
 class ExcitationTask:
-    """A validated request, the format of its answer, and its id."""
+    """A validated request and its id; the media type of the answer is `wanted`."""
 
     request: ExcitationRequest
-    wanted: Literal["json", "csv"]
     request_id: str
+    wanted: Literal["json", "csv"]
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /excitation`, within about `deadline` seconds."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from joulepath.app.api.figures.request import Covariance, Section
+from joulepath.app.api.figures.task import Covariance, Section
 from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.figures import DRIVES, FIGURES_ID, FRICTION, MAINS
 from joulepath.app.schemas.examples.values import CREATED

@@ -11,8 +11,7 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from joulepath.app.api.figures.models import FiguresDetail, FiguresList, FiguresSummary
-from joulepath.app.api.figures.request import FiguresDocument
-from joulepath.app.api.figures.task import FiguresTask
+from joulepath.app.api.figures.task import FiguresDocument, FiguresTask
 from joulepath.app.api.shared.dependencies import ServiceClient, ServiceStore
 from joulepath.app.api.shared.large_bodies import LargeBodyRoute
 from joulepath.app.api.shared.parameters import LOCATION_HEADER, set_location

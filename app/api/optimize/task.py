@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from joulepath.app.answers.envelope import AnswerFigures, MotionAnswer
-from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.arm import arm_fields
 from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.request import to_problem
 from joulepath.app.convert.unlikely_units import unlikely_units
@@ -14,7 +14,7 @@ from joulepath.app.convert.warnings import certified_warnings
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.schemas.request import OptimizeRequest, WhichCandidates
-from joulepath.app.tasks.certified import certified
+from joulepath.app.tasks.answer_collector import certified
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.energy import Objective

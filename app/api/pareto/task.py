@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from joulepath.app.answers.declared import as_json
 from joulepath.app.answers.envelope import Answer
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.arm import arm_fields
 from joulepath.app.convert.request import to_problem
 from joulepath.app.engine.listening import listener
 from joulepath.app.engine.result import TaskResult

@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from joulepath.app.api.cycle.request import CycleRequest
-from joulepath.app.api.cycle.stop import PlainName
+from joulepath.app.api.cycle.request import CycleRequest, PlainName
 from joulepath.app.schemas.common import IDENTITY, Pose, Request, described
 from joulepath.app.schemas.examples.values import OPTIMIZE, at
 from joulepath.app.settings import LONGEST_DEADLINE

@@ -11,7 +11,7 @@ from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.cycle.task import cycle_answer
 from joulepath.app.api.placement.problem import request_at, to_placement
 from joulepath.app.api.placement.request import PlacementRequest
-from joulepath.app.convert.arm_fields import LARGEST
+from joulepath.app.convert.arm import LARGEST
 from joulepath.app.convert.json_text import sent
 from joulepath.app.convert.warnings import AT_EDGE, JOINT_POSITIONS
 from joulepath.app.engine.listening import listener

@@ -22,8 +22,8 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
 from joulepath.app.exceptions.stored import NoMeshes, StoreUnavailable
 from joulepath.app.http.disconnect import unless_disconnected
-from joulepath.app.http.entity_tag import is_known
 from joulepath.app.http.openapi import problem_responses
+from joulepath.app.http.weights import is_known
 from joulepath.app.store import robots
 from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.urdf import urdf_of

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from joulepath.app.api.robots.request import OwnArm
-from joulepath.app.convert.base64_data import decoded
-from joulepath.app.convert.fields import location
+from joulepath.app.convert.fields import decoded, location
 from joulepath.app.convert.until import until
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.base import FieldError, InvalidRequest

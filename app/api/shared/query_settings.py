@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from fastapi import Request
 from pydantic import ValidationError
 
-from joulepath.app.convert.query import query_values
+from joulepath.app.convert.json_text import query_values
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.http.problems import invalid_request
 from joulepath.app.schemas.common import Request as RequestModel

@@ -14,7 +14,7 @@ from fastapi import Request
 from fastapi.responses import Response
 
 from joulepath.app.exceptions.transport import NotFound, PagesNotBuilt
-from joulepath.app.http.entity_tag import is_known
+from joulepath.app.http.weights import is_known
 
 INDEX = "index.html"
 _MEDIA_TYPES = {

@@ -19,8 +19,7 @@ from joulepath.app.api.whatif.answer import (
     WhatifAnswer,
     WhatifBase,
 )
-from joulepath.app.convert.arm import to_arm
-from joulepath.app.convert.arm_fields import arm_fields
+from joulepath.app.convert.arm import arm_fields, to_arm
 from joulepath.app.convert.fields import inside, moved
 from joulepath.app.convert.given_motion import to_motion
 from joulepath.app.convert.recorded import as_logged
@@ -36,8 +35,7 @@ from joulepath.app.schemas.examples.values import EVALUATE, OPTIMIZE
 from joulepath.app.schemas.naming import Name
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.settings import LONGEST_DEADLINE
-from joulepath.app.tasks.answer_collector import AnswerCollector
-from joulepath.app.tasks.certified import certified
+from joulepath.app.tasks.answer_collector import AnswerCollector, certified
 from joulepath.optimizer.deadline import Deadline, DeadlineShares
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.evaluate.evaluation import Evaluation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -11,8 +12,7 @@ import numpy as np
 
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.logs.channels import channels_of
-from joulepath.optimizer.identify.logs.columns import EFFORTS, NOT_LOGGED
+from joulepath.optimizer.identify.logs.columns import EFFORTS, NOT_LOGGED, Columns
 from joulepath.optimizer.identify.logs.effort import EffortReport, effort_report
 from joulepath.optimizer.identify.logs.effort_checks import (
     check_signs,
@@ -21,24 +21,17 @@ from joulepath.optimizer.identify.logs.effort_checks import (
 )
 from joulepath.optimizer.identify.logs.file_channels import FileChannels, read_channels
 from joulepath.optimizer.identify.logs.file_rows import LogSource
+from joulepath.optimizer.identify.logs.filters import noise
 from joulepath.optimizer.identify.logs.head import head_of
 from joulepath.optimizer.identify.logs.header_columns import columns_of_header
 from joulepath.optimizer.identify.logs.lag import effort_lag, power_lag
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.log_report import LogReport
-from joulepath.optimizer.identify.logs.log_warnings import (
-    held_warning,
-    log_warnings,
-    named_joints,
-)
+from joulepath.optimizer.identify.logs.log_report import Channel, LogReport
+from joulepath.optimizer.identify.logs.log_warnings import held_warning, log_warnings, named_joints
 from joulepath.optimizer.identify.logs.motion import LoggedMotion
-from joulepath.optimizer.identify.logs.moves import (
-    cut_into_moves,
-    rests_by_command,
-    rests_by_speed,
-)
+from joulepath.optimizer.identify.logs.moves import cut_into_moves, rests_by_command, rests_by_speed
 from joulepath.optimizer.identify.logs.speeds import speeds_of
 from joulepath.optimizer.identify.logs.usable_effort import check_measured, choose_meaning
 from joulepath.optimizer.problem.arm import Payload
@@ -242,3 +235,59 @@ def _payload(
             "`payload`."
         )
     return Payload(mass, np.array(com or [0.0, 0.0, 0.0])), True
+
+
+_UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "power": "W", "temperature": "°C"}
+_EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}
+
+
+def channels_of(log: Log, columns: Columns, effort: ChannelName | None) -> tuple[Channel, ...]:
+    """All channels of a log.
+
+    Args:
+        log: the log.
+        columns: columns of the file.
+        effort: group of columns of the efforts.
+    """
+    return tuple(_channels(log, columns, effort))
+
+
+def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterator[Channel]:
+    units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
+    sources: dict[str, ChannelName | None] = {
+        "q": "q",
+        "v": "v",
+        "a": "a",
+        "effort": effort,
+        "temperature": "temperature",
+    }
+    for name, group in sources.items():
+        values: Array | None = getattr(log, name)
+        if values is None:
+            continue
+        indices = columns.groups.get(group) if group is not None else None
+        for j, size in enumerate(noise(values, log.rate)):
+            if indices is not None and indices[j] == NOT_LOGGED:
+                continue
+            column = None if indices is None else columns.names[indices[j]]
+            yield Channel(f"{name}{j + 1}", column, units[name], *_range(values[:, j]), float(size))
+    if log.wrench is not None:
+        for j, size in enumerate(noise(log.wrench, log.rate)):
+            column = columns.names[columns.groups["wrench"][j]]
+            yield Channel(
+                f"wrench{j + 1}",
+                column,
+                "N" if j < 3 else "N·m",
+                *_range(log.wrench[:, j]),
+                float(size),
+            )
+    if log.power is not None:
+        column = " · ".join(columns.names[k] for k in columns.groups["power"])
+        (size,) = noise(log.power[:, None], log.rate)
+        yield Channel("power", column, "W", *_range(log.power), float(size))
+
+
+def _range(values: Array) -> tuple[float, float]:
+    """Least and greatest value, with the digits of single precision."""
+    low, high = (float(f"{each:.7g}") for each in (values.min(), values.max()))
+    return low, high

@@ -18,11 +18,10 @@ from scipy.interpolate import make_interp_spline
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.bspline import Basis
-from joulepath.optimizer.motion.joined import joined
+from joulepath.optimizer.motion.joined import joined, spline_through
 from joulepath.optimizer.motion.passing import pass_times
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import SAMPLING, Spline, lasting, sampled
-from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.guess import Guess

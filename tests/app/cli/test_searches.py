@@ -14,7 +14,7 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.whatif.answer import WhatifAnswer
-from joulepath.app.cli import compare, excitation, ik, pareto, placement, whatif
+from joulepath.app.cli import ik, searches
 from tests.app.cli.console import ROOT, Here, request
 from tests.app.cli.test_terminal import on_a_terminal
 from tests.app.requests import HOME, NEAR, move
@@ -95,7 +95,7 @@ def test_a_front_with_its_motions(here: Here, tmp_path: Path) -> None:
     motion = folder / f"{min(names)}.json"
     code, out, _ = here.run("export", "csv", str(motion))
     assert code == 0 and out.startswith(b"t,q1,")
-    lines = pareto.summary_of(answer)
+    lines = searches.pareto_summary(answer)
     first = answer["points"][0]
     assert lines[f"{first['duration']:.4g} s"] == f"{first['energy']:.4g} J electrical"
 
@@ -113,7 +113,7 @@ def test_a_placement_with_its_cycles(here: Here, tmp_path: Path) -> None:
     assert total == pytest.approx(answer["best"]["energy"])
     # joint positions stay the same wherever the base stands
     assert answer["saving"] == pytest.approx(0.0, abs=1e-6)
-    lines = placement.summary_of(answer)
+    lines = searches.placement_summary(answer)
     assert lines["energy"] == f"{answer['best']['energy']:.4g} J electrical"
     assert lines["saved"] == "0.0%"
 
@@ -130,7 +130,7 @@ def test_compare(here: Here, tmp_path: Path) -> None:
     body = json.dumps(move(methods=["uniform_scaling", "bspline"]))
     answer = written(here, tmp_path, "compare", "-", stdin=body)
     model_of(CompareAnswer).model_validate_json(json.dumps(answer))
-    lines = compare.summary_of(answer)
+    lines = searches.compare_summary(answer)
     assert [*lines] == ["uniform_scaling", "bspline"]
     assert "0.0% above the best" in lines[answer["best"]]
 
@@ -141,7 +141,7 @@ def test_a_change_of_the_arm(here: Here, tmp_path: Path) -> None:
     body = json.dumps({"optimize": move(), "changes": [heavier, beyond]})
     answer = written(here, tmp_path, "whatif", "-", stdin=body)
     model_of(WhatifAnswer).model_validate_json(json.dumps(answer))
-    lines = whatif.summary_of(answer)
+    lines = searches.whatif_summary(answer)
     assert [*lines] == ["as it is", "heavier", "slower"]
     assert re.fullmatch(r"the same motion [\d.-]+ J, best [\d.-]+ J", lines["heavier"])
     assert lines["slower"] == answer["changes"][1]["problem"]["title"]
@@ -169,7 +169,7 @@ def test_a_table_of_configurations_is_a_motion(here: Here, tmp_path: Path) -> No
 def test_an_excitation(here: Here, tmp_path: Path) -> None:
     fields = {"parameters": ["friction"], "period": 6, "harmonics": 2, "starts": 1, "deadline": 60}
     answer = written(here, tmp_path, "excitation", "-", stdin=json.dumps(fields))
-    assert excitation.summary_of(answer)["motions within limits"] == "1 of 1 starts"
+    assert searches.excitation_summary(answer)["motions within limits"] == "1 of 1 starts"
 
 
 def plain(shown: str) -> str:

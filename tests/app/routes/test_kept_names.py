@@ -17,7 +17,7 @@ from joulepath.app.exceptions.stored import (
     UnknownLog,
     UnknownStudy,
 )
-from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
+from joulepath.app.schemas.examples.bodies import LOG_EXAMPLES
 from joulepath.optimizer.exceptions import DeclaredError
 from tests.app.job_clients import evaluation, sent
 from tests.app.problems import checked

@@ -18,7 +18,7 @@ from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow, Unauthen
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
 from joulepath.app.exceptions.transport import BodyTooLarge, UnsupportedMediaType
-from joulepath.app.schemas.examples.logs import LOG_EXAMPLES
+from joulepath.app.schemas.examples.bodies import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidTable, UnknownRobot

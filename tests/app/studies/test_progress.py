@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from joulepath.app.studies.progress import Progress, progress
+from joulepath.app.studies.answers import Progress, progress
 
 ENERGIES = [100.0, 80.0, 90.0, 60.0, 60.0]
 THRESHOLD = 80.0

@@ -11,11 +11,10 @@ from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.cruise import TINY
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.grid_cells import Curvature, GridCells
-from joulepath.optimizer.bounds.grid_points import GridPoints
 from joulepath.optimizer.bounds.least_potential import LeastPotential, _excess, _hold, _weight
 from joulepath.optimizer.bounds.path_curvature import DIFFERENCE_STEP
-from joulepath.optimizer.bounds.speed_conjugate import BISECTIONS, SpeedConjugate
-from joulepath.optimizer.bounds.time_parts import TimeParts
+from joulepath.optimizer.bounds.path_terms import GridPoints
+from joulepath.optimizer.bounds.speed_conjugate import BISECTIONS, SpeedConjugate, TimeParts
 from joulepath.optimizer.bounds.weights import Weights
 from joulepath.optimizer.kinematics.vectors import cross
 

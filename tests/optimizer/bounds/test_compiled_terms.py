@@ -14,9 +14,8 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
 from joulepath.optimizer.bounds.grid_cells import Curvature, GridCells, Spacing
-from joulepath.optimizer.bounds.grid_points import GridPoints
 from joulepath.optimizer.bounds.least_potential import LeastPotential
-from joulepath.optimizer.bounds.path_terms import path_terms
+from joulepath.optimizer.bounds.path_terms import GridPoints, path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.speed_conjugate import SpeedConjugate
 from joulepath.optimizer.bounds.weights import Weights

@@ -17,8 +17,8 @@ from joulepath.optimizer.evaluate.sample_check import check_samples
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.export.certified import certified
 from joulepath.optimizer.export.program import Move, Program, Rest, program_of_cycle
+from joulepath.optimizer.motion.joined import spline_through
 from joulepath.optimizer.motion.spline import Spline, retimed
-from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.cycle import Cycle

@@ -23,8 +23,8 @@ from joulepath.optimizer.joint_limits.posture_terms import PostureTerms
 from joulepath.optimizer.joint_limits.torque_cover import TorqueCover
 from joulepath.optimizer.joint_limits.torque_load import Rates, TorqueLoad, greatest_torques
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.motion.joined import spline_through
 from joulepath.optimizer.motion.spline import sample
-from joulepath.optimizer.motion.through_samples import spline_through
 from joulepath.optimizer.problem.arm import Arm, Payload
 from tests.by_pinocchio import torques_of
 from tests.models.own_arm.arms import robot

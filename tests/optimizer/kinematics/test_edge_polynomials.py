@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from joulepath.models.robot import Array
-from joulepath.optimizer.kinematics.seven.trigonometric_polynomials import (
+from joulepath.optimizer.kinematics.seven.interval_edges import (
     Polynomial,
     product,
     sinusoid,

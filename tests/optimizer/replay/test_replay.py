@@ -25,10 +25,9 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
 from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.replay.from_solution import planned_motion
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import TIME_GRID, course_of, reference
-from joulepath.optimizer.replay.replay import replay
+from joulepath.optimizer.replay.replay import planned_motion, replay
 from joulepath.optimizer.replay.replay_result import Replay
 from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.clocks import CountingClock

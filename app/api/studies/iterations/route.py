@@ -36,7 +36,7 @@ from joulepath.app.store.cache import Answered, Asked
 from joulepath.app.store.tables import Study
 from joulepath.app.studies.answers import detail
 from joulepath.app.tasks.answer_cache import AnswerCache
-from joulepath.app.tasks.answer_figures import figures_of
+from joulepath.app.tasks.answer_collector import figures_of
 from joulepath.app.tasks.read_body import HeldBody
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
 from joulepath.optimizer.search.errors import PathInfeasible
