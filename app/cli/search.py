@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -40,12 +40,6 @@ ANSWERS: Callable[[Any], Any] = click.option(
 )
 
 
-class _Timed(Protocol):
-    """A request with a deadline."""
-
-    deadline: float
-
-
 def search(
     model: type[Request],
     task: Callable[[Any, str], Task],
@@ -69,10 +63,10 @@ def search(
     """
     request_id = new_id()
     request: Any = validated(model, body, request_id)
-    timed: _Timed = request
+    deadline: float = request.deadline
     compile_kernel_of(robot_in(request))
-    with terminal.steps(f"Optimising for at most {timed.deadline:g} s"):
-        result = result_of(task(request, request_id), timed.deadline, request_id)
+    with terminal.steps(f"Optimising for at most {deadline:g} s"):
+        result = result_of(task(request, request_id), deadline, request_id)
     if result.kept_as is not None:
         result = result.not_kept()
     if answers is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any, Protocol, TypeVar, TypeVarTuple
+from typing import Any, TypeVar, TypeVarTuple
 
 from sqlalchemy import ColumnElement, Select, and_, or_
 from sqlalchemy.orm import InstrumentedAttribute, Session
@@ -12,22 +12,16 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 from joulepath.app.store.tables import Answer, Job, StoredLog, Study
 
 R = TypeVar("R", Answer, Job, StoredLog, Study)
+Listed = Answer | Job | StoredLog | Study
 Ts = TypeVarTuple("Ts")
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
 
 
-class Listed(Protocol):
-    """A row of a list."""
-
-    created: datetime
-    id: str
-
-
 def newest_first(
     query: Select[*Ts],
-    table: type[Answer | Job | StoredLog | Study],
+    table: type[Listed],
     limit: int,
     after: str | None,
 ) -> Select[*Ts]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Annotated, Literal, Self
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, ValidationError
 
 from joulepath.app.answers.envelope import Answer
-from joulepath.app.api.replay.planned_motion import to_planned_motion
-from joulepath.app.convert.given_answer import paths_of_moves, to_program
+from joulepath.app.convert.given_answer import Number, Part, paths_of_moves, to_program
 from joulepath.app.convert.until import until
 from joulepath.app.convert.warnings import replay_warnings
 from joulepath.app.engine.listening import listener
@@ -21,12 +21,17 @@ from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.kept_answers import kept_answers
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.declared import NotEmpty, Seconds
+from joulepath.optimizer.export.program import Move
 from joulepath.optimizer.progress import Steps, TellSteps, no_listener
+from joulepath.optimizer.replay.baseline_courses import ReportedBaseline, planned_baselines
 from joulepath.optimizer.replay.controller import ControlName
-from joulepath.optimizer.replay.planned import PlannedMotion
+from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
+from joulepath.optimizer.replay.reference import course_of
 from joulepath.optimizer.replay.replay import replay
 from joulepath.optimizer.replay.replay_result import Quantity, Replay
 from joulepath.optimizer.replay.simulator import mujoco
+from joulepath.optimizer.result.baseline import BaselineName
+from joulepath.optimizer.result.energy import Objective
 
 PERTURBED_NOTHING = "The arm carries no payload: to change it has no effect."
 NO_BASELINES = (
@@ -212,3 +217,92 @@ def _perturbation(perturb: Perturb | None) -> dict[Quantity, float]:
         {} if perturb is None else {"payload": perturb.payload, "friction": perturb.friction}
     )
     return {quantity: fraction for quantity, fraction in given.items() if fraction is not None}
+
+
+class _Electrical(Part):
+    total: Number
+    dwell: Number = 0.0
+
+
+class _Mechanical(Part):
+    total: Number
+
+
+class _Energy(Part):
+    electrical: _Electrical
+    mechanical: _Mechanical
+
+
+class _Baseline(Part):
+    name: BaselineName
+    duration: Annotated[float, Field(ge=0, le=1e6)]
+    electrical: Number
+    mechanical: Number
+    saving: Number | None
+
+
+class _Candidate(Part):
+    q_goal: Annotated[list[Number], Field(max_length=16)]
+
+
+class _Optimized(Part):
+    """An answer of `POST /optimize`, but for its motion."""
+
+    objective: Objective = "electrical"
+    energy: _Energy
+    baselines: Annotated[list[_Baseline], Field(max_length=16)] = Field(default_factory=list)
+    candidates: Annotated[list[_Candidate], Field(max_length=100_000)] = Field(default_factory=list)
+
+
+class _Total(Part):
+    energy: _Energy
+
+
+class _Evaluated(Part):
+    """An answer of `POST /evaluate`, but for its motion."""
+
+    total: _Total
+
+
+def to_planned_motion(move: Move, answer: dict[str, Any]) -> PlannedMotion:
+    """The motion of an answer, whose samples are checked, with the energies that the answer
+    reports.
+
+    Raises ValidationError (of pydantic).
+    """
+    arm, spline = move.arm, move.spline
+    if "trajectory" not in answer:
+        energy = _Evaluated.model_validate(answer).total.energy
+        return _planned(move, answer["samples"], energy)
+    given = _Optimized.model_validate(answer)
+    ends = spline.control_points[0], spline.control_points[-1]
+    named = [
+        np.array(each.q_goal, dtype=float)
+        for each in given.candidates
+        if len(each.q_goal) == arm.robot.nq
+    ]
+    names = ReportedBaseline.__dataclass_fields__
+    reported = [
+        ReportedBaseline(**{name: getattr(each, name) for name in names})
+        for each in given.baselines
+    ]
+    return replace(
+        _planned(move, answer["trajectory"], given.energy),
+        objective=given.objective,
+        waiting=given.energy.electrical.dwell,
+        compared=bool(reported),
+        baselines=planned_baselines(arm, ends[0], [ends[1], *named], spline.duration, reported),
+    )
+
+
+def _planned(move: Move, samples: dict[str, Any], energy: _Energy) -> PlannedMotion:
+    return PlannedMotion(
+        arm=move.arm,
+        course=course_of(move.spline),
+        duration=move.duration,
+        electrical=energy.electrical.total - energy.electrical.dwell,
+        mechanical=energy.mechanical.total,
+        torques=PlannedTorques(
+            *(np.array(samples[name], dtype=float) for name in ("q", "v", "a", "tau"))
+        ),
+    )

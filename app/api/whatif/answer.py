@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, Literal, Protocol, Self
+from typing import Annotated, Any, Literal, Self
 
 from joulepath.app.answers.envelope import Answer
 from joulepath.optimizer.declared import Joules, NotEmpty, Ratio, Seconds, Watts
 from joulepath.optimizer.dynamics.losses import share_of
+from joulepath.optimizer.evaluate.interval_energy import IntervalEnergy
 from joulepath.optimizer.result.certificate import Certificate
 from joulepath.optimizer.result.energy import ElectricalEnergy, Energy, Objective
+from joulepath.optimizer.result.solution import Solution
 
 Status = Literal["optimal", "feasible"]
-
-
-class Motion(Protocol):
-    """A motion, optimised or given."""
-
-    @property
-    def energy(self) -> Energy:
-        """Its energy."""
-        ...
-
-    @property
-    def duration(self) -> float:
-        """Its duration [s]."""
-        ...
+Motion = Solution | IntervalEnergy
+"""A motion: optimised, or given."""
 
 
 @dataclass(frozen=True)

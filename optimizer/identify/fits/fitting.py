@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -145,6 +145,20 @@ def _with_torque(
             return changed
         return replace(changed, link_change=matrix @ (values[of_links] - before))
 
+    result, errors = _with_estimate(fitted, found, arm)
+    return replace(result, noise=noise), errors
+
+
+def _with_estimate(
+    fitted: FitResult, found: Estimate, arm: Callable[[Array], FittedArm]
+) -> tuple[FitResult, Array]:
+    """The fit with an estimate, and the errors (k, p) of the parameters of its `prior_error_arms`.
+
+    Args:
+        fitted: the fit before.
+        found: estimate of p parameters.
+        arm: the arm with some values (p,) of the parameters.
+    """
     errors = root_of(found.prior_covariance, FIT.min_error_share).T
     without = tuple(arm(values) for values in found.replicates)
     result = replace(
@@ -154,7 +168,6 @@ def _with_torque(
         arms_without_cluster=without,
         row_error_arms=without,
         prior_error_arms=tuple(arm(found.value + error) for error in errors),
-        noise=noise,
     )
     return result, errors
 
@@ -178,16 +191,7 @@ def _with_wrench(
     def arm(values: Array) -> FittedArm:
         return replace(fitted.arm, link_change=values - own)
 
-    without = tuple(arm(values) for values in found.replicates)
-    errors = root_of(found.prior_covariance, FIT.min_error_share).T
-    return replace(
-        fitted,
-        arm=arm(found.value),
-        estimate=found,
-        arms_without_cluster=without,
-        row_error_arms=without,
-        prior_error_arms=tuple(arm(found.value + error) for error in errors),
-    )
+    return _with_estimate(fitted, found, arm)[0]
 
 
 def _with_power(
