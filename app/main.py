@@ -52,7 +52,7 @@ from joulepath.app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
 from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
-from joulepath.app.tasks.in_flight import InFlight
+from joulepath.app.tasks.answer_cache import InFlight
 
 ROUTES = (
     optimize,

@@ -1,11 +1,15 @@
-"""The client of a request, for limits, logs and ownership."""
+"""The client of a request, for limits, logs and ownership; the role that a request needs; owners.
+Every path that is not listed here needs a key.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address, ip_address
+from typing import get_args
 
-from joulepath.app.exceptions.access import Role
+from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow
 
 Address = IPv4Address | IPv6Address
 
@@ -52,3 +56,33 @@ def _network(text: str) -> str:
     if isinstance(address, IPv6Address):
         return f"{IPv6Address(int(address) >> _IPV6_PREFIX << _IPV6_PREFIX)}/{_IPV6_PREFIX}"
     return text if address is None else str(address)
+
+
+PUBLIC = re.compile(
+    r"/healthz|/readyz|/openapi\.json|/redoc|/docs(/[^/]+)?|/problems/[^/]+|/|/studio(/\w[\w.-]*)*"
+    r"|/help(/|(/\w[\w.-]*)*/?)"
+)
+"""Paths without user data: probes, documentation, problem pages, the studio page."""
+_READING = ("GET", "HEAD", "OPTIONS")
+# it answers a question, but takes the workers' time
+_COMPUTING = re.compile(r"/studies/[^/]+/suggest")
+
+
+def needed_role(method: str, path: str) -> Role | None:
+    """The role required by a request; None without a key. `path` may be a route's template."""
+    if method in _READING and PUBLIC.fullmatch(path):
+        return None
+    return "read" if method in _READING and not _COMPUTING.fullmatch(path) else "compute"
+
+
+def check_role(client: Client, needed: Role) -> None:
+    """Raises RoleTooLow."""
+    order = get_args(Role)
+    if order.index(client.role) < order.index(needed):
+        raise RoleTooLow(client.role, needed)
+
+
+def check_owner(client: Client, owner: str | None) -> None:
+    """Raises NotOwner unless the client owns the object or is an administrator."""
+    if client.role != "admin" and (owner is None or client.owner != owner):
+        raise NotOwner(owner)

@@ -1,6 +1,10 @@
-"""Exit codes of `joulepath`, see `joulepath --help`."""
+"""Ends of commands: their exit codes, and Ctrl-C even if compiled code drops the exception."""
 
 from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 ANSWERED = 0
 PROBLEM = 1
@@ -26,3 +30,28 @@ def of_error(error: Exception) -> int:
         )
         else PROBLEM
     )
+
+
+# processor time [s] after which a dropped interrupt is raised again
+PERIOD = 0.5
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Raises KeyboardInterrupt at Ctrl-C, and again until it leaves the body.
+
+    Python drops exceptions in finalisers and in callbacks of compiled code.
+    """
+
+    def interrupt(*_: object) -> None:
+        signal.setitimer(signal.ITIMER_VIRTUAL, PERIOD)
+        raise KeyboardInterrupt
+
+    numbers = (signal.SIGINT, signal.SIGVTALRM)
+    previous = [signal.signal(number, interrupt) for number in numbers]
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        for number, handler in zip(numbers, previous, strict=True):
+            signal.signal(number, handler)

@@ -8,20 +8,17 @@ import click
 
 from joulepath import __version__
 from joulepath.app.cli.answer import Refused
-from joulepath.app.cli.cluster_worker import cluster_worker
 from joulepath.app.cli.evaluate import evaluate
-from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID
+from joulepath.app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, interruptible
 from joulepath.app.cli.export import export
 from joulepath.app.cli.identify import identify
 from joulepath.app.cli.ik import ik
-from joulepath.app.cli.interrupts import interruptible
 from joulepath.app.cli.jobs import jobs
 from joulepath.app.cli.keys import keys
 from joulepath.app.cli.rename import rename
 from joulepath.app.cli.replay import replay
 from joulepath.app.cli.report import check, report
 from joulepath.app.cli.robots import robots
-from joulepath.app.cli.ros2 import ros2
 from joulepath.app.cli.searches import (
     compare,
     cycle,
@@ -31,7 +28,7 @@ from joulepath.app.cli.searches import (
     placement,
     whatif,
 )
-from joulepath.app.cli.serve import serve
+from joulepath.app.cli.serve import cluster_worker, ros2, serve
 from joulepath.app.cli.studies import studies
 from joulepath.app.cli.tools import tools
 

@@ -1,10 +1,13 @@
-"""`joulepath serve`."""
+"""Commands that run until they are stopped: `joulepath serve`, `cluster-worker` and `ros2`."""
 
 from __future__ import annotations
 
+import asyncio
 import os
 
 import click
+
+from joulepath.app.cli.answer import refused
 
 
 @click.command(
@@ -41,3 +44,62 @@ def serve(host: str | None, port: int | None) -> None:
     from joulepath.app.__main__ import main
 
     main()
+
+
+@click.command(
+    epilog="""\b
+Example:
+  joulepath cluster-worker tcp://scheduler:8786"""
+)
+@click.argument("scheduler")
+def cluster_worker(scheduler: str) -> None:
+    """Works on jobs for the Dask scheduler at SCHEDULER, `tcp://HOST:PORT`.
+
+    JOULEPATH_WORKERS processes compute, by default one per CPU. Services with
+    JOULEPATH_CLUSTER=SCHEDULER send the work. SIGTERM and Ctrl-C end the command with 0; other
+    machines repeat its unfinished work.
+    """
+    from joulepath.app.settings import WrongSettings, read_settings
+
+    try:
+        settings = read_settings({"cluster": scheduler})
+    except WrongSettings as error:
+        raise click.UsageError(str(error)) from None
+
+    from joulepath.app.cluster.dask_worker import serve
+    from joulepath.app.engine.forkserver import start_forkserver
+    from joulepath.app.logs import configure_logging
+
+    start_forkserver()
+    configure_logging(settings.log_level)
+    asyncio.run(serve(scheduler, settings))
+
+
+@click.command(
+    context_settings={"ignore_unknown_options": True},
+    epilog="""\b
+Examples:
+  joulepath ros2 --ros-args -p robot:=ur5e
+  joulepath ros2 --ros-args -p robot:=ur5e \\
+    -r '~/trajectory:=/joint_trajectory_controller/joint_trajectory'""",
+)
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+def ros2(arguments: tuple[str, ...]) -> None:
+    """Starts a ROS 2 node that plans motions, see docs/reference/ros2.md.
+
+    ARGUMENTS are those of any node: --ros-args, then parameters and remappings. Needs the packages
+    of joulepath[ros2], or an installation of ROS 2.
+    """
+    from joulepath.optimizer.exceptions import DeclaredError
+    from joulepath.optimizer.presentation.extras import required
+
+    try:
+        required("rclpy", "joulepath ros2", "joulepath[ros2]")
+    except ModuleNotFoundError as error:
+        raise click.ClickException(str(error)) from None
+    from joulepath.app.ros2.node import main
+
+    try:
+        main(list(arguments))
+    except DeclaredError as error:
+        raise refused(error) from None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from joulepath.app.cluster.machine import RESOURCES, compute, resource, version
-from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.engine.task import Ended, Take, Work
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.progress import no_listener
 

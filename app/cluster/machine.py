@@ -18,9 +18,8 @@ from weakref import WeakKeyDictionary
 
 import joulepath
 from joulepath.app.engine.pool import Engine
-from joulepath.app.engine.task import Task
+from joulepath.app.engine.task import Ended, Task, Work, taking
 from joulepath.app.engine.warm_up import warm
-from joulepath.app.engine.work import Ended, Work, taking
 from joulepath.app.exceptions.queue import WorkerLost
 from joulepath.app.settings import read_settings
 from joulepath.optimizer.progress import Told, no_listener

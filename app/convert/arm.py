@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import orjson
 
-from joulepath.app.convert.identified import with_figures
-from joulepath.app.convert.own_robots import own_figures_of, own_robot_of
 from joulepath.app.convert.pose import to_base
+from joulepath.app.convert.robots import own_figures_of, own_robot_of, with_figures
 from joulepath.app.convert.scene import to_attachment, to_scene
 from joulepath.app.convert.tool import to_tcp, to_tool, with_tool
 from joulepath.app.schemas import arm as asked

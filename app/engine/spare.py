@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from joulepath.app.engine.fair_queue import PATIENCE, FairQueue
-from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.engine.task import Ended, Take, Work
 from joulepath.app.engine.worker import Worker
 from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded

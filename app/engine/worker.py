@@ -23,8 +23,7 @@ from typing import Any, TypeVar
 from joulepath.app.engine.forkserver import CONTEXT
 from joulepath.app.engine.listening import Listener, listening
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.engine.task import Task, outcome
-from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.engine.task import Ended, Take, Task, Work, outcome
 from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.app.logs import configure_logging
 from joulepath.optimizer.deadline import Stopped, stoppable

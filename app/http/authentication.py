@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from starlette.requests import Request
 
+from joulepath.app.access.client import check_role, needed_role
 from joulepath.app.access.key_ring import KeyRing
-from joulepath.app.access.rules import check_role, needed_role
 from joulepath.app.exceptions.access import Unauthenticated, WrongKey
 from joulepath.app.http.client import client_of
 

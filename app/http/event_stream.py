@@ -1,4 +1,4 @@
-"""Answers by server-sent events: events of the work, and finally its answer."""
+"""Answers by server-sent events: events of the work as JSON, and finally its answer."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from fastapi import Request
 from starlette.responses import StreamingResponse
 from starlette.types import Message, Receive, Scope, Send
 
-from joulepath.app.convert.progress import to_event
+from joulepath.app.convert.fields import fields
 from joulepath.app.engine.result import TaskResult, json_document
 from joulepath.app.http.disconnect import unless_disconnected
 from joulepath.app.http.handlers import problem_response
 from joulepath.optimizer.exceptions import DeclaredError
-from joulepath.optimizer.progress import Event, Tell, only_news
+from joulepath.optimizer.presentation.gap import optimality_gap
+from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Tell, only_news
 
 logger = logging.getLogger(__name__)
 
@@ -126,3 +127,17 @@ class EventStream(StreamingResponse):
 
 def _body(content: bytes) -> Message:
     return {"type": "http.response.body", "body": content, "more_body": True}
+
+
+def to_event(event: Event) -> tuple[str, dict[str, Any]]:
+    """Name and content of an event."""
+    if isinstance(event, CandidatesFound):
+        return "candidates", fields(event, "total")
+    if isinstance(event, CandidateTried):
+        return "candidate", fields(event, "index", "status", "bound", "energy")
+    gap = None if event.bound is None else optimality_gap(event.bound, event.energy)
+    return "incumbent", {
+        **fields(event, "energy", "duration", "bound"),
+        "gap": gap,
+        **fields(event, "q_goal"),
+    }

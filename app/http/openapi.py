@@ -13,7 +13,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from joulepath.app.access.rules import needed_role
+from joulepath.app.access.client import needed_role
 from joulepath.app.api.logs.request import LogSettings
 from joulepath.app.engine.result import json_document
 from joulepath.app.exceptions.access import CrossSite, RoleTooLow, Unauthenticated, WrongHost

@@ -9,8 +9,7 @@ from urllib.parse import urlsplit
 
 from starlette.requests import Request
 
-from joulepath.app.access.client import address_of
-from joulepath.app.access.rules import needed_role
+from joulepath.app.access.client import address_of, needed_role
 from joulepath.app.exceptions.access import CrossSite, WrongHost
 
 EVERYONE = "*"

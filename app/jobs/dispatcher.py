@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from functools import partial
 
-from joulepath.app.engine.work import Ended
+from joulepath.app.engine.task import Ended
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.stored import StoreUnavailable
 from joulepath.app.jobs.changes import Changes

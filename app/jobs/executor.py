@@ -13,8 +13,7 @@ from joulepath.app.convert.packed import unpacked
 from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.engine.task import Task
-from joulepath.app.engine.work import Ended, Take, Work, result_of
+from joulepath.app.engine.task import Ended, Take, Task, Work, result_of
 from joulepath.app.exceptions.queue import Preempted
 from joulepath.app.exceptions.stored import UnknownFigures, UnknownLog
 from joulepath.app.store.store import Store

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from joulepath.app.engine.work import Ended, Work
+from joulepath.app.engine.task import Ended, Work
 from joulepath.app.jobs.progress import HEARD, Found
 from joulepath.app.jobs.work import RETRY, task_of
 from joulepath.app.store.cache import Asked

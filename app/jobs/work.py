@@ -11,7 +11,7 @@ from typing import Any
 import orjson
 
 from joulepath.app.engine.result import TaskResult, json_document
-from joulepath.app.engine.work import Ended
+from joulepath.app.engine.task import Ended
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import (
     ClusterUnavailable,

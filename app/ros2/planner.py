@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.client.client import Client
 from joulepath.app.convert.arm import robot_named, to_arm
-from joulepath.app.convert.own_robots import own_robot_named
+from joulepath.app.convert.robots import own_robot_named
 from joulepath.app.engine.result import json_document
 from joulepath.app.http.problems import invalid_request
 from joulepath.app.ros2.messages import Json

@@ -15,8 +15,7 @@ from joulepath.app.api.whatif.task import WhatifRequest
 from joulepath.app.schemas.common import Request, Response, by_field, described, part
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import ANSWER_PATH, CREATED, EVALUATE, JOB_ID, OPTIMIZE
-from joulepath.app.schemas.naming import Name, search_in
-from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.queries import Name, Query, after_of, limit_of, next_of, search_in
 from joulepath.app.schemas.request import OptimizeRequest
 
 MOST_REQUESTS = 10_000

@@ -1,12 +1,15 @@
-"""What query strings have in common: `Query`, and the page of a list that is asked for."""
+"""What query strings have in common: `Query`, the page of a list that is asked for, and the search
+for the names that clients give to what the service keeps.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, Field
 
-from joulepath.app.schemas.common import Request, described
+from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
+from joulepath.app.schemas.lengths import LENGTHS
 
 PAGE_PATTERN = r"^[0-9]{1,16}_[0-9a-f-]{36}$"
 
@@ -45,3 +48,19 @@ def next_of(example_id: str) -> Any:
 
 def _position(example_id: str) -> str:
     return f"1741944413589793_{example_id}"
+
+
+Name = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CONTROLS), PLAIN]
+
+
+class NewName(Request):
+    """Another name of something that the service keeps."""
+
+    name: Name | None = described("The name. Null: none.", None, "Night cell")
+
+
+def search_in(places: str) -> Any:
+    """The field `search` of the page of a list, whose texts are in `places`."""
+    return described(
+        f"A text in {places}, in upper or lower case. Null: any.", None, "night", default=None
+    )

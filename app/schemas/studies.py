@@ -20,8 +20,7 @@ from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.figures import FIGURES_ID
 from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
 from joulepath.app.schemas.lengths import LENGTHS
-from joulepath.app.schemas.naming import Name, search_in
-from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.queries import Name, Query, after_of, limit_of, next_of, search_in
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.result.energy import Objective
 

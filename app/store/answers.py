@@ -11,8 +11,7 @@ from sqlalchemy import Select, and_, func, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client
-from joulepath.app.access.rules import check_owner
+from joulepath.app.access.client import Client, check_owner
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import AnswerInUse, UnknownAnswer

@@ -10,8 +10,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from joulepath.app.access.client import Client
-from joulepath.app.access.rules import check_owner
+from joulepath.app.access.client import Client, check_owner
 from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
 from joulepath.app.store.tables import Figures, Study, by_id, now
 

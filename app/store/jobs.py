@@ -10,8 +10,7 @@ from sqlalchemy import ColumnElement, Select, func, insert, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client
-from joulepath.app.access.rules import check_owner
+from joulepath.app.access.client import Client, check_owner
 from joulepath.app.exceptions.queue import TooManyWaiting
 from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownJob
 from joulepath.app.store.cache import Meaning

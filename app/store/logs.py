@@ -6,8 +6,7 @@ from sqlalchemy import delete as delete_from
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client
-from joulepath.app.access.rules import check_owner
+from joulepath.app.access.client import Client, check_owner
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
 from joulepath.app.store.paging import having, page_of
 from joulepath.app.store.tables import StoredLog, by_id

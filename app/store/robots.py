@@ -5,8 +5,7 @@ from __future__ import annotations
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from joulepath.app.access.client import Client
-from joulepath.app.access.rules import check_owner
+from joulepath.app.access.client import Client, check_owner
 from joulepath.app.exceptions.stored import BundledRobot, RobotExists, TooManyRobots
 from joulepath.app.store.tables import OwnRobot
 from joulepath.models.registry import robot_names

@@ -9,8 +9,7 @@ from sqlalchemy import delete as delete_from
 from sqlalchemy import select
 from sqlalchemy.orm import Session, defer
 
-from joulepath.app.access.client import Client
-from joulepath.app.access.rules import check_owner
+from joulepath.app.access.client import Client, check_owner
 from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import KeyReused, UnknownIteration, UnknownStudy
 from joulepath.app.store import answers, cache

@@ -9,9 +9,8 @@ from functools import partial
 from typing import Any, Protocol
 
 from joulepath.app.api.report.request import MOST_ROWS
-from joulepath.app.convert.identified import Identified, identified_as
-from joulepath.app.convert.own_robots import own_robot_named, own_robot_of
 from joulepath.app.convert.recorded import GivenLog, log_given
+from joulepath.app.convert.robots import Identified, identified_as, own_robot_named, own_robot_of
 from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.task import Task

@@ -33,8 +33,7 @@ from joulepath.app.api.pareto.task import ParetoRequest, ParetoTask
 from joulepath.app.convert.json_text import sent
 from joulepath.app.engine import forkserver, pool
 from joulepath.app.engine.result import StoredAnswer, TaskResult
-from joulepath.app.engine.task import Task, outcome
-from joulepath.app.engine.work import Ended, Take, Work
+from joulepath.app.engine.task import Ended, Take, Task, Work, outcome
 from joulepath.app.main import create_app
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.settings import Settings

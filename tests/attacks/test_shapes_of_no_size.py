@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from joulepath.app.convert.arm import to_arm
-from joulepath.app.convert.own_robots import own_robot_of
+from joulepath.app.convert.robots import own_robot_of
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.models.own_arm.description import Collision, InvalidArm

@@ -17,7 +17,7 @@ import crossplane
 import pytest
 import yaml
 
-from joulepath.app.cli.cluster_worker import cluster_worker
+from joulepath.app.cli.serve import cluster_worker
 from joulepath.app.settings import Settings
 from scripts.build_docs import sources
 from tests.app.live import ROOT

@@ -10,8 +10,15 @@ from pydantic import Field
 from joulepath.app.schemas.common import NO_CONTROLS, Response, described, part
 from joulepath.app.schemas.examples.values import ANSWER_ID, CREATED, JOB_ID, OPTIMIZE
 from joulepath.app.schemas.lengths import LENGTHS
-from joulepath.app.schemas.naming import Name, NewName, search_in
-from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.queries import (
+    Name,
+    NewName,
+    Query,
+    after_of,
+    limit_of,
+    next_of,
+    search_in,
+)
 
 Pointer = Annotated[str, Field(max_length=LENGTHS.pointer, pattern=NO_CONTROLS)]
 TypedNumber = Annotated[str, Field(max_length=LENGTHS.number, pattern=NO_CONTROLS)]

@@ -12,8 +12,7 @@ from joulepath.app.api.identifications.answer import IdentificationResult
 from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.figures import FIGURES_ID
 from joulepath.app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
-from joulepath.app.schemas.naming import Name, search_in
-from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.queries import Name, Query, after_of, limit_of, next_of, search_in
 
 _RESULT: Any = model_of(IdentificationResult)
 

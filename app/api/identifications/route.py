@@ -38,7 +38,7 @@ from joulepath.app.http.handlers import result_response
 from joulepath.app.http.json_route import JsonRoute
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import IDENTIFICATION_ID
-from joulepath.app.schemas.naming import NewName
+from joulepath.app.schemas.queries import NewName
 from joulepath.app.store import answers
 from joulepath.app.store import jobs as stored_jobs
 from joulepath.app.store import logs as stored_logs

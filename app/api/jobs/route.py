@@ -35,10 +35,9 @@ from joulepath.app.http.openapi import problem_responses
 from joulepath.app.http.weights import JSON
 from joulepath.app.jobs.answers import as_csv, as_lines, detail, summary
 from joulepath.app.jobs.events import events_after
-from joulepath.app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
-from joulepath.app.schemas.examples.values import JOB_ID
+from joulepath.app.schemas.examples.values import JOB_ID, RESULTS_CSV, RESULTS_LINES
 from joulepath.app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
-from joulepath.app.schemas.naming import NewName
+from joulepath.app.schemas.queries import NewName
 from joulepath.app.store import jobs as stored_jobs
 from joulepath.app.tasks.job_body import JobBodyTask, Validated
 from joulepath.app.tasks.job_request import IDENTIFY

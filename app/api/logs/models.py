@@ -8,8 +8,7 @@ from typing import Literal
 from joulepath.app.schemas.common import Response, described, part
 from joulepath.app.schemas.examples.values import CREATED, LOG_ID
 from joulepath.app.schemas.log_file import EffortMeaning
-from joulepath.app.schemas.naming import Name, search_in
-from joulepath.app.schemas.queries import Query, after_of, limit_of, next_of
+from joulepath.app.schemas.queries import Name, Query, after_of, limit_of, next_of, search_in
 
 
 class LogChannel(Response):

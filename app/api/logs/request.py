@@ -9,7 +9,7 @@ from pydantic import Field
 from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, RobotName, Vector3, described
 from joulepath.app.schemas.log_file import LogFile
-from joulepath.app.schemas.naming import Name
+from joulepath.app.schemas.queries import Name
 
 Tag = Annotated[str, Field(min_length=1, max_length=32, pattern=NO_CONTROLS), PLAIN]
 

@@ -26,7 +26,7 @@ from joulepath.app.exceptions.transport import UnsupportedMediaType
 from joulepath.app.http.json_route import UNDECLARED, JsonRoute, media_type
 from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.examples.values import LOG_ID
-from joulepath.app.schemas.naming import NewName
+from joulepath.app.schemas.queries import NewName
 from joulepath.app.store import logs
 from joulepath.app.store.tables import StoredLog, new_id, now
 from joulepath.optimizer.exceptions import InvalidTable

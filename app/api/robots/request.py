@@ -10,9 +10,8 @@ from pydantic import Field
 from joulepath.app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from joulepath.app.schemas.examples.own_arm import URDF
 from joulepath.app.schemas.lengths import LENGTHS
-from joulepath.app.schemas.naming import Name as SearchText
-from joulepath.app.schemas.naming import search_in
-from joulepath.app.schemas.queries import Query
+from joulepath.app.schemas.queries import Name as SearchText
+from joulepath.app.schemas.queries import Query, search_in
 from joulepath.models.own_arm.description import PLAUSIBLE
 from joulepath.models.shape_sizes import SIZES
 

@@ -17,9 +17,8 @@ from joulepath.app.http.metrics import Metrics
 from joulepath.app.jobs.jobs import Jobs
 from joulepath.app.settings import Settings
 from joulepath.app.store.store import Store
-from joulepath.app.tasks.answer_cache import AnswerCache
+from joulepath.app.tasks.answer_cache import AnswerCache, InFlight
 from joulepath.app.tasks.arm_engine import ArmEngine
-from joulepath.app.tasks.in_flight import InFlight
 
 # coroutines, because FastAPI would run plain functions in a thread
 

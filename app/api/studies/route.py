@@ -17,7 +17,7 @@ from joulepath.app.api.shared.parameters import (
     WantedFormat,
     set_location,
 )
-from joulepath.app.convert.identified import identified_as, with_figures
+from joulepath.app.convert.robots import identified_as, with_figures
 from joulepath.app.exceptions.access import NotOwner
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown, WorkerLost
@@ -29,7 +29,7 @@ from joulepath.app.exceptions.stored import (
 )
 from joulepath.app.exceptions.transport import BodyTooLarge, RequestTimeout
 from joulepath.app.http.openapi import problem_responses
-from joulepath.app.schemas.examples.studies import STUDY_CSV
+from joulepath.app.schemas.examples.values import STUDY_CSV
 from joulepath.app.schemas.studies import (
     Study,
     StudyList,

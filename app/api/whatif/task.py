@@ -32,7 +32,7 @@ from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.schemas.common import Request, described
 from joulepath.app.schemas.evaluate import EvaluateRequest
 from joulepath.app.schemas.examples.values import EVALUATE, OPTIMIZE
-from joulepath.app.schemas.naming import Name
+from joulepath.app.schemas.queries import Name
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.app.tasks.answer_collector import AnswerCollector, certified

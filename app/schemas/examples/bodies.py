@@ -9,8 +9,7 @@ from math import cos, pi
 from joulepath.app.schemas.examples.figures import FIGURES_EXAMPLES
 from joulepath.app.schemas.examples.files import Example, body_examples, shown
 from joulepath.app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
-from joulepath.app.schemas.examples.studies import ITERATION_EXAMPLES
-from joulepath.app.schemas.examples.values import LOG_ID, OTHER_LOG_ID
+from joulepath.app.schemas.examples.values import ITERATION_EXAMPLES, LOG_ID, OTHER_LOG_ID
 
 _PERIOD = 0.05
 _ROWS = 61

@@ -1,8 +1,10 @@
-"""Values that the examples of several schemas share."""
+"""Values that the examples of several schemas share, and examples of jobs and studies."""
 
 from __future__ import annotations
 
 from typing import Any
+
+from joulepath.app.schemas.examples.files import Example, body_examples
 
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 """Joint positions [rad] with the tool pointing down."""
@@ -52,3 +54,42 @@ MESH_FILE = (
 def at(x: float, y: float, z: float) -> dict[str, list[float]]:
     """A pose at a position [m], not rotated."""
     return {"position": [x, y, z], "rotvec": [0.0, 0.0, 0.0]}
+
+
+RESULTS_CSV = (
+    "index,name,kind,state,attempt,wall_time_s,energy_J,duration_s,status,answer,problem\n"
+    f"0,bin to shelf,optimize,done,1,0.21,57.5,1.33,optimal,{ANSWER_PATH},\n"
+    "1,shelf to bin,optimize,failed,1,0.02,,,,,duration-too-short\n"
+)
+"""Results as CSV."""
+RESULTS_LINES = (
+    '{"index":0,"name":"bin to shelf","kind":"optimize","state":"done","attempt":1,'
+    '"wall_time":0.21,"energy":57.5,"duration":1.33,'
+    f'"status":"optimal","answer":"{ANSWER_PATH}","problem":null,"result":{{"robot":"ur5e"}}}}\n'
+)
+"""Results as lines of JSON; the answer is abridged."""
+
+
+_OPTIMIZE = body_examples("/optimize")["application/json"]
+ITERATION_EXAMPLES: dict[str, Example] = {
+    "evaluate": {
+        "summary": "The energy of the present motion",
+        "value": {
+            "evaluate": {
+                "configurations": [HOME, [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]],
+                "time_per_segment": 3.0,
+            }
+        },
+    }
+}
+ITERATION_EXAMPLES |= {
+    name: {"summary": _OPTIMIZE[name]["summary"], "value": {"optimize": _OPTIMIZE[name]["value"]}}
+    for name in ("time_scaling", "joint_to_pose")
+}
+
+STUDY_CSV = (
+    "iteration,created,kind,energy_J,electrical_J,mechanical_J,duration_s,change_from_last_J,"
+    "change_from_best_J,threshold_met,answer\n"
+    f"1,2025-03-14T09:26:53.589793+00:00,optimize,96.1,96.1,31.9,1.33,,,false,{ANSWER_ID}\n"
+)
+"""The history of a study as CSV."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from joulepath.app.access.client import Client
-from joulepath.app.access.rules import check_owner, check_role, needed_role
+from joulepath.app.access.client import Client, check_owner, check_role, needed_role
 from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow
 
 

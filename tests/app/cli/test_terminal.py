@@ -16,7 +16,7 @@ from tempfile import TemporaryFile
 
 import pytest
 
-from joulepath.app.cli.interrupts import interruptible
+from joulepath.app.cli.exit_codes import interruptible
 from tests.app.cli.console import COMMAND, PATIENCE, ROOT, Here, environment, request
 from tests.app.forks import Fork
 from tests.app.requests import AMPLE, long_search

@@ -23,8 +23,7 @@ from joulepath.app.cluster import machine as app_machine
 from joulepath.app.cluster.link import LINK, Cluster
 from joulepath.app.cluster.machine import RESOURCES
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.engine.task import Task
-from joulepath.app.engine.work import Ended, Work, result_of, taking
+from joulepath.app.engine.task import Ended, Task, Work, result_of, taking
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.exceptions import OutsideLimits

@@ -12,8 +12,7 @@ from functools import partial
 
 import pytest
 
-from joulepath.app.engine.task import outcome
-from joulepath.app.engine.work import result_of
+from joulepath.app.engine.task import outcome, result_of
 from joulepath.app.exceptions.base import InternalError, InvalidRequest
 from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits

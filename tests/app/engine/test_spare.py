@@ -12,7 +12,7 @@ import pytest
 
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.engine.spare import PATIENCE
-from joulepath.app.engine.work import Ended, Work, result_of, taking
+from joulepath.app.engine.task import Ended, Work, result_of, taking
 from joulepath.app.exceptions.queue import Preempted, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from tests.app.engine.bench import DEADLINE_GRACE, LONG, Bench, settings, until

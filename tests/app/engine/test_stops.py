@@ -15,7 +15,7 @@ import pytest
 
 from joulepath.app.engine import pool
 from joulepath.app.engine.fair_queue import PATIENCE
-from joulepath.app.engine.work import result_of
+from joulepath.app.engine.task import result_of
 from joulepath.app.exceptions.base import ServiceError
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
 from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError

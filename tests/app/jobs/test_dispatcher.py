@@ -17,7 +17,7 @@ from joulepath.app.access.client import OPERATOR
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.listening import Listener
 from joulepath.app.engine.result import TaskResult
-from joulepath.app.engine.work import Take
+from joulepath.app.engine.task import Take
 from joulepath.app.exceptions.queue import ClusterUnavailable, Preempted, WorkerLost
 from joulepath.app.jobs import dispatcher as module
 from joulepath.app.jobs.dispatcher import LEASE, Dispatcher

@@ -12,7 +12,7 @@ import pytest
 
 from joulepath.app.convert.packed import packed
 from joulepath.app.convert.recorded import GivenLog
-from joulepath.app.engine.work import Ended, Take, Work, taking
+from joulepath.app.engine.task import Ended, Take, Work, taking
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.queue import ClusterUnavailable
 from joulepath.app.jobs.executor import ClusterExecutor, LocalExecutor

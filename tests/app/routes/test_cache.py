@@ -24,9 +24,8 @@ from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
 from joulepath.app.store.tables import CachedAnswer
 from joulepath.app.tasks import answer_cache
-from joulepath.app.tasks.answer_cache import AnswerCache
+from joulepath.app.tasks.answer_cache import AnswerCache, InFlight
 from joulepath.app.tasks.answer_collector import figures_of
-from joulepath.app.tasks.in_flight import InFlight
 from joulepath.app.tasks.read_body import HeldBody
 from tests.app.job_clients import ended
 from tests.app.requests import HOME, NEAR, move

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.access.rules import needed_role
+from joulepath.app.access.client import needed_role
 from joulepath.app.api.shared import static_folder
 from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.transport import NotFound, PagesNotBuilt

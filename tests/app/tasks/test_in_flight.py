@@ -9,7 +9,7 @@ import pytest
 from joulepath.app.engine.result import TaskResult
 from joulepath.app.exceptions.queue import Busy
 from joulepath.app.store.cache import Asked
-from joulepath.app.tasks.in_flight import InFlight
+from joulepath.app.tasks.answer_cache import InFlight
 from joulepath.optimizer.exceptions import OutsideLimits
 
 ASKED = Asked("key", 10.0)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 import orjson
 from fastapi import APIRouter, Path, Request, Response
 
-from joulepath.app.access.rules import check_owner
+from joulepath.app.access.client import check_owner
 from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.optimize.task import OptimizeTask
 from joulepath.app.api.shared.dependencies import ServiceCache, ServiceStore
