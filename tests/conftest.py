@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.app.forks import fork_forkserver, start_origin
 from tests.compilers import with_compiler, without_compiler
 
 if TYPE_CHECKING:
@@ -74,6 +75,14 @@ def pytest_collection() -> Iterator[None]:
         atexit.register(gc.unfreeze)
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Makes what all processes that run tests share: a folder, and the process whose forks are the
+    programs under test, which loads the package while the others load the tests."""
+    os.environ.setdefault("PYTEST_SHARED_FOLDER", DATABASES.name)
+    if config.getoption("numprocesses", None):
+        start_origin()
+
+
 def pytest_unconfigure() -> None:
     DATABASES.cleanup()
 
@@ -89,6 +98,12 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def _without_compiler() -> Iterator[None]:
     with without_compiler():
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _forked_workers() -> None:
+    """Workers of services in this process are its forks: nothing is imported for them again."""
+    fork_forkserver()
 
 
 @pytest.fixture

@@ -38,8 +38,8 @@ def test_the_node_in_an_environment_with_rclpy(only: str) -> None:
         "PYTHONPATH": str(ROOT),
     }
     # variables of the surrounding run, which is another one
-    for name in ("PYTEST_ADDOPTS", "PYTEST_XDIST_WORKER", "PYTEST_XDIST_WORKER_COUNT"):
-        environment.pop(name, None)
+    for name in ("ADDOPTS", "FORKS", "SHARED_FOLDER", "XDIST_WORKER", "XDIST_WORKER_COUNT"):
+        environment.pop(f"PYTEST_{name}", None)
     done = subprocess.run(
         [*command, "-p", "no:cacheprovider"],
         cwd=ROOT,

@@ -12,12 +12,14 @@ import functools
 import json
 import os
 import runpy
+import select
 import signal
 import socket
 import struct
 import subprocess
 import sys
 import threading
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -31,6 +33,8 @@ ROOT = Path(__file__).parents[2]
 LONGEST = 1 << 17
 """Most bytes of a request for a fork: the environment is the largest part of it."""
 NUMBER = struct.Struct("i")
+ORIGIN = "PYTEST_FORKS"
+"""Variable with the address of the process that forks."""
 
 
 class Fork:
@@ -113,34 +117,59 @@ def _number(told: socket.socket) -> int:
 
 @functools.cache
 def _origin() -> socket.socket:
-    """The way to the process that forks, which ends with this one."""
-    way, end = socket.socketpair(type=socket.SOCK_SEQPACKET)
-    with end:
-        command = [sys.executable, "-m", "tests.app.forks"]
-        # as workers have it
-        one_thread = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-        process = subprocess.Popen(command, cwd=ROOT, stdin=end.fileno(), env=one_thread)
-    atexit.register(process.wait)
-    atexit.register(way.close)
+    """The way to the process that forks, which ends with the last process that has a way to it."""
+    address = os.environ.get(ORIGIN) or start_origin()
+    way = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    way.connect(f"\0{address}")
     return way
 
 
+def start_origin() -> str:
+    """Starts the process that forks, for this process and those that it starts: to import the
+    package takes as long as the tests of a room. Returns its address."""
+    address = f"joulepath-forks-{os.getpid()}"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(f"\0{address}")
+        listening.listen()
+        command = [sys.executable, "-m", "tests.app.forks"]
+        # as workers have it
+        one_thread = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+        process = subprocess.Popen(command, cwd=ROOT, stdin=listening.fileno(), env=one_thread)
+    os.environ[ORIGIN] = address
+    atexit.register(process.wait)
+    atexit.register(_origin().close)
+    return address
+
+
 def _asked() -> list[str]:
-    """Forks at each request until there are no more. A fork returns the name of its module and its
-    arguments; a second one beside it tells of its end."""
-    requests = socket.socket(fileno=os.dup(0))
+    """Forks at each request until all that could ask have ended. A fork returns the name of its
+    module and its arguments; a second one beside it tells of its end."""
+    listening = socket.socket(fileno=os.dup(0))
+    ways: list[socket.socket] = []
     while True:
-        request, given, _, _ = socket.recv_fds(requests, LONGEST, 4)
-        with suppress(ChildProcessError):
-            while os.waitpid(-1, os.WNOHANG)[0]:
-                pass  # one that has ended
-        if not request:
-            os._exit(0)
-        if os.fork() == 0:
-            break
-        for each in given:
-            os.close(each)
-    requests.close()
+        for ready in select.select([listening, *ways], [], [])[0]:
+            if ready is listening:
+                ways.append(listening.accept()[0])
+                continue
+            request, given, _, _ = socket.recv_fds(ready, LONGEST, 4)
+            with suppress(ChildProcessError):
+                while os.waitpid(-1, os.WNOHANG)[0]:
+                    pass  # one that has ended
+            if request and os.fork() == 0:
+                for each in (listening, *ways):
+                    each.close()
+                return _begun(request, given)
+            for number in given:
+                os.close(number)
+            if not request:
+                ready.close()
+                ways.remove(ready)
+                if not ways:
+                    os._exit(0)
+
+
+def _begun(request: bytes, given: list[int]) -> list[str]:
+    """The name of the module of a fork and its arguments, in the fork itself."""
     told = given.pop()
     program = os.fork()
     for number, stream in enumerate(given):
@@ -159,7 +188,7 @@ def _asked() -> list[str]:
     return arguments  # type: ignore[no-any-return]
 
 
-def _fork_forkserver() -> None:
+def fork_forkserver() -> None:
     """Workers of a service are forked from a process that `multiprocessing` starts: here it is a
     fork of the service, which has imported all that it would import."""
     start = util.spawnv_passfds
@@ -168,7 +197,10 @@ def _fork_forkserver() -> None:
         code = arguments[-1]
         if "multiprocessing.forkserver" not in code:
             return start(path, arguments, passed)
-        process = os.fork()
+        with warnings.catch_warnings():
+            # the threads of a process that runs tests hold nothing that the fork needs
+            warnings.simplefilter("ignore", DeprecationWarning)
+            process = os.fork()
         if process == 0:
             kept = sorted({2, *passed, os.sysconf("SC_OPEN_MAX")})
             for one, other in pairwise(kept):
@@ -206,7 +238,7 @@ if __name__ == "__main__":
     for each in ("joulepath.app.main", "toppra"):  # what services, workers and commands import
         import_module(each)
     sys.argv = _asked()
-    _fork_forkserver()
+    fork_forkserver()
     if sys.argv[0] == "-c":
         exec(sys.argv.pop(1), {"__name__": "__main__"})
     else:

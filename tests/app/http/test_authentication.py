@@ -17,10 +17,8 @@ import pytest
 from joulepath.app.access.key_file import changing, hash_of
 from joulepath.app.exceptions.access import NotOwner, RoleTooLow, Unauthenticated
 from joulepath.app.exceptions.stored import AnswerInUse, KeyReused, UnknownAnswer
-from joulepath.app.main import create_app
 from joulepath.app.schemas.examples.own_arm import PUT_EXAMPLES
 from joulepath.app.schemas.examples.values import STUDY_ID
-from joulepath.app.settings import Settings
 from tests.app.access.test_key_file import add
 from tests.app.databases import opened
 from tests.app.documents import open_document
@@ -72,11 +70,9 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
 
 
 @pytest.fixture(scope="module")
-def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def document(guarded: Guarded) -> dict[str, Any]:
     """The OpenAPI document of a service with keys."""
-    file = tmp_path_factory.mktemp("document") / "keys.yaml"
-    add(file, "press")
-    return create_app(Settings(api_keys_file=file)).openapi()
+    return guarded.send(None, "GET", "/openapi.json").json()
 
 
 PUBLIC = [

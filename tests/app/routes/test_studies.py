@@ -23,6 +23,7 @@ from joulepath.optimizer.exceptions import (
     UnreachableTargets,
 )
 from joulepath.optimizer.search.errors import DurationTooShort
+from tests.app.documents import open_document
 from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, move
 
@@ -170,9 +171,7 @@ def test_what_either_endpoint_refuses_is_documented(
 ) -> None:
     answer = client.post(f"{begin(client)}/iterations", json=body)
     checked(kind, answer.content)
-    responses = client.get("/openapi.json").json()["paths"]["/studies/{id}/iterations"]["post"][
-        "responses"
-    ]
+    responses = open_document()["paths"]["/studies/{id}/iterations"]["post"]["responses"]
     schema = responses[str(answer.status_code)]["content"]["application/problem+json"]["schema"]
     assert answer.json()["type"] in schema["discriminator"]["mapping"]
 

@@ -14,6 +14,7 @@ from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import UnsupportedMediaType
 from joulepath.app.http.validation_messages import told
 from joulepath.app.schemas import names
+from tests.app.documents import open_document
 from tests.app.problems import checked
 from tests.app.requests import HOME, move
 
@@ -182,7 +183,7 @@ def test_every_json_body_is_read_strictly_as_common_clients_declare_it(
 ) -> None:
     """No type, that of `curl -d`, and plain text are JSON on every path; a name occurs once."""
     headers = {} if content_type is None else {"content-type": content_type}
-    paths = client.get("/openapi.json").json()["paths"]
+    paths = open_document()["paths"]
     taking_json = [
         (method, re.sub(r"{\w+}", "any", path))
         for path, operations in paths.items()
@@ -207,10 +208,8 @@ def test_a_bag_may_be_sent_as_the_refusal_of_another_type_says(client: TestClien
     assert read.status_code != 415, read.text
 
 
-def test_every_pattern_of_a_text_is_told_in_words(client: TestClient) -> None:
-    patterns = {
-        each["pattern"] for each in objects(client.get("/openapi.json").json()) if "pattern" in each
-    }
+def test_every_pattern_of_a_text_is_told_in_words() -> None:
+    patterns = {each["pattern"] for each in objects(open_document()) if "pattern" in each}
     assert len(patterns) > 1
     for pattern in patterns:
         error = {
