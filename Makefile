@@ -36,7 +36,7 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-.PHONY: serve test test-long docs bench lock clean ready lint mypy style types kernels pytest pytest-long vitest
+.PHONY: serve test test-long docs bench lock clean ready lint mypy style types kernels bytecode pytest pytest-long vitest
 
 serve: $(VENV)/.runtime $(VENV)/.package kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
@@ -46,17 +46,22 @@ ready: $(VENV)/.runtime $(NATIVE)
 	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels $(ROS2)/.ready
 	@$(PY) -m compileall -q app optimizer models
 
-# The linters come first: they find in a minute what the tests find later.
+# The linters come first: they find in a minute what the tests find later. mypy takes as long as the others together.
 test: ready
-	@$(MAKE) --no-print-directory --jobs=2 lint
-	@$(MAKE) --no-print-directory vitest pytest
+	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest bytecode
+	@$(MAKE) --no-print-directory pytest
 
 test-long: ready
-	@$(MAKE) --no-print-directory --jobs=2 lint
-	@$(MAKE) --no-print-directory vitest pytest-long
+	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest bytecode
+	@$(MAKE) --no-print-directory pytest-long
 
 # Every process loads all tests: their bytecode is kept, even where Python may write none.
-pytest pytest-long: export PYTHONDONTWRITEBYTECODE :=
+bytecode pytest pytest-long: export PYTHONDONTWRITEBYTECODE :=
+
+# Each process would otherwise compile all tests, with what their assertions say when they fail. Tests that cannot be
+# loaded fail when they are run.
+bytecode:
+	@$(PY) -m pytest --collect-only -q -p no:schemathesis > /dev/null || true
 
 # `worksteal`: a process that has run its share of the tests takes some of another one's. Only long tests need
 # schemathesis, which takes a second to load.
