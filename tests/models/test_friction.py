@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.fit_friction import fit
+from joulepath.models.fit_friction import FITS
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, FrictionLaw, Robot
+from tests.selection import long_but
 
 # worst relative error over the table that a user may rely on
 WORST_ERROR = {"curved": 0.05, "coulomb_viscous": 0.18}
@@ -64,9 +65,11 @@ def test_a_larger_knee_softens_the_reversal_only(robot: Robot, law: FrictionLaw)
     assert soft.torque(fast) == pytest.approx(law.torque(fast), rel=1e-3)
 
 
-@pytest.mark.long
-def test_stored_coefficients_are_the_fits(robot: Robot) -> None:
-    fits = fit("ur5e")
-    for law in robot.friction_laws.values():
-        for part, values in fits[law.name].items():
-            assert getattr(law, part) == pytest.approx(values, rel=REFIT), part
+@pytest.mark.parametrize("joint", long_but([1], range(6)))
+def test_stored_coefficients_are_the_fits(robot: Robot, joint: int) -> None:
+    speed, torque = table(robot)
+    knee = robot.figures["friction_table"]["knee"]["value"]
+    for name, law in robot.friction_laws.items():
+        fitted = FITS[name](speed, torque[:, joint], knee)
+        stored = [part[joint] for part in (law.coulomb, law.curved, law.speed, law.viscous)]
+        assert stored == pytest.approx(fitted, rel=REFIT), name

@@ -22,8 +22,10 @@ from joulepath.optimizer.native.library_cache import (
     is_intact,
     mark_used,
 )
+from tests.app.forks import Fork
 
 HASTY = CacheSettings(compiler_timeout=0.5, poll_interval=0.01)
+FORKED = 60.0  # s; for a few forks to end, on a machine with much else to do
 ENDED = 20.0  # s; for a process that was killed to be gone, on a machine with much else to do
 
 
@@ -53,6 +55,23 @@ def test_libraries_that_rested_longest_leave(
     # a folder that is gone is no error
     mark_used(tmp_path / "none" / "arm.so")
     library_cache._prune(tmp_path / "none")
+
+
+def test_several_processes_make_one_library(tmp_path: Path) -> None:
+    """One compiles, the others wait for it, and nothing is left lying about."""
+    calls, script, target = (tmp_path / name for name in ("calls", "compiler", "cache/kernel.so"))
+    script.write_text(f'#!/bin/sh\necho call >> {calls}\nsleep 0.1\ncp "$1" "$3"\n', "utf-8")
+    script.chmod(0o755)
+    code = (
+        "from pathlib import Path; from joulepath.optimizer.native import library_cache as cache; "
+        f"cache.compile_library(Path({str(target)!r}), [], lambda: 'code')"
+    )
+    environment = os.environ | {"CC": str(script)}
+    programs = [Fork(("-c", code), environment, (0, 1, 2)) for _ in range(3)]
+    assert [each.wait(FORKED) for each in programs] == [0, 0, 0]
+    assert calls.read_text("utf-8").splitlines() == ["call"]
+    assert sorted(path.suffix for path in target.parent.iterdir()) == [".lock", ".sha256", ".so"]
+    assert is_intact(target)
 
 
 @pytest.fixture
