@@ -167,7 +167,14 @@ def test_a_table_of_configurations_is_a_motion(here: Here, tmp_path: Path) -> No
 
 
 def test_an_excitation(here: Here, tmp_path: Path) -> None:
-    fields = {"parameters": ["friction"], "period": 6, "harmonics": 2, "starts": 1, "deadline": 60}
+    fields = {
+        "parameters": ["friction"],
+        "period": 6,
+        "harmonics": 2,
+        "starts": 1,
+        "deadline": 60,
+        "centre": HOME,
+    }
     answer = written(here, tmp_path, "excitation", "-", stdin=json.dumps(fields))
     assert searches.excitation_summary(answer)["motions within limits"] == "1 of 1 starts"
 

@@ -21,6 +21,8 @@ from tests.app.requests import HOME, PATIENT
 
 # relative: sums of the same numbers in another order
 ROUNDING = 1e-9
+# relative: optima of the same moves, from initial guesses that round differently
+SAME_MOTION = 1e-6
 REST: dict[str, Any] = {"target": {"q": HOME}}
 PART = {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
 
@@ -49,6 +51,14 @@ def answered(client: TestClient, asked: dict[str, Any]) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def answer(client: TestClient) -> dict[str, Any]:
     return answered(client, a_cycle())
+
+
+@pytest.fixture(scope="module")
+def stops(answer: dict[str, Any]) -> list[dict[str, Any]]:
+    """The stops at the configurations of the answer: a quarter of the time to search among all."""
+    pick, place = (answer["legs"][k]["goal"]["q"] for k in (0, 2))
+    first, second = a_cycle()["stops"]
+    return [first | {"target": {"q": pick}}, second | {"target": {"q": place}}]
 
 
 def test_the_cycle_is_kept(client: TestClient, answer: dict[str, Any]) -> None:
@@ -125,8 +135,9 @@ def test_every_move_refers_to_its_answer(answer: dict[str, Any], client: TestCli
     )
 
 
-def test_a_payload_that_is_left_out_stays_and_null_puts_it_down(client: TestClient) -> None:
-    stops = a_cycle()["stops"]
+def test_a_payload_that_is_left_out_stays_and_null_puts_it_down(
+    client: TestClient, stops: list[dict[str, Any]]
+) -> None:
     carried = client.post(
         "/cycle", json=a_cycle(stops=[stops[0], {"target": stops[1]["target"]}], closed=False)
     ).json()
@@ -277,13 +288,13 @@ def test_the_moves_repeat_the_scene_in_its_frame(client: TestClient) -> None:
 
 
 def test_a_cycle_in_a_given_time_waits_on_its_brakes(
-    client: TestClient, answer: dict[str, Any]
+    client: TestClient, answer: dict[str, Any], stops: list[dict[str, Any]]
 ) -> None:
     time, hold = (
         2.5 * answer["duration"],
         {"hold": "brakes", "brake_delay": 0.2, "brake_power": 2.0},
     )
-    found = client.post("/cycle", json=a_cycle(time=time, hold=hold)).json()
+    found = client.post("/cycle", json=a_cycle(stops=stops, time=time, hold=hold)).json()
     assert found["duration"] == pytest.approx(time) and found["price_of_time"] < 0
     (wait,) = (leg for leg in found["legs"] if leg["kind"] == "wait")
     assert wait["start"] == wait["goal"] and wait["answer"] is None
@@ -296,14 +307,15 @@ def test_a_cycle_in_a_given_time_waits_on_its_brakes(
         "fastest_then_wait" in {each["name"] for each in found["baselines"]}
         and found["warnings"] == []
     )
-    at_most = client.post("/cycle", json=a_cycle(time={"max": time})).json()
-    assert at_most["duration"] == answer["duration"] and at_most["price_of_time"] == 0
+    at_most = client.post("/cycle", json=a_cycle(stops=stops, time={"max": time})).json()
+    assert at_most["duration"] == pytest.approx(answer["duration"], rel=SAME_MOTION)
+    assert at_most["price_of_time"] == 0
 
 
 def test_a_cycle_that_cannot_be_so_fast_says_how_fast_it_can_be(
-    client: TestClient, answer: dict[str, Any]
+    client: TestClient, answer: dict[str, Any], stops: list[dict[str, Any]]
 ) -> None:
-    reply = client.post("/cycle", json=a_cycle(time=1.0))
+    reply = client.post("/cycle", json=a_cycle(stops=stops, time=1.0))
     problem = reply.json()
     assert (reply.status_code, problem["type"], problem["dwells"]) == (
         422,
@@ -313,9 +325,9 @@ def test_a_cycle_that_cannot_be_so_fast_says_how_fast_it_can_be(
     assert 1.0 < problem["shortest"] <= answer["duration"]
 
 
-def test_a_free_order_is_told(client: TestClient) -> None:
-    content = a_cycle(order="free", together=[["pick", "place"]])
-    content["stops"].append({"name": "look", "target": down(0.3, 0.3, 0.4)})
+def test_a_free_order_is_told(client: TestClient, stops: list[dict[str, Any]]) -> None:
+    look = {"name": "look", "target": {"q": [HOME[0] + 0.5, *HOME[1:]]}}
+    content = a_cycle(stops=[*stops, look], order="free", together=[["pick", "place"]])
     reply = client.post("/cycle", json=content)
     assert reply.status_code == 200, reply.text
     order = model_of(CycleAnswer).model_validate_json(reply.content).order
@@ -351,8 +363,10 @@ def test_an_order_that_contradicts_itself_says_which_stops_do(client: TestClient
     assert problem["names"] == ["place", "pick"] and "leave out" in problem["detail"]
 
 
-def test_the_cycle_as_a_table(client: TestClient, answer: dict[str, Any]) -> None:
-    reply = client.post("/cycle", json=a_cycle(), headers={"Accept": "text/csv"})
+def test_the_cycle_as_a_table(
+    client: TestClient, answer: dict[str, Any], stops: list[dict[str, Any]]
+) -> None:
+    reply = client.post("/cycle", json=a_cycle(stops=stops), headers={"Accept": "text/csv"})
     assert reply.status_code == 200 and reply.headers["content-type"].startswith("text/csv")
     rows = list(csv.DictReader(reply.text.splitlines()))
     times, power = (np.array([float(row[name]) for row in rows]) for name in ("t", "power"))

@@ -18,12 +18,14 @@ from tests.app.routes.test_cycle import PART, ROUNDING, answered, down
 
 
 def a_cycle(**fields: Any) -> dict[str, Any]:
-    """A part is carried past a scanner."""
-    stops = [
+    """A part is carried past a scanner, in two configurations of each stop."""
+    stops: list[dict[str, Any]] = [
         {"name": "pick", "target": down(0.45, -0.3, 0.15), "dwell": 0.3, "payload": PART},
         {"name": "scanner", "target": down(0.45, 0.05, 0.35), "via": True},
         {"name": "place", "target": down(0.1, 0.5, 0.2), "payload": None},
     ]
+    for stop in stops:
+        stop["branch"] = {"shoulder": "right", "elbow": "up"}
     return {"start": {"q": HOME}, "stops": stops, "windings": False, **PATIENT, **fields}
 
 
