@@ -36,18 +36,11 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel that `pip wheel .` makes, by the build backend that is installed."""
+    """The wheel, by the build backend that pyproject.toml names, as it is installed."""
     folder = tmp_path_factory.mktemp("wheel")
-    options = [
-        "--quiet",
-        "--disable-pip-version-check",
-        "--no-deps",
-        "--no-build-isolation",
-        "--wheel-dir",
-        str(folder),
-    ]
+    command = [sys.executable, "-m", "hatchling", "build", "--target", "wheel"]
     with with_compiler():
-        subprocess.run([sys.executable, "-m", "pip", "wheel", *options, str(ROOT)], check=True)
+        subprocess.run([*command, "--directory", str(folder)], cwd=ROOT, check=True)
     (built,) = folder.glob("joulepath-*.whl")
     return built
 
