@@ -66,7 +66,7 @@ def test_distances_along_a_motion(kind: str, count: int) -> None:
 def test_what_is_proven_clear_is_certified() -> None:
     """And what is not, has no proven clearance that is worth mentioning."""
     clear = 0
-    for seed in range(60):
+    for seed in range(20):
         model = CollisionModel(arm_in_cell(LOADS[0], cell(seed)))
         proof, is_clear = (
             proven_clearance(model, wander(seed)),
@@ -77,7 +77,7 @@ def test_what_is_proven_clear_is_certified() -> None:
         assert (
             proof.min_clearance >= 0 if is_clear else proof.min_clearance < 2 * CLEARANCE_PROOF.gap
         )
-    assert 3 < clear < 57
+    assert 1 < clear < 19
 
 
 def test_what_is_proven_clear_is_certified_even_if_its_proof_takes_too_long(

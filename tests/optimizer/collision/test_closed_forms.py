@@ -9,7 +9,7 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.closed_form_distance import box_segment, segment_segment
 
-COUNT = 2000
+COUNT = 1000
 EXACT = 1e-13  # m; lengths are of the order of 1 m, rounding 1e-16
 NEARLY_PARALLEL = 2e-7  # m; see PARALLEL
 KINDS = (

@@ -258,7 +258,7 @@ def test_a_closed_box_is_the_box() -> None:
     size = np.array([0.5, 0.4, 0.6])
     mesh = TriangleMesh(box_triangles(size))
     assert mesh.is_closed and not TriangleMesh(box_triangles(size)[1:]).is_closed
-    q = rng(3).uniform(-3, 3, (120, 6))
+    q = rng(3).uniform(-3, 3, (40, 6))
     ours = by_body(model_of([Obstacle("cloud", mesh, POSE @ at([0.5, 0.2, 0.2]))]), q)
     theirs = by_body(model_of([Obstacle("box", Box(size), POSE @ at([0.5, 0.2, 0.2]))]), q)
     outside = theirs > 0
@@ -311,11 +311,11 @@ def test_the_planner_rejects_what_collides(kind: str) -> None:
     arm = arm_in_cell(scene=Scene([Obstacle("cloud", shapes()[kind][0], POSE, MARGIN)]))
     model = CollisionModel(arm)
     checker, stricter = StateValidityChecker(arm, model), StateValidityChecker(arm, model, 5e-3)
-    q = rng(12).uniform(-2.5, 2.5, (300, 6))
+    q = rng(12).uniform(-2.5, 2.5, (100, 6))
     distance = model.signed_distances(q)[0].min(axis=1)
     clear = np.abs(distance) > COAL_TOLERANCE
     valid = np.array([checker.is_valid(each) for each in q])
-    assert (valid == (distance > 0))[clear].all() and 5 < valid.sum() < 295
+    assert (valid == (distance > 0))[clear].all() and 5 < valid.sum() < 95
     strict = np.array([stricter.is_valid(each) for each in q])
     assert (strict == (distance > 5e-3))[np.abs(distance - 5e-3) > COAL_TOLERANCE].all()
 

@@ -17,7 +17,7 @@ from tests.optimizer.collision.numpy_distances import NumpyDistances
 SEARCHED = 2e-10  # m; the search ends at a difference of 1e-10 between its bounds, and both round
 ON_DISC = 2e-8  # m; the root of the rounding of a squared cosine, times radii of up to a metre
 WITNESS = 1e-7  # m; shares of corners of a triangle with a sine of 1e-8, times lengths of up to 3 m
-COUNT = 300
+COUNT = 100
 DISC = np.array([[0.0, 0, -0.2], [0, 0, 0.2]])
 
 

@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 
 from joulepath.optimizer.cycle.time_allocation import ALLOCATION, TimeAllocation
 from joulepath.optimizer.plan_cycle import PLAN_CYCLE
+from tests.selection import long_but
 
 # W: what a wait draws
 WAITING = 5.0
@@ -82,7 +83,7 @@ def fastest(moves: list[Move]) -> list[Move]:
     return [replace(move, duration=move.shortest) for move in moves]
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", long_but(range(2), range(5)))
 class TestFilling:
     @pytest.mark.parametrize("factor", [1.001, 1.05, 1.5, 3.0, 20.0])
     def test_it_needs_the_least_energy_in_the_time(self, seed: int, factor: float) -> None:
