@@ -8,6 +8,7 @@ import atexit
 import gc
 import itertools
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -53,8 +54,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks the tests of the long folders, and puts the few tests that take long to the front: at
     the end, one process would be busy with them while the others idle. Long tests may hang for
     longer before they fail: some take minutes on an idle machine."""
+    folders = tuple(f"{folder}/" for folder in LONG_FOLDERS)
     for item in items:
-        if any(folder in item.path.parents for folder in LONG_FOLDERS):
+        if str(item.path).startswith(folders):
             item.add_marker("long")
         if item.get_closest_marker("long") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(LONG_TIMEOUT))
@@ -101,9 +103,12 @@ def _without_compiler() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _forked_workers() -> None:
-    """Workers of services in this process are its forks: nothing is imported for them again."""
+def _forked_workers(_without_compiler: None) -> None:
+    """Workers of services in this process are forks of it as it is before the first test: nothing
+    is imported for them again, and nothing that a test has changed is in them."""
     fork_forkserver()
+    if engine := sys.modules.get("joulepath.app.engine.forkserver"):
+        engine.start_forkserver()
 
 
 @pytest.fixture

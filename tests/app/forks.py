@@ -8,6 +8,7 @@ or code as `python -c` does.
 from __future__ import annotations
 
 import atexit
+import faulthandler
 import functools
 import json
 import os
@@ -202,6 +203,8 @@ def fork_forkserver() -> None:
             warnings.simplefilter("ignore", DeprecationWarning)
             process = os.fork()
         if process == 0:
+            # it would write of an abort to whatever has the file of its messages by then
+            faulthandler.disable()
             kept = sorted({2, *passed, os.sysconf("SC_OPEN_MAX")})
             for one, other in pairwise(kept):
                 os.closerange(one + 1, other)
