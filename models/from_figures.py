@@ -26,8 +26,10 @@ from joulepath.models.robot import (
 from joulepath.models.shape_sizes import check_lengths
 from joulepath.models.urdf import coupling_of, urdf_of
 
+BETWEEN_LINKS = "between_links"
+"""Figure of the section `hulls` of robots whose links are compared with each other by them."""
 # figures of the sections `collision` and `hulls` beside the shapes of links
-NO_LINKS = ("elbow", "meshes", "never_meet", "radius")
+NO_LINKS = ("elbow", "meshes", "never_meet", "radius", BETWEEN_LINKS)
 
 
 def robot_of(name: str, figures: dict[str, Any]) -> Robot:
@@ -66,6 +68,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         ),
         figures=figures,
         hulls=_hulls(figures.get("hulls", {}), model),
+        hulls_between_links=BETWEEN_LINKS in figures.get("hulls", {}),
         torque_side=_torque_side(limits),
         elbow=_elbow(figures, capsules),
         T_base_base_link=_base_link(figures["kinematics"]),

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from joulepath.models.meshes import sampled
 from joulepath.models.robot import Array, Mask
+from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 Inside = Callable[[Array], Mask]
 """Whether points (k, 3) [m] lie where no obstacle can be."""
@@ -37,8 +38,12 @@ class PartSettings:
     overlap: float = 1e-4
     """Distance [m] by which both parts reach beyond the plane. The proof of the cover then ends at
     triangles of this size."""
+    gain: float = 0.0
+    """Least decrease of the cost of a part by its division, relative to this cost."""
     surface: int = 200_000
     """Points of every mesh, from which distances are measured."""
+    triangles: int | None = None
+    """Random triangles of a part, from which its planes are chosen; None for all of them."""
     density: float = 12_000.0
     """Points of a hull per m², at which its excess is measured."""
     offsets: int = 9
@@ -52,6 +57,20 @@ class PartSettings:
 
 
 PARTS = PartSettings()
+QUICK = PartSettings(
+    most=4,
+    p99=0.010,
+    maximum=0.015,
+    free=0.003,
+    gain=0.3,
+    surface=10_000,
+    density=500.0,
+    triangles=300,
+    offsets=4,
+    spreads=(),
+)
+"""For an arm of a user, who waits: a bent link takes about a second, and random configurations
+rarely collide other than on the meshes."""
 DIRECTIONS = [
     np.array(each) / np.linalg.norm(each)
     for each in product((-1.0, 0.0, 1.0), repeat=3)
@@ -84,12 +103,13 @@ def below(triangles: Array, normal: Array, offset: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A part of a surface: triangles, planes of the hull, points on the hull in order of decreasing
-    distance from the surface of the link, and the area [m²] per point. The first `far` points are
-    farther away than `PARTS.free`.
+    """A part of a surface: all triangles, those from which planes are chosen, planes of the hull,
+    points on the hull in order of decreasing distance from the surface of the link, and the area
+    [m²] per point. The first `far` points are farther away than `PartSettings.free`.
     """
 
     triangles: Array
+    chosen: Array
     planes: Array
     points: Array
     distances: Array
@@ -109,27 +129,36 @@ class Division:
         tree: points of the surface.
         inside: the places that do not count.
         radius: radius by which the hulls are grown [m].
+        settings: settings of the division.
+        checkpoint: called for every plane; may raise to interrupt.
         rng: of the random planes.
     """
 
     tree: cKDTree
     inside: Inside
     radius: float
+    settings: PartSettings
+    checkpoint: Checkpoint
     rng: np.random.Generator
 
     def part(self, triangles: Array) -> _Part:
         """A part of these triangles. Raises QhullError for flat ones."""
-        hull = ConvexHull(triangles.reshape(-1, 3))
-        count = int(PARTS.density * hull.area) + 1
+        most, chosen = self.settings.triangles, triangles
+        if most is not None and len(triangles) > most:
+            rows = np.random.default_rng(0).choice(len(triangles), most, replace=False)
+            chosen = triangles[rows]
+        hull = ConvexHull(chosen.reshape(-1, 3))
+        count = int(self.settings.density * hull.area) + 1
         points = sampled(hull.points[hull.simplices], count, np.random.default_rng(0))
         distances = np.asarray(self.tree.query(points)[0])
         order = (-distances).argsort()
         points, distances = points[order], distances[order]
-        far = int((distances > PARTS.free).sum())
+        far = int((distances > self.settings.free).sum())
         counts = np.ones(count, dtype=bool)
         counts[:far] = ~self.inside(points[:far])
         return _Part(
             triangles,
+            chosen,
             hull.equations,
             points[counts],
             distances[counts],
@@ -148,41 +177,50 @@ class Division:
         """Integral of the fourth power of the excess over the surface [m⁶]: deep hollows cost most,
         and are divided first.
         """
-        excess = self.distances(part, others, part.far) - PARTS.free
+        excess = self.distances(part, others, part.far) - self.settings.free
         return float(part.area * (excess**4).sum())
 
-    def halves(self, part: _Part, others: Sequence[_Part]) -> tuple[_Part, _Part]:
-        """Divide a part into two, by the best plane found."""
-        corners = part.triangles.reshape(-1, 3)
-        best: tuple[float, Array, float, tuple[_Part, _Part]] | None = None
+    def halves(self, part: _Part, others: Sequence[_Part]) -> tuple[_Part, _Part] | None:
+        """Divide a part into two, by the best plane found; None if that would gain too little."""
+        corners = part.chosen.reshape(-1, 3)
+        best: tuple[float, Array, float] | None = None
 
         def attempt(normal: Array, offset: float) -> None:
             nonlocal best
+            self.checkpoint()
             try:
-                first, second = (
-                    self.part(below(part.triangles, sign * normal, sign * offset + PARTS.overlap))
-                    for sign in (1.0, -1.0)
-                )
+                first, second = self._sides(part.chosen, normal, offset)
             except (QhullError, ValueError):
                 return  # flat, or without a triangle
             cost = self.cost(first, [second, *others]) + self.cost(second, [first, *others])
             if best is None or cost < best[0]:
-                best = cost, normal, offset, (first, second)
+                best = cost, normal, offset
 
         for normal in DIRECTIONS:
             ends = np.quantile(corners @ normal, [0, 1])
-            for share in np.linspace(0.0, 1.0, PARTS.offsets + 2)[1:-1]:
+            for share in np.linspace(0.0, 1.0, self.settings.offsets + 2)[1:-1]:
                 attempt(normal, float(ends[0] + share * (ends[1] - ends[0])))
-        for spread in PARTS.spreads:
+        for spread in self.settings.spreads:
             assert best is not None, "a body with a volume has a plane through it"
-            _, normal, offset, _ = best
+            _, normal, offset = best
             middle = corners[np.abs(corners @ normal - offset).argsort()[:20]].mean(axis=0)
-            for _ in range(PARTS.trials):
+            for _ in range(self.settings.trials):
                 turned = normal + spread * self.rng.normal(size=3)
                 turned /= np.linalg.norm(turned)
-                attempt(turned, middle @ turned + spread * PARTS.shift * self.rng.normal())
-        assert best is not None
-        return best[3]
+                attempt(turned, middle @ turned + spread * self.settings.shift * self.rng.normal())
+        if best is None or best[0] > (1 - self.settings.gain) * self.cost(part, others):
+            return None
+        return self._sides(part.triangles, *best[1:])
+
+    def _sides(self, triangles: Array, normal: Array, offset: float) -> tuple[_Part, _Part]:
+        """The parts below and above a plane. Raises QhullError for a flat one, ValueError for one
+        without a triangle.
+        """
+        overlap = self.settings.overlap
+        return (
+            self.part(below(triangles, normal, offset + overlap)),
+            self.part(below(triangles, -normal, overlap - offset)),
+        )
 
 
 @dataclass(frozen=True)
@@ -209,7 +247,11 @@ class Rim:
 
 
 def divided(
-    surfaces: Sequence[Array], radius: float, inside: Inside, most: int = PARTS.most
+    surfaces: Sequence[Array],
+    radius: float,
+    inside: Inside,
+    settings: PartSettings = PARTS,
+    checkpoint: Checkpoint = unwatched,
 ) -> list[Array]:
     """Divide the surfaces of a link into parts; the hulls of the parts cover the link.
 
@@ -219,7 +261,8 @@ def divided(
         surfaces: triangles (t, 3, 3) [m] of every mesh.
         radius: radius by which the hulls will be grown [m].
         inside: the places where the excess does not count.
-        most: the largest number of parts.
+        settings: settings of the division.
+        checkpoint: called in every iteration; may raise to interrupt.
 
     Returns:
         The triangles (k, 3, 3) [m] of every part.
@@ -228,18 +271,20 @@ def divided(
         QhullError: the surfaces are flat.
     """
     rng = np.random.default_rng(0)
-    near = np.concatenate([sampled(each, PARTS.surface, rng) for each in surfaces])
-    division, triangles = Division(cKDTree(near), inside, radius, rng), np.concatenate(surfaces)
-    parts = [division.part(triangles)]
-    while len(parts) < most:
+    near = np.concatenate([sampled(each, settings.surface, rng) for each in surfaces])
+    division = Division(cKDTree(near), inside, radius, settings, checkpoint, rng)
+    parts = [division.part(np.concatenate(surfaces))]
+    while len(parts) < settings.most:
         rest = [[each for each in parts if each is not part] for part in parts]
         pairs = list(zip(parts, rest, strict=True))
         p99, maximum = np.percentile(
             np.concatenate([division.distances(*pair) for pair in pairs]), [99, 100]
         )
-        if p99 <= PARTS.p99 and maximum <= PARTS.maximum:
+        if p99 <= settings.p99 and maximum <= settings.maximum:
             break
-        cost = [division.cost(*pair) for pair in pairs]
-        worst = int(np.argmax(cost))
-        parts = [*rest[worst], *division.halves(parts[worst], rest[worst])]
+        worst = int(np.argmax([division.cost(*pair) for pair in pairs]))
+        halves = division.halves(*pairs[worst])
+        if halves is None:
+            break
+        parts = [*rest[worst], *halves]
     return [part.triangles for part in parts]

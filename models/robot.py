@@ -199,7 +199,7 @@ class Robot:
 
     The `capsules` cover the meshes of the links. The `hulls` of a link, one or several, cover it
     more closely: distances to obstacles are those of hulls, and distances between links those of
-    capsules.
+    capsules, or also those of hulls with `hulls_between_links`.
     `never_in_collision` has pairs of non-adjacent links which cannot touch in any configuration.
     `elbow` is the capsule around the elbow, for its speed limit; None for an arm without an elbow.
     `torque_side` is `motor` if the torque limits include rotor and friction, `link` if they exclude
@@ -222,6 +222,7 @@ class Robot:
     never_in_collision: frozenset[tuple[int, int]]
     figures: dict[str, Any] = field(repr=False)
     hulls: tuple[LinkHull, ...] = ()
+    hulls_between_links: bool = False
     torque_side: TorqueSide = "motor"
     elbow: LinkCapsule | None = None
     T_base_base_link: Array = field(default_factory=lambda: np.eye(4), repr=False)

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from joulepath.models.from_figures import BETWEEN_LINKS
 from joulepath.models.hull_cover import HULL_FIT
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
 from joulepath.models.own_arm.figure import assumed, stated
 from joulepath.models.own_arm.link_shapes import LinkShapes, Rows, check_near
-from joulepath.models.own_arm.meeting_pairs import MeetingPairs, pairs_that_meet
+from joulepath.models.own_arm.meeting_pairs import Cover, MeetingPairs, pairs_that_meet
 from joulepath.models.own_arm.robot_xml import robot_element
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.upright import UprightChain
@@ -51,21 +52,24 @@ def shape_figures(
         LinkShapes.of(description, chain, upright, checkpoint),
         _radius(description, upright),
     )
-    capsules, guessed, figures = list[Rows](), list[bool](), {}
+    covers, guessed, figures = list[Cover](), list[bool](), {}
+    hulls = dict[str, list[Rows]]()
     for k, name in enumerate([BASE, *links]):
         own = shapes.rows(k)
         rows = own or _between_joints(upright, k, radius)
         check_near(name, rows)
-        capsules.append(rows)
+        if parts := shapes.hulls(k):
+            hulls[name] = parts
+        covers.append(Cover(rows, parts))
         guessed.append(not own)
         of_user = stated(description, rows, "m", _FRAME)
         figures[name] = of_user if own else assumed(rows, "m", f"From joint to joint. {_FRAME}")
     pairs = _given_pairs(description, chain, checkpoint)
     if pairs is None:
-        meeting = pairs_that_meet(chain, upright, capsules, guessed, checkpoint)
+        meeting = pairs_that_meet(chain, upright, covers, guessed, checkpoint)
         note = (
-            "Pairs whose capsules meet in 95 % of 300 random configurations, or in 30 % if one is "
-            "from joint to joint."
+            "Pairs whose shapes meet in 95 % of 300 random configurations, or in 30 % if one is a "
+            "capsule from joint to joint."
         )
         figures["never_meet"] = assumed(meeting.excluded, "1", note)
         if meeting.doubtful:
@@ -81,20 +85,20 @@ def shape_figures(
         )
     if shapes.unknown:
         warnings.append(f"Shapes that are not read count as nothing: {_listed(shapes.unknown)}.")
-    return {"collision": figures} | _hull_figures(description, links, shapes)
+    return {"collision": figures} | _hull_figures(description, hulls)
 
 
 def _hull_figures(
-    description: Description, links: list[str], shapes: LinkShapes
+    description: Description, hulls: dict[str, list[Rows]]
 ) -> dict[str, dict[str, Any]]:
     """The section `hulls`; none without a link that has one."""
-    found = {name: points for k, name in enumerate(links, 1) if (points := shapes.hull(k))}
-    if not found:
+    if not hulls:
         return {}
-    note = "x, y, z in the link frame. Obstacles are compared with it, except clouds."
-    figures = {name: stated(description, [points], "m", note) for name, points in found.items()}
+    note = "x, y, z in the link frame. Links and obstacles are compared with it, except clouds."
+    figures = {name: stated(description, parts, "m", note) for name, parts in hulls.items()}
     radius = stated(description, HULL_FIT.radius, "m", "Grows the hulls of the points.")
-    return {"hulls": {"radius": radius} | figures}
+    between = stated(description, "hulls", "1", "Links are compared with each other by them.")
+    return {"hulls": {"radius": radius, BETWEEN_LINKS: between} | figures}
 
 
 def _doubt(meeting: MeetingPairs, chain: Chain) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
-from joulepath.models.own_arm.mesh_files import corners
+from joulepath.models.own_arm.mesh_files import surface
 from joulepath.models.own_arm.robot_xml import TENSOR, ZERO, number, numbers
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.urdf_tree import listed, name_of
@@ -169,10 +169,10 @@ def _filled(
     if element is None:
         return None
     if element.tag == "mesh":
-        points = corners(meshes, element.get("filename", ""), checkpoint)
-        if points is None:
+        mesh = surface(meshes, element.get("filename", ""), checkpoint)
+        if mesh is None:
             return None
-        scaled = points * numbers(element, "scale", where, "1 1 1")
+        scaled = mesh[0] * numbers(element, "scale", where, "1 1 1")
         try:
             body = trimesh.convex.convex_hull(scaled)
         except Exception as error:  # qhull raises its own kinds for flat meshes

@@ -1,7 +1,7 @@
-"""Capsules of the links of a URDF, in the frames of the moving links.
+"""Shapes of the links of a URDF, in the frames of the moving links.
 
-A link has the user's capsules, or else one around each of its `<collision>` shapes. Meshes count if
-their files were given.
+A link has the user's capsules, or else one capsule around each of its `<collision>` shapes, and
+hulls of these shapes. Meshes count if their files were given.
 """
 
 from __future__ import annotations
@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import product
 from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
 from scipy.spatial import QhullError
 
-from joulepath.models.hull_cover import hull_around
+from joulepath.models.hull_cover import HULL_FIT, hull_around
+from joulepath.models.hull_parts import QUICK, divided, nowhere
 from joulepath.models.own_arm.capsule_around import capsule_around, outermost
 from joulepath.models.own_arm.description import PLAUSIBLE, CapsuleRow, Description, InvalidArm
-from joulepath.models.own_arm.mesh_files import corners
+from joulepath.models.own_arm.mesh_files import surface
 from joulepath.models.own_arm.robot_xml import ZERO, numbers
 from joulepath.models.own_arm.upright import UprightChain
 from joulepath.models.own_arm.urdf_chain import Chain
@@ -26,8 +28,23 @@ from joulepath.models.robot import Array
 from joulepath.models.shape_sizes import WrongSize, check_lengths, check_scale, check_surface
 from joulepath.models.uploads.limits import LIMITS, Checkpoint
 
-MOST_POINTS = 128
-"""Most points of a hull: with more, distances take longer than those of a few capsules."""
+
+@dataclass(frozen=True)
+class HullLimits:
+    """Limits of the hulls of a link, beyond which it has capsules alone."""
+
+    points: int = 128
+    """Most points of a hull: with more, distances take longer than those of a few capsules."""
+    count: int = 8
+    """Most hulls of a link, as of the robots that come with the product."""
+    triangles: int = 300_000
+    """Most triangles of a mesh that is divided into parts: their corners take 20 MB."""
+    sides: int = 24
+    """Sides of the prism around a cylinder: it reaches 1 % of the radius beyond."""
+
+
+HULLS = HullLimits()
+NO_CORNERS, NO_TRIANGLES = np.empty((0, 3)), np.empty((0, 3, 3))
 SOLIDS = {
     "sphere": {"radius": 1},
     "cylinder": {"radius": 1, "length": 1},
@@ -39,6 +56,27 @@ Rows = list[list[float]]
 """Capsules: both ends of the axis and the radius [m], as in the figures of a robot."""
 Around = tuple[Array, float]
 """Ends (2, 3) of the axis and radius of a capsule [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A collision shape in its own frame: the capsule around it, corners (n, 3) [m] whose convex
+    hull contains it, none if it is round, and the triangles (t, 3, 3) [m] of a mesh.
+    """
+
+    around: Around
+    corners: Array
+    triangles: Array = field(default_factory=lambda: NO_TRIANGLES)
+
+    def parts(self, checkpoint: Checkpoint) -> list[Array]:
+        """Corners (n, 3) [m] of the parts of a bent mesh, or those of the whole shape."""
+        if not len(self.triangles):
+            return [self.corners]
+        try:
+            parts = divided([self.triangles], HULL_FIT.radius, nowhere, QUICK, checkpoint)
+        except (QhullError, ValueError):
+            return [self.corners]  # flat
+        return [part.reshape(-1, 3) for part in parts] if len(parts) > 1 else [self.corners]
 
 
 @dataclass(frozen=True)
@@ -56,8 +94,8 @@ class LinkShapes:
     missing: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
     _seen: list[str] = field(default_factory=list)
-    _made: dict[tuple[str, str | None], Around] = field(default_factory=dict)
-    _outermost: dict[tuple[str, str | None], Array] = field(default_factory=dict)
+    _made: dict[tuple[str, str | None], _Solid] = field(default_factory=dict)
+    _of_link: dict[int, list[tuple[pin.SE3, _Solid]]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -82,26 +120,26 @@ class LinkShapes:
         ]
         return given + of_urdf
 
-    def hull(self, k: int) -> Rows | None:
-        """Points of the hull around the mesh of link k, after `rows`; None unless one mesh is the
-        only shape of the link, or if the hull would need more than MOST_POINTS.
+    def hulls(self, k: int) -> list[Rows]:
+        """Points of the hulls of the shapes of link k, after `rows`. Empty with capsules of the
+        user, with a round shape, of which its capsule is the closest hull, and if too many points
+        would be needed.
         """
-        links = [link for link in self.chain.rigid[k] if link in self.capsules or self._of(link)]
-        if len(links) != 1 or links[0] in self.capsules or len(shapes := self._of(links[0])) != 1:
-            return None
-        mesh = shapes[0].find("geometry/mesh")
-        key = ("", None) if mesh is None else (mesh.get("filename", ""), mesh.get("scale"))
-        if key not in self._outermost:
-            return None
-        self.checkpoint()
-        T = self._frame(k, links[0]) * _origin(shapes[0].find("origin"), "A <collision> has")
-        try:
-            points = hull_around(
-                self._outermost[key] @ T.rotation.T + T.translation, MOST_POINTS, self.checkpoint
-            )
-        except QhullError:
-            return None
-        return points.tolist() if len(points) <= MOST_POINTS else None
+        shapes, found = self._of_link.get(k, []), list[Rows]()
+        if any(link in self.capsules for link in self.chain.rigid[k]):
+            return []
+        for T, solid in shapes:
+            parts = solid.parts(self.checkpoint) if len(shapes) == 1 else [solid.corners]
+            for part in parts:
+                try:
+                    points = hull_around(
+                        part @ T.rotation.T + T.translation, HULLS.points, self.checkpoint
+                    )
+                except (QhullError, ValueError):
+                    return []  # flat, or round and thus without corners
+                found.append(points.tolist())
+        fits = len(found) <= HULLS.count and all(len(each) <= HULLS.points for each in found)
+        return found if fits else []
 
     def _of(self, link: str) -> list[Element]:
         """The collision shapes of a URDF link."""
@@ -126,15 +164,17 @@ class LinkShapes:
             self._count("urdf", link)
             where = f"A <collision> of link {link!r} has"
             geometry = shape.find("geometry")
-            around = None if geometry is None else self._around(geometry, where)
-            if around is not None:
-                rows.append(_placed(frame * _origin(shape.find("origin"), where), around))
+            solid = None if geometry is None else self._solid(geometry, where)
+            if solid is not None:
+                T = frame * _origin(shape.find("origin"), where)
+                self._of_link.setdefault(k, []).append((T, solid))
+                rows.append(_placed(T, solid.around))
         return rows
 
-    def _around(self, geometry: Element, where: str) -> Around | None:
-        """The capsule around a shape, in its frame; None for an unknown or missing shape."""
+    def _solid(self, geometry: Element, where: str) -> _Solid | None:
+        """A shape in its frame; None for an unknown or missing shape."""
         if (mesh := geometry.find("mesh")) is not None:
-            return self._around_mesh(mesh, f"{where} a <mesh>")
+            return self._of_mesh(mesh, f"{where} a <mesh>")
         for kind, parts in SOLIDS.items():
             element = geometry.find(kind)
             if element is None:
@@ -152,27 +192,33 @@ class LinkShapes:
                 sides = given["size"] / 2
                 longest = int(np.argmax(sides))
                 axis = np.eye(3)[longest] * sides[longest]
-                return np.array([-axis, axis]), float(np.linalg.norm(np.delete(sides, longest)))
-            half = given.get("length", np.zeros(1)) / 2
-            axis = np.array([0.0, 0.0, half[0]])
-            return np.array([-axis, axis]), float(given["radius"][0])
+                around = np.array([-axis, axis]), float(np.linalg.norm(np.delete(sides, longest)))
+                return _Solid(around, sides * list(product((-1, 1), repeat=3)))
+            half, radius = given.get("length", np.zeros(1))[0] / 2, float(given["radius"][0])
+            axis = np.array([0.0, 0.0, half])
+            around = np.array([-axis, axis]), radius
+            return _Solid(around, _prism(radius, half) if kind == "cylinder" else NO_CORNERS)
         self.unknown.extend([each.tag for each in geometry][:1])
         return None
 
-    def _around_mesh(self, mesh: Element, where: str) -> Around | None:
+    def _of_mesh(self, mesh: Element, where: str) -> _Solid | None:
         name, scaled = mesh.get("filename", ""), mesh.get("scale")
         if (name, scaled) not in self._made:
-            points = corners(self.meshes, name, self.checkpoint)
-            if points is None:
+            read = surface(self.meshes, name, self.checkpoint)
+            if read is None:
                 self.missing.append(name)
                 return None
             scale = numbers(mesh, "scale", where, "1 1 1")
-            points = self._outermost[name, scaled] = self._scaled(points, scale, where)
-            self._made[name, scaled] = capsule_around(points, self.checkpoint)
+            points = self._scaled(read[0], scale, where)
+            corners = outermost(points, self.checkpoint)
+            around = capsule_around(corners, self.checkpoint)
+            is_small = len(read[1]) <= HULLS.triangles
+            triangles = points[read[1]] if is_small else NO_TRIANGLES
+            self._made[name, scaled] = _Solid(around, corners, triangles)
         return self._made[name, scaled]
 
     def _scaled(self, points: Array, scale: Array, where: str) -> Array:
-        """The outermost corners (n, 3) [m] of a mesh, given in units of `scale` (3,) [m]."""
+        """The corners (n, 3) [m] of a mesh, given in units of `scale` (3,) [m]."""
         with _of_field("urdf"):
             check_scale(f"{where} with a `scale` that", scale, points)
         points = points * scale
@@ -182,7 +228,7 @@ class LinkShapes:
             )
         with _of_field("meshes"):
             check_surface(f"{where} that", points)
-        return outermost(points, self.checkpoint)
+        return points
 
     def _count(self, field: str, link: str) -> None:
         """Counts a shape of a link. Raises InvalidArm for too many."""
@@ -219,6 +265,16 @@ def _of_field(field: str) -> Iterator[None]:
         yield
     except WrongSize as error:
         raise InvalidArm(field, str(error)) from None
+
+
+def _prism(radius: float, half: float) -> Array:
+    """Corners (n, 3) [m] of a prism around a cylinder about the z axis."""
+    turn = 2 * np.pi * np.arange(HULLS.sides) / HULLS.sides
+    reach = radius / np.cos(np.pi / HULLS.sides)
+    x, y = reach * np.cos(turn), reach * np.sin(turn)
+    return np.concatenate(
+        [np.stack([x, y, np.full(HULLS.sides, z)], axis=1) for z in (-half, half)]
+    )
 
 
 def _placed(T: pin.SE3, around: Around) -> list[float]:

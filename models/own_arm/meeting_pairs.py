@@ -1,4 +1,4 @@
-"""Pairs of links whose capsules overlap in nearly every configuration.
+"""Pairs of links whose shapes overlap in nearly every configuration.
 
 Checking such a pair would make every motion a collision.
 """
@@ -12,6 +12,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from joulepath.models.hull_cover import HULL_FIT
 from joulepath.models.own_arm.link_shapes import Rows
 from joulepath.models.own_arm.upright import UprightChain, turn_onto
 from joulepath.models.own_arm.urdf_chain import Chain
@@ -31,7 +32,7 @@ class OverlapSettings:
     """The same for a pair with a guessed capsule: a maker would not build joint ranges in which
     links collide this often, so that the guess is too thick."""
     doubtful_share: float = 0.3
-    """Least share of overlapping configurations of a pair that is compared, and named: its capsules
+    """Least share of overlapping configurations of a pair that is compared, and named: its shapes
     are likely too thick beside a joint. In the bundled arms, pairs that can meet do so in at most
     20 %."""
     rounding: float = 1e-9
@@ -42,8 +43,16 @@ OVERLAP = OverlapSettings()
 
 
 @dataclass(frozen=True)
+class Cover:
+    """The capsules of a link, and the points of its hulls, which take precedence."""
+
+    capsules: Rows
+    hulls: list[Rows]
+
+
+@dataclass(frozen=True)
 class MeetingPairs:
-    """Pairs of links, as their numbers, by how often their capsules overlap."""
+    """Pairs of links, as their numbers, by how often their shapes overlap."""
 
     excluded: list[list[int]]
     """In nearly every configuration: they are not compared."""
@@ -54,31 +63,29 @@ class MeetingPairs:
 def pairs_that_meet(
     chain: Chain,
     upright: UprightChain,
-    capsules: list[Rows],
+    covers: list[Cover],
     guessed: list[bool],
     checkpoint: Checkpoint,
 ) -> MeetingPairs:
-    """Pairs of non-adjacent links whose capsules overlap in many random configurations.
+    """Pairs of non-adjacent links whose shapes overlap in many random configurations.
 
     Args:
         chain: the joints and their ranges.
         upright: the frames of the links.
-        capsules: capsules of every link, base first.
+        covers: shapes of every link, base first.
         guessed: whether the capsules of a link are an assumption.
         checkpoint: ends the computation by an exception.
     """
-    pairs = [(a, b) for a, b in combinations(range(len(capsules)), 2) if a + 1 < b]
+    pairs = [(a, b) for a, b in combinations(range(len(covers)), 2) if a + 1 < b]
     meets = np.zeros(len(pairs))
-    shapes = [
-        [(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules
-    ]
+    shapes = [_shapes(cover) for cover in covers]
     frames = [
         _frames(chain, upright, q)
         for q in np.random.default_rng(0).uniform(
             chain.q_min, chain.q_max, (OVERLAP.samples, chain.nq)
         )
     ]
-    balls = [_balls(rows, [each[k] for each in frames]) for k, rows in enumerate(capsules)]
+    balls = [_balls(cover, [each[k] for each in frames]) for k, cover in enumerate(covers)]
     request = coal.CollisionRequest()
     for k, (a, b) in enumerate(pairs):
         met = set[int]()
@@ -113,12 +120,32 @@ def _frames(chain: Chain, upright: UprightChain, q: Array) -> list[pin.SE3]:
     return frames
 
 
-def _balls(rows: Rows, frames: list[pin.SE3]) -> tuple[Array, Array]:
-    """Centres (samples, n, 3) in the base and radii (n,) [m] of the balls around the capsules of a
+def _shapes(cover: Cover) -> list[tuple[coal.ShapeBase, pin.SE3]]:
+    """The shapes by which a link is compared, with their poses in its frame."""
+    if not cover.hulls:
+        return [(coal.Capsule(row[6], _length(row)), _middle(row)) for row in cover.capsules]
+    found = []
+    for points in cover.hulls:
+        corners = coal.StdVec_Vec3s()
+        corners.extend(np.array(points))
+        hull = coal.Convex.convexHull(corners, False, "")
+        hull.setSweptSphereRadius(HULL_FIT.radius)
+        found.append((hull, pin.SE3.Identity()))
+    return found
+
+
+def _balls(cover: Cover, frames: list[pin.SE3]) -> tuple[Array, Array]:
+    """Centres (samples, n, 3) in the base and radii (n,) [m] of the balls around the shapes of a
     link."""
-    centres = np.array([(np.array(row[:3]) + row[3:6]) / 2 for row in rows])
+    points = cover.hulls or [[row[:3], row[3:6]] for row in cover.capsules]
+    grown = [HULL_FIT.radius] * len(points) if cover.hulls else [row[6] for row in cover.capsules]
+    centres = np.array([(np.min(each, axis=0) + np.max(each, axis=0)) / 2 for each in points])
     turned = np.array([centres @ T.rotation.T + T.translation for T in frames])
-    return turned, np.array([row[6] + _length(row) / 2 + OVERLAP.rounding for row in rows])
+    radii = [
+        np.linalg.norm(np.array(each) - centre, axis=1).max() + radius + OVERLAP.rounding
+        for each, centre, radius in zip(points, centres, grown, strict=True)
+    ]
+    return turned, np.array(radii)
 
 
 def _close(first: tuple[Array, Array], second: tuple[Array, Array]) -> list[list[int]]:

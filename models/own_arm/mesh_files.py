@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from joulepath.models.own_arm.description import PLAUSIBLE, InvalidArm
 from joulepath.models.robot import Array
@@ -83,11 +84,11 @@ def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:
     return found
 
 
-def corners(
+def surface(
     meshes: Mapping[str, bytes], reference: str, checkpoint: Checkpoint = unwatched
-) -> Array | None:
-    """Corners (n, 3) of a mesh of the URDF, in its own units; None without its file. A COLLADA file
-    is in metres.
+) -> tuple[Array, npt.NDArray[np.int64]] | None:
+    """Corners (n, 3) of a mesh of the URDF, in its own units, and index triples (m, 3) of its
+    triangles; None without its file. A COLLADA file is in metres, and its triangles are not read.
 
     Raises InvalidArm for an unreadable file, or several matching files.
     """
@@ -97,17 +98,18 @@ def corners(
     most = MeshSize()
     try:
         if _kind(path) == "dae":
-            found = collada_corners(meshes[path], most, checkpoint)
+            corners = collada_corners(meshes[path], most, checkpoint)
+            triangles = np.empty((0, 3), dtype=np.int64)
         else:
-            found, _ = read_mesh(_kind(path), meshes[path], most, checkpoint)
+            corners, triangles = read_mesh(_kind(path), meshes[path], most, checkpoint)
     except UnreadableFile as error:
         raise InvalidArm("meshes", f"{reference[: PLAUSIBLE.name]!r} {error}") from error
-    if len(found) < 4 or not np.isfinite(found).all():
+    if len(corners) < 4 or not np.isfinite(corners).all():
         raise InvalidArm(
             "meshes",
             f"{reference[: PLAUSIBLE.name]!r} must have from 4 to {most.corners} finite corners.",
         )
-    return found
+    return corners, triangles
 
 
 def _file_of(meshes: Mapping[str, bytes], reference: str) -> str | None:

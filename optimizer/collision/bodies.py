@@ -94,7 +94,7 @@ class Body:
 
 def bodies_of(arm: Arm) -> tuple[Body, ...]:
     """Bodies of an arm: the capsules of the robot, then tool and payload, then the hulls of robot
-    and tool if there is any obstacle, then the obstacles of the scene.
+    and tool if any of them is compared, then the obstacles of the scene.
     """
     robot, last = arm.robot, arm.robot.last_link
     T_last_flange = robot.T_last_flange
@@ -116,7 +116,8 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
     of_tool = [body for body in attached if not body.is_hull]
     hulls = [*hulls, *(body for body in attached if body.is_hull)]
     obstacles = [body for obstacle in arm.scene.obstacles for body in _bodies_of_obstacle(obstacle)]
-    return (*capsules, *of_tool, *(hulls if obstacles else ()), *obstacles)
+    compared = robot.hulls_between_links or obstacles
+    return (*capsules, *of_tool, *(hulls if compared else ()), *obstacles)
 
 
 @lru_cache(MOST_ROBOTS)

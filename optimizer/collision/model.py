@@ -52,7 +52,8 @@ class CollisionModel:
     """Bodies of an arm, and the checked `pairs` (p, 2) of bodies, in order from the base.
 
     Two links are checked unless they are adjacent or can never be in collision. Tool and payload
-    are checked against all links except the links that they touch by design. The scene is checked
+    are checked against all links except the links that they touch by design. Links are represented
+    by their capsules, or by their hulls with `Robot.hulls_between_links`. The scene is checked
     against every moving body; of a link or a tool with hulls, these are checked, except against
     clouds, and its capsules otherwise. All distances have the margin of the obstacle subtracted.
     """
@@ -282,22 +283,27 @@ class CollisionModel:
 
 def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
     """Indices (p, 2) of the bodies of every checked pair."""
-    links = range(len(arm.robot.capsules))
-    moving = [k for k, body in enumerate(bodies) if body.link > 0 or k in links]
-    obstacles = [k for k, body in enumerate(bodies) if body.link == 0 and k not in links]
+    robot = arm.robot
+    links = _compared_between_links(robot, bodies)
+    of_arm = [k for k, body in enumerate(bodies) if body.link > 0 or k in links]
+    obstacles = [
+        k
+        for k, body in enumerate(bodies)
+        if body.link == 0 and k >= len(robot.capsules) and not body.is_hull
+    ]
     with_hull = {(body.name, body.link) for body in bodies if body.is_hull}
     pairs: list[tuple[int, int]] = []
-    for k in moving:
+    for k in of_arm:
         body = bodies[k]
-        if body.is_hull:
-            others = []
-        elif k in links:
+        if k in links:
             others = [
                 i
                 for i in links
                 if body.link - bodies[i].link > 1
-                and (bodies[i].link, body.link) not in arm.robot.never_in_collision
+                and (bodies[i].link, body.link) not in robot.never_in_collision
             ]
+        elif body.is_hull or k < len(robot.capsules):
+            others = []
         else:
             others = [i for i in links if bodies[i].link not in body.touches]
         if body.link > 0:
@@ -307,6 +313,17 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
             ]
         pairs += [(i, k) for i in others]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
+
+
+def _compared_between_links(robot: Robot, bodies: Sequence[Body]) -> list[int]:
+    """Indices of the bodies by which links are compared with each other, with tool and payload."""
+    capsules = range(len(robot.capsules))
+    if not robot.hulls_between_links:
+        return list(capsules)
+    # the hulls of links precede those of a tool
+    hulls = [k for k, body in enumerate(bodies) if body.is_hull][: len(robot.hulls)]
+    hulled = {bodies[k].link for k in hulls}
+    return [k for k in capsules if bodies[k].link not in hulled] + hulls
 
 
 def collision_model(arm: Arm) -> CollisionModel:

@@ -105,8 +105,9 @@ class RobotDetail(RobotSummary):
     )
     hulls: Parameters | None = part(
         "Convex hulls that hold each link more closely, and are compared with obstacles: for each "
-        "hull of a link, points [x, y, z] in the link frame, whose hull is grown by `radius`; null "
-        "for a robot without hulls."
+        "hull of a link, points [x, y, z] in the link frame, whose hull is grown by `radius`. With "
+        "`between_links`, links are compared with each other by their hulls, too. Null for a robot "
+        "without hulls."
     )
     drives: Parameters = part("Motors, gears and inverters.")
     electronics: Parameters = part(

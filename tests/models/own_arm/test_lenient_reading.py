@@ -11,7 +11,7 @@ import pytest
 
 from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
-from joulepath.models.own_arm.mesh_files import corners
+from joulepath.models.own_arm.mesh_files import surface
 from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, SHAPE, robot
 from tests.optimizer.kinematics.six_joints import flange
 
@@ -162,6 +162,6 @@ def test_a_mesh_of_a_package_is_found_by_the_end_of_its_path() -> None:
     square = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
     meshes = {"arm/meshes/link.obj": square, "arm/meshes/other.obj": square + b"\n"}
     for reference in ("package://arm/meshes/link.obj", "file:///opt/ros/arm/meshes/link.obj"):
-        found = corners(meshes, reference)
-        assert found is not None and found.shape == (4, 3)
+        found = surface(meshes, reference)
+        assert found is not None and [each.shape for each in found] == [(4, 3), (4, 3)]
     assert RICH.count("<mesh") == 1

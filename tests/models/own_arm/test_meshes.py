@@ -10,26 +10,29 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from joulepath.models.capsule_cover import not_held
+from joulepath.models.capsule_cover import not_held, outside
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.own_arm.capsule_around import SEARCH, capsule_around
 from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
-from joulepath.models.own_arm.mesh_files import corners, in_folder, in_zip
+from joulepath.models.own_arm.mesh_files import in_folder, in_zip, surface
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, LinkCapsule
 from joulepath.models.uploads.limits import LIMITS
 from tests.mesh_folders import meshes as arm_folder
-from tests.models.own_arm.arms import RICH, RICH_ARM, robot
+from tests.models.own_arm.arms import PLAIN, RICH, RICH_ARM, URDF, changed, meshed, robot
 from tests.selection import long_but
 
 NAMED = RICH.replace(
     '"forearm.stl"', '"package://cell/meshes/forearm.stl" scale="0.001 0.001 0.001"'
 )
+UPPER_ARM = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0.0, 0.0), np.array([0.0, -0.2, 0.0]))
+"""The collision shape of the plain arm in the frame of its link."""
 # [mm], as a drawing program writes it
 BLOCK = trimesh.creation.box((180.0, 60.0, 40.0))
 
@@ -44,6 +47,11 @@ def zipped(files: dict[str, bytes]) -> bytes:
         for name, content in files.items():
             archive.writestr(name, content)
     return target.getvalue()
+
+
+def in_upper_arm(points: Array) -> Array:
+    """Points (n, 3) [m] of the collision shape of the plain arm, in the frame of its link."""
+    return np.asarray(points @ UPPER_ARM.rotation.T + UPPER_ARM.translation)
 
 
 def volume(axis: Array, radius: float) -> float:
@@ -118,26 +126,77 @@ def test_a_mesh_of_the_urdf_is_held_where_it_stands(tmp_path: Path) -> None:
         )
 
 
-def test_a_link_of_one_mesh_has_a_hull_around_it() -> None:
-    """Not a link with more shapes, with capsules of the user, or without its mesh. The block has
-    the place of the mesh's origin in the URDF."""
-    cylinder = NAMED.index('<collision><origin xyz="0.1 0 0" rpy="0 1.57 0"/>')
-    alone = NAMED[:cylinder] + NAMED[NAMED.index("<collision><geometry><mesh") :]
+CYLINDER = '<collision><origin xyz="0.1 0 0" rpy="0 1.57 0"/>'
+ALONE = NAMED[: NAMED.index(CYLINDER)] + NAMED[NAMED.index("<collision><geometry><mesh") :]
+"""The mesh is the only shape of its link."""
+
+
+def test_a_link_of_shapes_with_corners_has_hulls_of_them() -> None:
+    """Not a link with capsules of the user, with a ball, or without its mesh. The block has the
+    place of the mesh's origin in the URDF."""
     files = {"forearm.stl": stl(BLOCK)}
-    asked = dataclasses.replace(RICH_ARM, urdf=alone, meshes=files)
-    (hull,) = robot(asked).hulls
-    (capsule,) = [each for each in robot(asked).capsules if each.link == hull.link == 2]
+    asked = dataclasses.replace(RICH_ARM, urdf=ALONE, meshes=files)
+    (hull,) = [each for each in robot(asked).hulls if each.link == 2]
+    (capsule,) = [each for each in robot(asked).capsules if each.link == 2]
     assert len(hull.points) == 8
     assert ConvexHull(hull.points).volume == pytest.approx(0.18 * 0.06 * 0.04, rel=0.01)
     assert hull.points.mean(axis=0) == pytest.approx(capsule.axis.mean(axis=0), abs=5e-3)
+    both = [each for each in robot(dataclasses.replace(asked, urdf=NAMED)).hulls if each.link == 2]
+    assert len(both) == 2
     forearm = {"forearm": [(0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.05)]}
     own = dataclasses.replace(asked.collision, capsules=forearm)
+    ball = ALONE.replace(
+        "<collision><geometry><mesh",
+        '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
+        "<collision><geometry><mesh",
+    )
     for other in (
-        dataclasses.replace(asked, urdf=NAMED),
+        dataclasses.replace(asked, urdf=ball),
         dataclasses.replace(asked, collision=own),
         dataclasses.replace(asked, meshes={}),
     ):
-        assert not robot(other).hulls
+        assert 2 not in {each.link for each in robot(other).hulls}
+
+
+def test_the_hull_of_a_cylinder_holds_it_closely() -> None:
+    """The prism around it reaches 0.4 mm beyond, and the grown hull 2.7 mm beyond the prism."""
+    (hull,) = [each for each in robot(PLAIN).hulls if each.link == 1]
+    turn = 2 * np.pi * np.arange(200) / 200
+    around = np.stack([0.05 * np.cos(turn), 0.05 * np.sin(turn)], axis=1)
+    ends = [np.column_stack([around, np.full(200, z)]) for z in (-0.15, 0.15)]
+    found = outside(in_upper_arm(np.concatenate(ends)), [hull])
+    assert found.min() >= -0.0027 - 4.4e-4 and found.max() <= 0.0
+
+
+def test_a_bent_mesh_has_hulls_of_its_parts() -> None:
+    """Every triangle is within them, and the bend is free, which one hull would fill."""
+    arms = [trimesh.creation.box((180.0, 50.0, 40.0)), trimesh.creation.box((50.0, 180.0, 40.0))]
+    arms[0].apply_translation((65.0, 0.0, 0.0))
+    arms[1].apply_translation((0.0, 65.0, 0.0))
+    bent = trimesh.util.concatenate(arms)
+    text = meshed('scale="0.001 0.001 0.001"').replace("link.obj", "link.stl")
+    made = robot(changed(urdf=text, meshes={"link.stl": stl(bent)}))
+    hulls = [each for each in made.hulls if each.link == 1]
+    assert len(hulls) > 1
+    triangles = in_upper_arm(bent.triangles.reshape(-1, 3) / 1000).reshape(-1, 3, 3)
+    assert not len(not_held(triangles, hulls))
+    assert outside(in_upper_arm(np.array([[0.1, 0.1, 0.0]])), hulls).min() > 0.03
+
+
+def test_links_whose_hulls_are_apart_are_compared() -> None:
+    """The capsule around a wide plate beneath the arm meets the forearm everywhere."""
+    plate = '<collision><geometry><box size="1.5 1.5 0.02"/></geometry></collision>'
+    rod = '<collision><origin xyz="0 0 0.15"/><geometry>{}</geometry></collision>'
+    for shape, excluded in (
+        ('<cylinder radius="0.03" length="0.3"/>', set()),
+        ('<capsule radius="0.03" length="0.3"/>', set()),
+    ):
+        text = URDF.replace('<link name="base"/>', f'<link name="base">{plate}</link>')
+        text = text.replace('<link name="forearm">', '<link name="forearm">' + rod.format(shape))
+        assert robot(changed(urdf=text)).never_in_collision == excluded
+    rows = {"base": [(-0.75, 0.0, 0.0, 0.75, 0.0, 0.0, 0.76)]}
+    by_capsules = changed(urdf=text, collision=dataclasses.replace(PLAIN.collision, capsules=rows))
+    assert robot(by_capsules).never_in_collision == {(0, 2)}
 
 
 def test_a_missing_mesh_is_told() -> None:
@@ -172,9 +231,9 @@ def test_the_longest_agreement_of_paths_counts() -> None:
         "left/arm/link.stl": stl(BLOCK),
         "right/arm/link.stl": stl(trimesh.creation.icosphere()),
     }
-    found = corners(files, "package://cell/right/arm/link.stl")
-    assert found is not None and np.linalg.norm(found, axis=1).max() == pytest.approx(1.0)
-    assert corners(files, "package://cell/right/arm/hand.stl") is None
+    found = surface(files, "package://cell/right/arm/link.stl")
+    assert found is not None and np.linalg.norm(found[0], axis=1).max() == pytest.approx(1.0)
+    assert surface(files, "package://cell/right/arm/hand.stl") is None
     # no step out of the folder
     assert in_folder(Path("/tmp/nowhere"), '<mesh filename="../../../etc/passwd.stl"/>') == {}
 

@@ -15,9 +15,9 @@ from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.coal_distance import coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arm import TOOL, Arm
 from joulepath.optimizer.problem.clouds import Points
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.scene import Attachment, Box, Obstacle, Scene, Sphere
 from tests.mesh_folders import meshes
 from tests.optimizer.cells import wander
 from tests.optimizer.moves import ROBOT
@@ -52,6 +52,37 @@ def test_without_obstacles_there_are_no_hulls() -> None:
     )
     assert [each.name for each in with_hulls.bodies] == [each.name for each in without.bodies]
     np.testing.assert_array_equal(with_hulls.pairs, without.pairs)
+
+
+def test_links_are_compared_by_hulls_if_the_robot_says_so() -> None:
+    """Also with the tool; links without hulls, as the base, by their capsules. A check of single
+    configurations agrees with the distances, and their gradients with differences.
+    """
+    rod = Attachment(Sphere(0.03), at(0.0, 0.0, 0.05))
+    model = CollisionModel(Arm(robot=replace(ROBOT, hulls_between_links=True), tool=[rod]))
+    pairs = [(model.bodies[i], model.bodies[k]) for i, k in model.pairs.tolist()]
+    assert all(i.is_hull == (i.link > 0) for i, _ in pairs)
+    assert all(k.is_hull == (k.name != TOOL) for _, k in pairs)
+    by_capsules = CollisionModel(Arm(robot=ROBOT, tool=[rod]))
+    links = [
+        {(each.bodies[i].link, each.bodies[k].link) for i, k in each.pairs.tolist()}
+        for each in (model, by_capsules)
+    ]
+    assert links[0] == links[1]
+    q = np.random.default_rng(5).uniform(-3, 3, (200, 6))
+    distance, gradient = model.signed_distances(q)
+    least = distance.min(axis=1)
+    assert 0.05 < (least < 0).mean() < 0.5
+    check = model.clearance_check(0.0)
+    met = np.array([check.is_met(each) for each in q])
+    np.testing.assert_array_equal(met, least >= 0)
+    apart, step = distance > 1e-3, 1e-6
+    for joint in range(6):
+        moved = [model.signed_distances(q + sign * step * np.eye(6)[joint])[0] for sign in (1, -1)]
+        difference = (moved[0] - moved[1]) / (2 * step)
+        # a step across an edge, where the nearest point changes, is not differentiable
+        error = np.abs(difference - gradient[:, :, joint])[apart]
+        assert np.quantile(error, 0.99) < 1e-6
 
 
 def test_distances_are_those_of_the_meshes_or_a_little_less() -> None:
