@@ -42,8 +42,8 @@ class PartSettings:
     """Least decrease of the cost of a part by its division, relative to this cost."""
     surface: int = 200_000
     """Points of every mesh, from which distances are measured."""
-    triangles: int | None = None
-    """Random triangles of a part, from which its planes are chosen; None for all of them."""
+    points: int | None = None
+    """Random points of a part, from which its planes are chosen; None for its triangles."""
     density: float = 12_000.0
     """Points of a hull per m², at which its excess is measured."""
     offsets: int = 9
@@ -64,8 +64,8 @@ QUICK = PartSettings(
     free=0.003,
     gain=0.3,
     surface=10_000,
-    density=500.0,
-    triangles=300,
+    density=1_000.0,
+    points=2_000,
     offsets=4,
     spreads=(),
 )
@@ -103,9 +103,9 @@ def below(triangles: Array, normal: Array, offset: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A part of a surface: all triangles, those from which planes are chosen, planes of the hull,
-    points on the hull in order of decreasing distance from the surface of the link, and the area
-    [m²] per point. The first `far` points are farther away than `PartSettings.free`.
+    """A part of a surface: its triangles, those or points from which planes are chosen, planes of
+    the hull, points on the hull in order of decreasing distance from the surface of the link, and
+    the area [m²] per point. The first `far` points are farther away than `PartSettings.free`.
     """
 
     triangles: Array
@@ -143,10 +143,10 @@ class Division:
 
     def part(self, triangles: Array) -> _Part:
         """A part of these triangles. Raises QhullError for flat ones."""
-        most, chosen = self.settings.triangles, triangles
-        if most is not None and len(triangles) > most:
-            rows = np.random.default_rng(0).choice(len(triangles), most, replace=False)
-            chosen = triangles[rows]
+        chosen, few = triangles, self.settings.points
+        if few is not None and len(triangles) > few:
+            points = sampled(triangles, few, np.random.default_rng(0))
+            chosen = np.repeat(points[:, None], 3, axis=1)  # a point is a triangle of no size
         hull = ConvexHull(chosen.reshape(-1, 3))
         count = int(self.settings.density * hull.area) + 1
         points = sampled(hull.points[hull.simplices], count, np.random.default_rng(0))

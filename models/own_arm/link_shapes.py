@@ -35,8 +35,9 @@ class HullLimits:
 
     points: int = 128
     """Most points of a hull: with more, distances take longer than those of a few capsules."""
-    count: int = 8
-    """Most hulls of a link, as of the robots that come with the product."""
+    count: int = 16
+    """Most hulls of a link: a hand is drawn with some ten boxes, and every hull is compared with
+    those of all other links."""
     triangles: int = 300_000
     """Most triangles of a mesh that is divided into parts: their corners take 20 MB."""
     sides: int = 24
