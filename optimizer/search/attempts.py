@@ -91,7 +91,7 @@ def solve(state: SearchState, candidate: Candidate) -> SolveResult:
         if interval.t_max < candidate.shortest:
             continue
         context = partial(_informed_context, state, candidate, interval)
-        result, moved = _attempted(state, candidate, context, lambda solver: solver.solve())
+        result, moved = attempted(state, candidate, context, lambda solver: solver.solve())
         results.append(result)
         if result.spline is not None:
             solved.append((result, moved))
@@ -121,7 +121,7 @@ def _informed_context(
     )
 
 
-def _attempted(
+def attempted(
     state: SearchState,
     candidate: Candidate,
     context_now: Callable[[], SolveContext],
@@ -131,6 +131,12 @@ def _attempted(
 
     Ends on self-motions slide. If they slide to where the problem forbids them to be, the attempt
     is repeated with fixed ends.
+
+    Args:
+        state: state of the search.
+        candidate: the candidate.
+        context_now: makes the context of a solve.
+        attempt: the attempt.
     """
     fixed, prepared = context_now(), state.prepared
     context = with_sliding_ends(fixed, candidate)
@@ -222,6 +228,6 @@ def improve(
         if duration is not None:
             interval = replace(interval, t_min=duration, t_max=duration)
         context = partial(context_of, state, candidate, interval)
-        result, moved = _attempted(state, candidate, context, attempt)
+        result, moved = attempted(state, candidate, context, attempt)
         if result.spline is not None:
             state.accept_if_better(candidate, result, state.prepared.energy(result.spline), moved)

@@ -88,18 +88,17 @@ class CoarseSolver:
             found.append(CoarseMotion(each, _at_rest(points, each)))
         return found
 
-    def random(self, candidate: Candidate, count: int) -> list[CoarseMotion]:
-        """Guesses of a candidate by random displacements of the quintic, within the position
-        limits.
+    def random(self, candidates: Sequence[Candidate]) -> list[CoarseMotion]:
+        """Guesses of candidates by random displacements of their quintics, each by another one,
+        within the position limits. A candidate may occur several times.
         """
-        limits, line = self.prepared.problem.arm.active_limits, _line(candidate)
-        at = _greville()
-        return [
-            CoarseMotion(
-                candidate, _at_rest(np.clip(line + each, limits.q_min, limits.q_max), candidate)
-            )
-            for each in random_displacements(limits, self.duration, at, count)
-        ]
+        limits, at = self.prepared.problem.arm.active_limits, _greville()
+        displacements = random_displacements(limits, self.duration, at, len(candidates))
+        found = []
+        for each, displacement in zip(candidates, displacements, strict=True):
+            points = np.clip(_line(each) + displacement, limits.q_min, limits.q_max)
+            found.append(CoarseMotion(each, _at_rest(points, each)))
+        return found
 
     def solved(
         self,

@@ -12,6 +12,7 @@ from joulepath.optimizer.search.outer_turns import explore_families
 from joulepath.optimizer.search.sampled_ends import activate_deferred
 from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
+from joulepath.optimizer.search.sliding_work import explore_sliding_work
 from joulepath.optimizer.search.state import SearchState
 
 
@@ -20,7 +21,8 @@ def explore(state: SearchState) -> None:
 
     Deferred candidates are solved while there is no motion.
     """
-    _activate(state)
+    if not explore_sliding_work(state) or state.problem.arm.scene.names:
+        _activate(state)
 
     def solve_open() -> None:
         branch_and_bound.explore(

@@ -113,7 +113,7 @@ class _LeastWorkSearch:
 
     def _restarted(self, best: CoarseMotion, settings: RestartSettings) -> list[CoarseMotion]:
         """Motions from random guesses of the best candidate, in batches as long as they improve."""
-        guesses = self.solver.random(best.candidate, settings.restarts)
+        guesses = self.solver.random([best.candidate] * settings.restarts)
         found, least = list[CoarseMotion](), best.work
         for k in range(0, len(guesses), settings.batch):
             batch = self._solve(

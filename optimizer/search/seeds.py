@@ -88,6 +88,12 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     return True
 
 
+def locally_least(candidates: Sequence[Candidate], energy: Array) -> list[Candidate]:
+    """Candidates of locally least energies (n,) along their self-motions, the least first."""
+    is_least = _local_minima(candidates, energy)
+    return [candidates[k] for k in np.argsort(energy, kind="stable").tolist() if is_least[k]]
+
+
 def estimates(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
     """Estimated objectives of candidates, shape (n,) [J]; see `estimates_between`."""
     q_start, q_goal = (

@@ -26,7 +26,7 @@ from joulepath.optimizer.dynamics.plant import SMOOTHING, has_corners
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import Spline, lasting, sampled
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.search.attempts import in_time, solve_from, solver_of
+from joulepath.optimizer.search.attempts import attempted, context_of, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.random_displacements import random_displacements
 from joulepath.optimizer.search.state import SearchState
@@ -140,7 +140,9 @@ def sharpen(state: SearchState, best: Candidate) -> None:
     follower, mechanical = _Follower(state, best), problem.objective == "mechanical"
     if not mechanical:
         follower.solve_around(coarse.get(best, best.spline))
-    ahead = follower.follow(restarts=SHARPENING.restarts if mechanical else 0)
+    # with ends that slide, motions from random starts are known already
+    restarts = SHARPENING.restarts if mechanical and not state.sliding_work_sought else 0
+    ahead = follower.follow(restarts)
     for rival in rivals:
         _Follower(state, rival).follow(restarts=0, ahead=ahead)
     best = state.best() or best
@@ -292,10 +294,15 @@ class _Follower:
         if fixed:
             interval = replace(interval, t_min=float(t[-1]), t_max=float(t[-1]))
         known = np.inf if candidate.energy is None else candidate.energy
-        solver = solver_of(state, candidate, interval, known)
-        result = in_time(state, partial(solver.solve_evenly, q, t, count, progress))
+        result, moved = attempted(
+            state,
+            candidate,
+            partial(context_of, state, candidate, interval, known),
+            lambda solver: solver.solve_evenly(q, t, count, progress),
+        )
         if result.spline is not None:
-            state.accept_if_better(candidate, result, state.prepared.energy(result.spline))
+            energy = state.prepared.energy(result.spline)
+            state.accept_if_better(candidate, result, energy, moved)
         return result.spline
 
     def _interval(self, duration: float, width: float = SMOOTHING.power_width) -> DurationInterval:

@@ -27,6 +27,7 @@ from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.path_ends import path_candidates
 from joulepath.optimizer.search.refinement import refine, refine_rivals
 from joulepath.optimizer.search.sampled_ends import between
+from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import FoundMotion, SearchState
 from joulepath.optimizer.search.tightened_limits import retry_within_tighter_limits
 from joulepath.optimizer.search.warm_start import warm_start
@@ -37,6 +38,10 @@ Stage = Callable[[SearchState], None]
 
 STORAGE_SHARE = 0.5
 """Share of the time left for the search without energy storage."""
+LONGEST_SHARE = 0.6
+"""Share of the time left for the search for a motion of the longest duration that comes first."""
+BRIEF_REST = 4.0
+"""Ratio of the longest to the least duration up to which no shorter motion is sought."""
 
 
 def find_candidates(state: SearchState) -> None:
@@ -84,6 +89,10 @@ def explore_candidates(state: SearchState) -> None:
     problem = state.problem
     # rest does no work: any motion may rest for the remaining time
     state.may_rest = problem.objective == "mechanical" and not problem.has_fixed_duration
+    if _rests_briefly(state):
+        solve_longest_duration(state, LONGEST_SHARE)
+        if state.best() is not None:
+            return
     explore_or_find_fastest(state, lambda: explore(state), state.known, state.without_storage)
 
 
@@ -109,13 +118,24 @@ def refine_best(state: SearchState) -> None:
     start_from_free_duration(state, state.best() or best)
 
 
-def solve_longest_duration(state: SearchState) -> None:
-    """Compare with the motion of the longest duration, once."""
+def _rests_briefly(state: SearchState) -> bool:
+    """Whether motions between sliding ends may rest, but not for long.
+
+    The motion of the longest duration then needs the least work of all.
+    """
+    sliding = [each for each in state.candidates if slides(state.prepared, each)]
+    if not (state.may_rest and sliding) or state.known:
+        return False
+    least = min(each.shortest for each in sliding)
+    return (state.problem.duration_max or 0.0) <= BRIEF_REST * least
+
+
+def solve_longest_duration(state: SearchState, share: float = 1.0) -> None:
+    """Compare with the motion of the longest duration, once, in a share of the time left."""
     longest = None
     if state.may_rest:
-        longest = solve_related(
-            state, replace(state.problem, duration_min=state.problem.duration_max)
-        )
+        fixed = replace(state.problem, duration_min=state.problem.duration_max)
+        longest = solve_related(state, fixed, share)
     if longest is not None:
         state.accept_if_better(longest.candidate, longest.result, longest.energy)
     state.may_rest = False

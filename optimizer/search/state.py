@@ -86,6 +86,8 @@ class SearchState:
     """Whether the search had no motion to one of the best goals of free orientation."""
     least_work_sought: bool = False
     """Whether coarse motions of least work have been sought."""
+    sliding_work_sought: bool = False
+    """Whether least work between sliding ends has been sought."""
     may_rest: bool = False
     """Whether the motion of the longest duration is still to be compared."""
     seeks_baselines: bool = False

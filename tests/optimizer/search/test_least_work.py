@@ -118,7 +118,7 @@ def test_guesses_rest_at_their_ends() -> None:
     own = run()
     candidate = own.state.candidates[0]
     work = rough_work(own)
-    guesses = [*work.first([candidate]), *work.random(candidate, 4)]
+    guesses = [*work.first([candidate]), *work.random([candidate] * 4)]
     assert len(guesses) == 5
     rest = bspline.REST_POINTS
     for each in guesses:
@@ -142,7 +142,7 @@ def test_rough_work_is_that_of_the_motion() -> None:
     ][:2]
     work = rough_work(own)
     found = work.solved(
-        [*work.first(chosen), *(work.random(each, 1)[0] for each in chosen)],
+        [*work.first(chosen), *(work.random([each])[0] for each in chosen)],
         COARSE.control_points,
         0.5,
         1e-2,
