@@ -14,7 +14,7 @@ import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import JoulepathError
-from joulepath.optimizer.kinematics.angles import nearest_turn
+from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.goal_manifold import GoalManifold
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
@@ -223,10 +223,21 @@ def on_branch(prepared: PreparedProblem, q: Array) -> bool:
     return wanted.allows(required_inverse_kinematics(prepared.arm.robot, "goal").label(q))
 
 
+def is_on(motion: SelfMotion, q: Array) -> bool:
+    """Whether q (nq,) [rad] is on a curve, up to rounding and full turns of joints.
+
+    At a joint limit, rounding may take the nearest member beyond it.
+    """
+    (nearest,) = motion.at(np.array([motion.parameter(q)]))
+    return float(np.abs(wrapped(nearest - q)).max()) < SAMPLES.equal_distance
+
+
 def _reaches(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> bool:
     """Whether q (nq,) [rad] reaches the target of an end; true for an end that is no sample."""
     if not end.sampled:
         return True
+    if end.self_motion is not None:
+        return is_on(end.self_motion, q)
     nearest = nearest_configuration(prepared, end, q)
     return nearest is not None and _is_equal(nearest, q)
 

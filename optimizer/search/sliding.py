@@ -18,12 +18,9 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.targets import Side
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.sampled_ends import with_ends
+from joulepath.optimizer.search.sampled_ends import is_on, with_ends
 from joulepath.optimizer.solve.methods import method_of
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
-
-CURVE_TOLERANCE = 1e-6
-"""Displacement [rad] from a curve below which a posture is on the curve."""
 
 
 def slides(prepared: PreparedProblem, candidate: Candidate) -> bool:
@@ -92,12 +89,6 @@ def _end(
             known = nearest.get(end.self_motion, sample)
             nearest[end.self_motion] = min(known, sample, key=itemgetter(0))
     for _, end in sorted(nearest.values(), key=itemgetter(0)):
-        motion = end.self_motion
-        # at a joint limit, rounding may take the member beyond it
-        if (
-            motion is not None
-            and np.abs(wrapped(motion.at(np.array([motion.parameter(q)]))[0] - q)).max()
-            < CURVE_TOLERANCE
-        ):
+        if end.self_motion is not None and is_on(end.self_motion, q):
             return end
     return None
