@@ -18,6 +18,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -45,6 +46,8 @@ from joulepath.optimizer.search.refinement import refine
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import estimates
 from joulepath.optimizer.search.state import SearchState
+from joulepath.optimizer.solve.methods.method import Method
+from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
 ROBOTS = ("ur5e", "panda", "iiwa14")
 OBJECTIVES = ("mechanical", "electrical")
@@ -97,7 +100,11 @@ def problem_of(seed: int, index: int, objective: str) -> Problem:
 
 def guess(rng: np.random.Generator, candidate: Candidate, arm: Arm) -> CoarseMotion:
     """A random motion of a candidate; in a third of them, two joints at most leave the line."""
-    space, rest, limits = bspline.uniform(COARSE.control_points), bspline.REST_POINTS, arm.limits
+    space, rest, limits = (
+        bspline.uniform(COARSE.control_points),
+        bspline.REST_POINTS,
+        arm.active_limits,
+    )
     half_waves, nq = np.arange(1, WAVES + 1), len(candidate.q_start)
     waves = np.sin(np.pi * np.outer(bspline.greville(space.knots), half_waves))
     size = np.exp(rng.uniform(*np.log(AMPLITUDES)))
@@ -138,7 +145,7 @@ def best_of_many(problem: Problem, count: int, seed: Sequence[int]) -> tuple[flo
         problem = replace(problem, duration_min=problem.duration_max)
     rng, run = np.random.default_rng(seed), Run(problem)
     run.prepare()
-    state, space = run.state, bspline.uniform(COARSE.control_points)
+    state = run.state
     # its own random motions would be followed from here, too
     state.sliding_work_sought = True
     solved = list[Candidate]()
@@ -146,12 +153,7 @@ def best_of_many(problem: Problem, count: int, seed: Sequence[int]) -> tuple[flo
         fresh = Candidate(*(getattr(each.candidate, name) for name in ENDS))
         fresh.shortest = each.candidate.shortest
         duration = problem.duration_max or fresh.shortest * rng.uniform(*SLOWER)
-        points, lasting = each.points, float(duration)
-        improve(
-            state,
-            fresh,
-            lambda solver, p=points, t=lasting: solver.solve_control_points(space, p, t),
-        )
+        improve(state, fresh, partial(_solved, each.points, float(duration)))
         if fresh.energy is not None:
             solved.append(fresh)
     solved.sort(key=lambda each: each.energy or 0.0)
@@ -166,6 +168,11 @@ def best_of_many(problem: Problem, count: int, seed: Sequence[int]) -> tuple[flo
 
 
 ENDS = ("start", "goal", "q_start", "q_goal")
+
+
+def _solved(points: Array, duration: float, solver: Method) -> SolveResult:
+    """A solve from control points (n, nq) [rad] of a motion of a duration [s]."""
+    return solver.solve_control_points(bspline.uniform(len(points)), points, duration)
 
 
 def _kinds(points: Sequence[Array], most: int) -> list[int]:
