@@ -13,7 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from joulepath import __version__
 from joulepath.app.access.key_ring import KeyRing
 from joulepath.app.access.start import key_ring
-from joulepath.app.api import docs, health, help, metrics, problems, studio
+from joulepath.app.api import docs, health, metrics, pages, problems
 from joulepath.app.api.advice import route as advice
 from joulepath.app.api.answers import route as answers
 from joulepath.app.api.compare import route as compare
@@ -83,8 +83,7 @@ ROUTES = (
     metrics,
     problems,
     docs,
-    help,
-    studio,
+    pages,
 )
 """Modules of routes, in the order of the documentation pages."""
 

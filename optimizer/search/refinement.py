@@ -9,14 +9,13 @@ import numpy as np
 
 from joulepath.optimizer.dynamics.plant import has_corners
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.motion.spline import retimed, sampled
+from joulepath.optimizer.motion.spline import Spline, retimed, sampled
 from joulepath.optimizer.search.attempts import improve, solve_from
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sharper_cost import sharpen_cost
 from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import DURATION_TOLERANCE, SearchState
-from joulepath.optimizer.search.switch_knots import follow_switches
 from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE
 from joulepath.optimizer.solve.methods.method import Method, above
 from joulepath.optimizer.solve.methods.solve_result import SolveResult
@@ -282,3 +281,46 @@ def lasts_below(ratio: float, state: SearchState, candidate: Candidate) -> bool:
     return candidate.spline.duration < ratio * float(
         shortest_duration(displacement, state.problem.arm.active_limits)
     )
+
+
+@dataclass(frozen=True)
+class SwitchKnotSettings:
+    """Settings of solves with knots at the switches of jerk."""
+
+    first_progress: float = 1e-3
+    """Relative decrease of the cost that a further step of a solve must promise."""
+    most_repeats: int = 2
+    """Largest number of further solves."""
+    least_saving: float = 3e-3
+    """Relative decrease of the energy below which no further solve follows: each solve saves some
+    eighth of what the one before saved."""
+
+
+SWITCH_KNOTS = SwitchKnotSettings()
+
+
+def follow_switches(state: SearchState, candidate: Candidate) -> None:
+    """Solve a candidate with sliding ends with knots at the switches of jerk, until the posture
+    settles.
+
+    The instants at which jerk switches depend on the posture at the ends. The first solve with
+    knots at the switches ends early, because the posture has moved by then. Further solves start
+    from its motion, with knots at the switches of the motion to the new posture.
+    """
+    coarse = candidate.spline
+    _solve_at_switches(state, candidate, coarse)
+    if candidate.spline is coarse:
+        return
+    for _ in range(SWITCH_KNOTS.most_repeats):
+        before = candidate.energy or 0.0
+        if state.deadline.passed:
+            return
+        _solve_at_switches(state, candidate, candidate.spline)
+        if before - (candidate.energy or 0.0) < SWITCH_KNOTS.least_saving * abs(before):
+            return
+
+
+def _solve_at_switches(state: SearchState, candidate: Candidate, spline: Spline) -> None:
+    """Solve from a motion; knots at switches follow the posture."""
+    progress = SWITCH_KNOTS.first_progress
+    improve(state, candidate, lambda solver: solver.solve_at_switches(spline, progress))

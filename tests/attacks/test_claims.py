@@ -16,7 +16,7 @@ from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.search.optimality import OPTIMALITY
+from joulepath.optimizer.search.answer import OPTIMALITY
 from tests.optimizer.moves import ROBOT, problem
 from tests.selection import long_but
 

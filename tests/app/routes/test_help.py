@@ -9,7 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath.app.access.client import needed_role
-from joulepath.app.api.shared import static_folder
+from joulepath.app.api import pages
 from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.transport import NotFound, PagesNotBuilt
 from joulepath.app.http.problems import path_of
@@ -88,14 +88,14 @@ def test_nothing_else_is_served(idle: TestClient, path: str) -> None:
 def test_pages_that_were_not_built_are_said_to_be_missing(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(static_folder, "files", lambda _: tmp_path)
-    static_folder._files.cache_clear()
+    monkeypatch.setattr(pages, "files", lambda _: tmp_path)
+    pages._files.cache_clear()
     try:
         client = TestClient(create_app(), base_url=LOCAL)
         for path in ("/help/", "/help/how_to/", "/studio"):
             refused(client.get(path), PagesNotBuilt)
     finally:
-        static_folder._files.cache_clear()
+        pages._files.cache_clear()
 
 
 @pytest.mark.parametrize("path", ["/help", "/help/", "/help/start/first_saving/", "/help/a.js"])

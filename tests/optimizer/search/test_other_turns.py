@@ -20,7 +20,7 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.other_turns import OTHER_TURNS, other_turns
+from joulepath.optimizer.search.near_goals import OTHER_TURNS, other_turns
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import estimates_between, expected
 from tests.optimizer.search.runs import explored, prepared

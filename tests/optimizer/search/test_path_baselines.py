@@ -14,8 +14,8 @@ from joulepath.optimizer.motion.quintic import fraction
 from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.search.baseline_comparison import PATH_BASELINES
 from joulepath.optimizer.search.baselines import standing
-from joulepath.optimizer.search.path_baselines import PATH_BASELINES
 from tests.optimizer.moves import ROBOT
 from tests.optimizer.tool_paths import ARM, HOME, along, moved
 

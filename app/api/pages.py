@@ -1,4 +1,7 @@
-"""Static files of the service: the studio and the pages, built before its start."""
+"""GET /studio, the page that shows motions, and GET /help, the pages of `docs/` as a site.
+
+Both are static files, built before the start of the service, the site by `scripts/build_docs.py`.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,17 @@ from functools import cache
 from importlib.resources import files
 from pathlib import PurePosixPath
 
-from fastapi import Request
-from fastapi.responses import Response
+from fastapi import APIRouter, Request
+from fastapi.responses import RedirectResponse, Response
 
 from joulepath.app.exceptions.transport import NotFound, PagesNotBuilt
 from joulepath.app.http.weights import is_known
 
-INDEX = "index.html"
+router = APIRouter(include_in_schema=False)
+
+_HELP = "help"
+_STUDIO = "studio"
+_INDEX = "index.html"
 _MEDIA_TYPES = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -49,7 +56,49 @@ class _File:
     """Content-Security-Policy of a page; None for other files."""
 
 
-def answer(request: Request, folder: str, path: str) -> Response:
+@router.get("/help")
+async def help_root() -> RedirectResponse:
+    """Leads to the first page. The target is relative: it holds behind a proxy's path, too."""
+    return RedirectResponse("help/", status_code=307)
+
+
+@router.get("/help/{path:path}")
+async def help_page(request: Request, path: str) -> Response:
+    """A page, with a slash at the end of its path, or a file of the site.
+
+    The path of a page without the slash redirects to the page, because the links of a page are
+    relative to its folder. The target of the redirect is only the last part of the path and cannot
+    name another host.
+    """
+    if path.endswith("/") or not path:
+        return _answer(request, _HELP, f"{path}{_INDEX}")
+    if f"{path}/{_INDEX}" in _files(_HELP):
+        query = f"?{request.url.query}" if request.url.query else ""
+        return RedirectResponse(f"{path.rpartition('/')[2]}/{query}", status_code=307)
+    return _answer(request, _HELP, path)
+
+
+@router.get("/")
+async def studio_root() -> RedirectResponse:
+    """Leads to the page. The target is relative: it holds behind a proxy's path, too."""
+    return RedirectResponse("studio", status_code=307)
+
+
+@router.get("/studio")
+async def studio_page(request: Request) -> Response:
+    """The page itself."""
+    return _answer(request, _STUDIO, _INDEX)
+
+
+@router.get("/studio/{path:path}")
+async def studio_asset(request: Request, path: str) -> Response:
+    """A script, a style sheet or the first example of the page."""
+    if not path:  # /studio/: the page's own addresses hold without the slash only
+        return RedirectResponse("../studio", status_code=307)
+    return _answer(request, _STUDIO, path)
+
+
+def _answer(request: Request, folder: str, path: str) -> Response:
     """The file at a path below `app/static/FOLDER`.
 
     Raises:
@@ -70,11 +119,6 @@ def answer(request: Request, folder: str, path: str) -> Response:
     if is_known(found.tag, request):
         return Response(status_code=304, headers=headers)
     return Response(found.content, media_type=found.media_type, headers=headers)
-
-
-def has(folder: str, path: str) -> bool:
-    """Whether there is a file for browsers at a path below `app/static/FOLDER`."""
-    return path in _files(folder)
 
 
 @cache
