@@ -14,6 +14,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -48,6 +49,8 @@ class CacheSettings:
 
 CACHE = CacheSettings()
 _running: set[subprocess.Popen[bytes]] = set()
+_ending = threading.Event()
+"""Set when the program ends: its compilers are killed, and nobody waits for their libraries."""
 
 
 def cache_directory() -> Path:
@@ -90,6 +93,7 @@ def compile_library(
     Raises:
         RuntimeError: there is no compiler, or it fails.
         CompilerHangs: the compiler exceeds its time limit, or did so recently.
+        SystemExit: the program ends, and has killed the compiler.
         OSError: the cache cannot be written.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -177,6 +181,8 @@ def _run(command: Sequence[str], log: Path, lock: IO[bytes], settings: CacheSett
         finally:
             _kill(process)
             _running.discard(process)
+    if code and _ending.is_set():
+        raise SystemExit  # ends its thread without a message
     if code:
         raise RuntimeError(
             f"the C compiler failed: {log.read_text(encoding='utf-8', errors='replace')[-500:]}"
@@ -193,6 +199,7 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
 @atexit.register
 def _kill_all() -> None:
     # Threads that wait for a compiler do not outlive the program.
+    _ending.set()
     for process in list(_running):
         _kill(process)
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -166,3 +168,27 @@ def test_killed_processes_leave_one_hung_compiler_at_most(tmp_path: Path, hung: 
         assert len(hung.read_text().split()) == 2
     finally:
         os.killpg(int(hung.read_text().split()[0]), signal.SIGKILL)
+
+
+def test_a_compiler_that_the_end_of_the_program_kills_is_no_failure(
+    tmp_path: Path, hung: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its folder may be gone before its thread: no script ends with a message on a lost log."""
+    monkeypatch.setattr(library_cache, "_ending", threading.Event())
+    ended: list[BaseException] = []
+
+    def compile_arm() -> None:
+        try:
+            compile_library(tmp_path / "arm.so", (), str)
+        except BaseException as error:
+            ended.append(error)
+
+    compiling = threading.Thread(target=compile_arm)
+    compiling.start()
+    while not (hung.exists() and len(hung.read_text().split()) == 2):
+        time.sleep(0.01)
+    for folder in tmp_path.glob("*.part"):
+        shutil.rmtree(folder)
+    library_cache._kill_all()
+    compiling.join()
+    assert [type(error) for error in ended] == [SystemExit]
