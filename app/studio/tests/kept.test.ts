@@ -17,6 +17,7 @@ import {
   replaceCell,
   request,
   saved,
+  toast,
   typed,
   write,
   type Answered,
@@ -43,6 +44,31 @@ it("a project is saved by itself, as it was typed", async () => {
   });
   await deleteProject("a");
   expect(await projects()).toEqual([]);
+});
+
+/** Another tab saves the project with another mass. */
+async function savedElsewhere(mass: number): Promise<void> {
+  const [record] = await projects();
+  const asked = indexedDB.open("joulepath studio", 1);
+  await vi.waitFor(() => expect(asked.readyState).toBe("done"));
+  const store = asked.result.transaction("projects", "readwrite").objectStore("projects");
+  const put = store.put({ ...record, request: { ...MOVE, payload: { mass } } });
+  await vi.waitFor(() => expect(put.readyState).toBe("done"));
+}
+const kept = async () =>
+  Object.fromEntries((await projects()).map(({ name, request }) => [name, request.payload?.mass]));
+
+it("a tab without changes does not overwrite what another tab has saved", async () => {
+  replaceCell({ project: { id: "t", name: "tabs" }, request: MOVE });
+  await saveNow();
+  await savedElsewhere(3);
+  await saveNow(); // as when it is closed
+  expect([await kept(), saved.value]).toEqual([{ tabs: 3 }, "elsewhere"]);
+  write("/payload/mass", 2, "2");
+  await saveNow();
+  await vi.waitFor(async () => expect(await kept()).toEqual({ tabs: 3, "tabs 2": 2 }), 3000);
+  expect(toast.value).toContain("this one is tabs 2 now");
+  for (const { id } of await projects()) await deleteProject(id);
 });
 
 it("the request of an answer is known again by its id", async () => {

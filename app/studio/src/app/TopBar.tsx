@@ -31,6 +31,7 @@ const SAVED = {
   "": "",
   saving: "Saving …",
   saved: "Saved in this browser",
+  elsewhere: "Changed in another tab: reload",
   failed: "Not saved: this browser keeps nothing",
 };
 

@@ -1,6 +1,7 @@
 // Projects in this browser: saved half a second after each change, one record each (IndexedDB).
 import { effect, untracked } from "@preact/signals";
-import { answered, economics, project, request, saved, typed } from "./state";
+import { freshName } from "./request";
+import { answered, economics, project, request, saved, toast, typed } from "./state";
 import type { Cell } from "./share";
 
 export interface Saved extends Cell {
@@ -110,12 +111,42 @@ function recordNow(): Saved {
   };
 }
 
-/** Writes the present project now. */
+/** The request that this tab last read or wrote, as text: another tab may have saved since. */
+let known = { id: "", request: "" };
+
+/** Writes a record, unless another tab has saved another request; in one transaction, for a tab that is closed. */
+async function writeUnlessChanged(record: Saved): Promise<boolean> {
+  const before = known;
+  const store = (await database()).transaction("projects", "readwrite").objectStore("projects");
+  const own = JSON.stringify(record.request);
+  return new Promise((resolve, reject) => {
+    const asked = store.get(record.id) as IDBRequest<Saved | undefined>;
+    asked.onerror = () => reject(asked.error ?? new Error("IndexedDB refused."));
+    asked.onsuccess = () => {
+      const kept = asked.result && JSON.stringify(asked.result.request);
+      if (kept && before.id === record.id && kept !== before.request && kept !== own)
+        return resolve(false);
+      const put = store.put(record);
+      put.onerror = () => reject(put.error ?? new Error("IndexedDB refused."));
+      put.onsuccess = () => {
+        if (known.id === record.id) known = { id: record.id, request: own };
+        resolve(true);
+      };
+    };
+  });
+}
+
+/** Writes the present project now; as another project, if both this and another tab have changed it. */
 export async function saveNow(): Promise<void> {
   if (!project.value.id) return;
+  const record = recordNow();
   try {
-    await write(recordNow());
-    saved.value = "saved";
+    const written = await writeUnlessChanged(record);
+    saved.value = written ? "saved" : "elsewhere";
+    if (written || JSON.stringify(record.request) === known.request) return;
+    const name = freshName(record.name, [record.name]);
+    project.value = { id: newId(), name };
+    toast.value = `Another tab has changed ${record.name} meanwhile: this one is ${name} now.`;
   } catch {
     saved.value = "failed"; // a private window, or no room
   }
@@ -128,13 +159,18 @@ export function followChanges(): void {
   effect(() => {
     void [project.value, request.value, typed.value, economics.value, answered.value];
     untracked(() => {
-      if (!project.value.id) return;
+      const { id } = project.value;
+      if (!id) return;
       saved.value = "saving";
       clearTimeout(timer);
       // what was changed just before another cell was opened is not lost
-      if (waiting && waiting.id !== project.value.id) void write(waiting).catch(() => undefined);
+      if (waiting && waiting.id !== id) void writeUnlessChanged(waiting).catch(() => undefined);
+      if (known.id !== id) known = { id, request: JSON.stringify(request.value) };
       waiting = recordNow();
-      timer = setTimeout(() => void saveNow(), PAUSE);
+      timer = setTimeout(() => {
+        waiting = null;
+        void saveNow();
+      }, PAUSE);
     });
   });
   effect(() => {

@@ -80,7 +80,7 @@ export const EMPTY: ApiRequest = {
 };
 
 export const project = signal<Project>({ id: "", name: "Untitled cell" });
-export const saved = signal<"" | "saving" | "saved" | "failed">("");
+export const saved = signal<"" | "saving" | "saved" | "elsewhere" | "failed">("");
 export const request = signal<ApiRequest>(EMPTY);
 export const typed = signal<Record<Pointer, string>>({});
 export const answered = signal<Answered | null>(null);
