@@ -144,7 +144,8 @@ export async function saveNow(): Promise<void> {
     const written = await writeUnlessChanged(record);
     saved.value = written ? "saved" : "elsewhere";
     if (written || JSON.stringify(record.request) === known.request) return;
-    const name = freshName(record.name, [record.name]);
+    const others = (await projects()).map(({ name }) => name);
+    const name = freshName(record.name, others);
     project.value = { id: newId(), name };
     toast.value = `Another tab has changed ${record.name} meanwhile: this one is ${name} now.`;
   } catch {

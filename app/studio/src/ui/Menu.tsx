@@ -46,8 +46,11 @@ export function Menu({ label, children, name, icon, id, quiet }: Props) {
       document.removeEventListener("keydown", escape, true);
     };
   }, []);
+  // in a panel that scrolls, its last entries are below the edge
+  const show = () =>
+    box.current?.open && box.current.querySelector(".drop")!.scrollIntoView({ block: "nearest" });
   return (
-    <details class="menu" ref={box} id={id}>
+    <details class="menu" ref={box} id={id} onToggle={show}>
       <summary class={`button${quiet ? " quiet" : ""}`} aria-label={name} title={name}>
         {icon && <Icon name={icon} />}
         {label}
