@@ -60,6 +60,7 @@ class RobotSummary(Response):
         None,
         ["shoulder_pan_joint", "shoulder_lift_joint"],
     )
+    rated_payload: float = described("Greatest mass of a payload.", "kg", 5.0)
     added: bool = described(
         "Whether a user added it; the others come with the service.", None, False
     )

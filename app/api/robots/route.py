@@ -229,6 +229,7 @@ def _summary(name: str, figures: dict[str, Any], added: bool, owner: str | None)
         "name": name,
         "title": figures["title"],
         "joints": figures["kinematics"]["joint_names"]["value"],
+        "rated_payload": figures["limits"]["rated_payload"]["value"],
         "added": added,
         "owner": owner,
         "energy_trust": energy_trust(figures),

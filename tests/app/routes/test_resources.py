@@ -37,6 +37,8 @@ def test_robots(client: TestClient) -> None:
         "panda",
         "xarm7",
     }
+    payloads = {robot.name: robot.rated_payload for robot in robots}
+    assert (payloads["ur5e"], payloads["ur10e"]) == (5.0, 12.5)
     # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
     trust = {robot.name: robot.energy_trust for robot in robots}
     assert "engineering defaults without a source (copper loss" in trust["ur3e"]

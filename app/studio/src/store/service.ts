@@ -39,6 +39,7 @@ export interface RobotSummary {
   name: string;
   title: string;
   joints: string[];
+  rated_payload: number;
   added: boolean;
   energy_trust: string;
 }

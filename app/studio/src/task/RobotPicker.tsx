@@ -57,22 +57,24 @@ export function RobotPicker({ onClose }: { onClose: () => void }) {
           )}
           {!robots && !why && <p class="hint">…</p>}
           <ul class="robots">
-            {shown.map(({ name, title, joints, added, energy_trust: trust }) => (
-              <li key={name}>
-                <button
-                  type="button"
-                  class="choice"
-                  aria-pressed={name === robotName(request.value)}
-                  onClick={() => choose(name)}
-                >
-                  <b>{title}</b>
-                  <small>
-                    {name} · {joints.length} joints{added ? " · yours" : ""}
-                  </small>
-                  <small>{trust}</small>
-                </button>
-              </li>
-            ))}
+            {shown.map(
+              ({ name, title, joints, rated_payload: mass, added, energy_trust: trust }) => (
+                <li key={name}>
+                  <button
+                    type="button"
+                    class="choice"
+                    aria-pressed={name === robotName(request.value)}
+                    onClick={() => choose(name)}
+                  >
+                    <b>{title}</b>
+                    <small>
+                      {name} · {joints.length} joints · {mass} kg payload{added ? " · yours" : ""}
+                    </small>
+                    <small>{trust}</small>
+                  </button>
+                </li>
+              ),
+            )}
           </ul>
         </>
       )}
