@@ -19,7 +19,7 @@ import numpy as np
 
 from joulepath import Arm, ConeOrientedPose, JoulepathError, Pose, Problem, export, optimize
 from joulepath.models.from_figures import robot_of
-from joulepath.models.own_arm.description import Collision, Description, InvalidArm
+from joulepath.models.own_arm.description import Description, InvalidArm
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.own_arm.mesh_files import in_folder
 from joulepath.models.own_arm.rules import RULES
@@ -111,7 +111,6 @@ def first_motion(
     packages: Sequence[Path],
     arguments: Mapping[str, str],
     seed: int,
-    never_meet: Sequence[tuple[str, str]] = (),
 ) -> ArmOutcome:
     """The outcome of a file, from its text to a written motion.
 
@@ -120,11 +119,10 @@ def first_motion(
         packages: folders with ROS packages.
         arguments: values of the arguments of a file with macros.
         seed: seed of the ends of the motion.
-        never_meet: pairs of links that are not compared; by default those that always meet.
     """
     began, read = time.perf_counter(), ArmOutcome(file.name)
     try:
-        robot = robot_of(file.name.split(".")[0], figures_of(file, packages, arguments, never_meet))
+        robot = robot_of(file.name.split(".")[0], figures_of(file, packages, arguments))
     except (InvalidArm, ValueError, OSError) as error:
         return replace(read, message=str(error).replace("\n", " "))
     read = replace(read, joints=robot.nq, inverse="no inverse kinematics")
@@ -152,7 +150,6 @@ def figures_of(
     file: Path,
     packages: Sequence[Path],
     arguments: Mapping[str, str],
-    never_meet: Sequence[tuple[str, str]],
 ) -> dict[str, object]:
     """Figures of the arm in a file. Raises InvalidArm with every problem that remains."""
     folders = [*packages, *package_folders(file)]
@@ -182,7 +179,6 @@ def figures_of(
         locked="others",
         mend_inertias=True,
         meshes=meshes,
-        collision=Collision(never_meet=tuple(never_meet) or None),
     )
     try:
         return own_figures(file.stem, description)[0]

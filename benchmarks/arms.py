@@ -77,11 +77,10 @@ def of_files(given: argparse.Namespace) -> int:
     """Prints a line per URDF file, and the counts."""
     outcomes = list[ArmOutcome]()
     arguments = dict(each.split("=", 1) for each in given.arguments)
-    pairs = [(first, second) for first, second in (each.split(",") for each in given.never_meet)]
     failed = 0
     for file in given.files:
         try:
-            outcomes.append(first_motion(file, given.packages, arguments, given.seed, pairs))
+            outcomes.append(first_motion(file, given.packages, arguments, given.seed))
             print(outcomes[-1], flush=True)
         except Exception as error:
             failed += 1
@@ -102,9 +101,6 @@ def main() -> int:
     )
     arguments.add_argument(
         "--arguments", nargs="+", default=[], metavar="NAME=VALUE", help="of files with macros"
-    )
-    arguments.add_argument(
-        "--never-meet", nargs="+", default=[], metavar="LINK,LINK", help="pairs not compared"
     )
     arguments.add_argument("--count", type=int, default=10, help="requests per robot (%(default)s)")
     arguments.add_argument(
