@@ -21,6 +21,7 @@ from joulepath.optimizer.search.exploration import explore
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from joulepath.optimizer.search.free_members import bounded
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
+from joulepath.optimizer.search.least_work_settings import LEAST_WORK
 from joulepath.optimizer.search.no_trajectory import no_motion
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.other_ways import explore_other_ways
@@ -119,12 +120,16 @@ def refine_best(state: SearchState) -> None:
 
 
 def _rests_briefly(state: SearchState) -> bool:
-    """Whether motions between sliding ends may rest, but not for long.
+    """Whether motions between sliding ends may rest, but not for long, and time suffices to search
+    for the motion of the longest duration.
 
-    The motion of the longest duration then needs the least work of all.
+    This motion then needs the least work of all.
     """
     sliding = [each for each in state.candidates if slides(state.prepared, each)]
-    if not (state.may_rest and sliding) or state.known:
+    in_time = LONGEST_SHARE * state.deadline.left >= LEAST_WORK.least_time
+    if not (state.may_rest and sliding and in_time and state.prepared.kernel.compiled):
+        return False
+    if state.known:
         return False
     least = min(each.shortest for each in sliding)
     return (state.problem.duration_max or 0.0) <= BRIEF_REST * least
