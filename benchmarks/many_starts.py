@@ -217,8 +217,11 @@ def run_task(seed: int, index: int, objective: str, count: int) -> dict[str, Any
         return None
     spent, energy = time.process_time() - began, answer.energy.of(problem.objective)
     least_energy, spline = best_of_many(problem, count, [seed, index])
+    if spline is None:
+        print(f"{name} none of the starts leads to a motion", flush=True)
+        return None
     excess = (energy - least_energy) / abs(least_energy)
-    other = difference(answer.trajectory.spline, spline) if spline and excess > 0 else ""
+    other = difference(answer.trajectory.spline, spline) if excess > 0 else ""
     print(f"{name} {energy:9.3f} J {spent:6.2f} s {100 * excess:+7.2f} % {other}", flush=True)
     return {"name": name, "energy": energy, "excess": max(excess, 0.0), "time": spent}
 
