@@ -118,9 +118,15 @@ def link_surfaces(folder: Path, robot: str, link: int) -> dict[str, Array]:
 
 
 def sampled(triangles: Array, count: int, rng: np.random.Generator) -> Array:
-    """Points (count, 3) [m], uniformly distributed over the area of triangles (t, 3, 3) [m]."""
+    """Points (count, 3) [m], uniformly distributed over the area of triangles (t, 3, 3) [m].
+
+    Raises:
+        ValueError: the triangles have no area.
+    """
     sides = triangles[:, 1:] - triangles[:, :1]
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    if not area.sum() > 0:
+        raise ValueError("The triangles have no area.")
     chosen = rng.choice(len(triangles), count, p=area / area.sum())
     shares = rng.uniform(size=(count, 2, 1))
     # Fold the far half of the parallelogram back onto the triangle.

@@ -21,14 +21,12 @@ from joulepath.optimizer.search.exploration import explore
 from joulepath.optimizer.search.fastest import explore_or_find_fastest, find_fastest
 from joulepath.optimizer.search.free_members import bounded
 from joulepath.optimizer.search.freed_duration import start_from_free_duration
-from joulepath.optimizer.search.least_work_settings import LEAST_WORK
 from joulepath.optimizer.search.no_trajectory import no_motion
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.other_ways import explore_other_ways
 from joulepath.optimizer.search.path_ends import path_candidates
 from joulepath.optimizer.search.refinement import refine, refine_rivals
 from joulepath.optimizer.search.sampled_ends import between
-from joulepath.optimizer.search.sliding import slides
 from joulepath.optimizer.search.state import FoundMotion, SearchState
 from joulepath.optimizer.search.tightened_limits import retry_within_tighter_limits
 from joulepath.optimizer.search.warm_start import warm_start
@@ -39,10 +37,6 @@ Stage = Callable[[SearchState], None]
 
 STORAGE_SHARE = 0.5
 """Share of the time left for the search without energy storage."""
-LONGEST_SHARE = 0.6
-"""Share of the time left for the search for a motion of the longest duration that comes first."""
-BRIEF_REST = 4.0
-"""Ratio of the longest to the least duration up to which no shorter motion is sought."""
 
 
 def find_candidates(state: SearchState) -> None:
@@ -90,10 +84,6 @@ def explore_candidates(state: SearchState) -> None:
     problem = state.problem
     # rest does no work: any motion may rest for the remaining time
     state.may_rest = problem.objective == "mechanical" and not problem.has_fixed_duration
-    if _rests_briefly(state):
-        solve_longest_duration(state, LONGEST_SHARE)
-        if state.best() is not None:
-            return
     explore_or_find_fastest(state, lambda: explore(state), state.known, state.without_storage)
 
 
@@ -119,28 +109,13 @@ def refine_best(state: SearchState) -> None:
     start_from_free_duration(state, state.best() or best)
 
 
-def _rests_briefly(state: SearchState) -> bool:
-    """Whether motions between sliding ends may rest, but not for long, and time suffices to search
-    for the motion of the longest duration.
-
-    This motion then needs the least work of all.
-    """
-    sliding = [each for each in state.candidates if slides(state.prepared, each)]
-    in_time = LONGEST_SHARE * state.deadline.left >= LEAST_WORK.least_time
-    if not (state.may_rest and sliding and in_time and state.prepared.kernel.compiled):
-        return False
-    if state.known:
-        return False
-    least = min(each.shortest for each in sliding)
-    return (state.problem.duration_max or 0.0) <= BRIEF_REST * least
-
-
-def solve_longest_duration(state: SearchState, share: float = 1.0) -> None:
-    """Compare with the motion of the longest duration, once, in a share of the time left."""
+def solve_longest_duration(state: SearchState) -> None:
+    """Compare with the motion of the longest duration, once."""
     longest = None
     if state.may_rest:
-        fixed = replace(state.problem, duration_min=state.problem.duration_max)
-        longest = solve_related(state, fixed, share)
+        longest = solve_related(
+            state, replace(state.problem, duration_min=state.problem.duration_max)
+        )
     if longest is not None:
         state.accept_if_better(longest.candidate, longest.result, longest.energy)
     state.may_rest = False

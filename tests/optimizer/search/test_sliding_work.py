@@ -17,12 +17,10 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search import stages
 from joulepath.optimizer.search.sampled_ends import between
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sliding_work import explore_sliding_work
 from tests.compilers import with_compiler
-from tests.optimizer.clocks import still
 from tests.optimizer.moves import fixed
 from tests.optimizer.search.runs import prepared
 
@@ -107,16 +105,3 @@ def test_others_are_explored_as_before(given: dict[str, Any]) -> None:
     state = prepared(problem(**given)).state
     assert not explore_sliding_work(state)
     assert state.best() is None
-
-
-@pytest.mark.long
-@pytest.mark.usefixtures("compiled")
-def test_the_longest_duration_comes_first_if_time_suffices(monkeypatch: pytest.MonkeyPatch) -> None:
-    shares = list[float]()
-    monkeypatch.setattr(
-        stages, "solve_longest_duration", lambda state, share=1.0: shares.append(share)
-    )
-    for deadline in (AMPLE, 2.0):
-        free = problem(duration_min=None, deadline=deadline)
-        stages.explore_candidates(prepared(free, clock=still).state)
-    assert shares == [stages.LONGEST_SHARE]
