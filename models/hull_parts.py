@@ -80,8 +80,12 @@ DIRECTIONS = [
 
 
 def below(triangles: Array, normal: Array, offset: float) -> Array:
-    """The pieces (k, 3, 3) of triangles (t, 3, 3) with `normal · x <= offset`."""
+    """The pieces (k, 3, 3) of triangles (t, 3, 3) with `normal · x <= offset`; of points (t, 1, 3),
+    those (k, 1, 3) that meet it.
+    """
     height = triangles @ normal - offset
+    if triangles.shape[1] == 1:
+        return np.asarray(triangles[height[:, 0] <= 0])
     is_below = height <= 0
     count = is_below.sum(axis=1)
     pieces = [triangles[count == 3]]
@@ -144,9 +148,8 @@ class Division:
     def part(self, triangles: Array) -> _Part:
         """A part of these triangles. Raises QhullError for flat ones."""
         chosen, few = triangles, self.settings.points
-        if few is not None and len(triangles) > few:
-            points = sampled(triangles, few, np.random.default_rng(0))
-            chosen = np.repeat(points[:, None], 3, axis=1)  # a point is a triangle of no size
+        if few is not None and triangles.shape[1] == 3 and len(triangles) > few:
+            chosen = sampled(triangles, few, np.random.default_rng(0))[:, None]
         hull = ConvexHull(chosen.reshape(-1, 3))
         count = int(self.settings.density * hull.area) + 1
         points = sampled(hull.points[hull.simplices], count, np.random.default_rng(0))
