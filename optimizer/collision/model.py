@@ -18,7 +18,7 @@ from joulepath.optimizer.collision.compiled_distances import ClearanceCheck
 from joulepath.optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from joulepath.optimizer.declared import Metres
 from joulepath.optimizer.kinematics.forward import joint_placements, link_frames
-from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.problem.arm import TOOL, Arm
 
 
 @dataclass(frozen=True)
@@ -291,7 +291,7 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
         for k, body in enumerate(bodies)
         if body.link == 0 and k >= len(robot.capsules) and not body.is_hull
     ]
-    with_hull = {(body.name, body.link) for body in bodies if body.is_hull}
+    hulled, tool_has_hulls = {h.link for h in robot.hulls}, any(p.is_hull for p in arm.tool)
     pairs: list[tuple[int, int]] = []
     for k in of_arm:
         body = bodies[k]
@@ -307,7 +307,10 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
         else:
             others = [i for i in links if bodies[i].link not in body.touches]
         if body.link > 0:
-            replaced = (body.name, body.link) in with_hull and not body.is_hull
+            # by numbers, since the link of the flange may be called as the tool
+            is_of_link = k < len(robot.capsules)
+            has_hulls = body.link in hulled if is_of_link else tool_has_hulls and body.name == TOOL
+            replaced = has_hulls and not body.is_hull
             others += [
                 i for i in obstacles if not (replaced if bodies[i].cloud is None else body.is_hull)
             ]

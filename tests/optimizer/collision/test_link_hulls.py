@@ -18,7 +18,9 @@ from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.problem.arm import TOOL, Arm
 from joulepath.optimizer.problem.clouds import Points
 from joulepath.optimizer.problem.scene import Attachment, Box, Obstacle, Scene, Sphere
+from joulepath.optimizer.problem.tool import load_tool
 from tests.mesh_folders import meshes
+from tests.models.own_arm.arms import URDF, changed, robot
 from tests.optimizer.cells import wander
 from tests.optimizer.moves import ROBOT
 from tests.optimizer.placement.cells import at
@@ -43,6 +45,19 @@ def test_obstacles_are_compared_with_hulls_and_clouds_with_capsules() -> None:
     assert of == {"post": {True}, "ball": {True}, "scan": {False}}
     assert sum(i.name == "post" for i, _ in pairs) == 6
     assert not any(i.is_hull for i, _ in pairs)
+
+
+def test_a_link_called_as_the_tool_is_compared_with_obstacles() -> None:
+    """By its capsules, beside the hulls of a gripper on it."""
+    urdf = URDF.replace('"tool"', '"mounting"').replace('"forearm"', '"tool"')
+    arm = robot(changed(urdf=urdf, tip="mounting"))
+    gripper = load_tool("robotiq_2f_85").shape
+    model = CollisionModel(Arm(robot=arm, tool=gripper, scene=Scene([POST])))
+    pairs = [(model.bodies[i], k) for i, k in model.pairs.tolist()]
+    with_post = [k for i, k in pairs if i.name == "post"]
+    of_link = [k for k in with_post if k < len(arm.capsules)]
+    assert [model.bodies[k].name for k in of_link] == ["tool"]
+    assert sum(model.bodies[k].is_hull for k in with_post) == 1 + sum(p.is_hull for p in gripper)
 
 
 def test_without_obstacles_there_are_no_hulls() -> None:
