@@ -71,8 +71,10 @@ MOST_PAIRS = 2000
 """Pairs of postures, of least estimate, of which guesses are drawn."""
 SLOWER = 1.05, 2.0
 """Durations of guesses of free duration, in multiples of the shortest."""
-SOLVED, REFINED = 14, 5
-"""Coarse motions that are solved, and solved motions that are refined."""
+SOLVED = 14
+"""Coarse motions that are solved."""
+REFINED = 5
+"""Solved motions that are refined."""
 KIND_DISTANCE = 0.3
 """Distance of control points [rad] above which motions are of different kinds."""
 

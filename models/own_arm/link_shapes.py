@@ -45,7 +45,8 @@ class HullLimits:
 
 
 HULLS = HullLimits()
-NO_CORNERS, NO_TRIANGLES = np.empty((0, 3)), np.empty((0, 3, 3))
+NO_CORNERS = np.empty((0, 3))
+NO_TRIANGLES = np.empty((0, 3, 3))
 SOLIDS = {
     "sphere": {"radius": 1},
     "cylinder": {"radius": 1, "length": 1},
