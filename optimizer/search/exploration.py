@@ -9,6 +9,7 @@ from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.least_work import explore_least_work
 from joulepath.optimizer.search.near_goals import activate_near_goals
 from joulepath.optimizer.search.outer_turns import explore_families
+from joulepath.optimizer.search.path_motions import solve_along_paths
 from joulepath.optimizer.search.sampled_ends import activate_deferred
 from joulepath.optimizer.search.seeds import activate_seeds
 from joulepath.optimizer.search.sliding import slides
@@ -19,7 +20,8 @@ from joulepath.optimizer.search.state import SearchState
 def explore(state: SearchState) -> None:
     """Solve candidates until no lower bound is below the best energy.
 
-    Deferred candidates are solved while there is no motion.
+    Deferred candidates are solved while there is no motion, and at last motions along planned paths
+    are sought.
     """
     if not explore_sliding_work(state) or state.problem.arm.scene.names:
         _activate(state)
@@ -34,13 +36,13 @@ def explore(state: SearchState) -> None:
             state.tell_tried,
         )
 
-    if explore_least_work(state, solve_open):
-        return
-    while True:
-        explore_families(state, solve_open)
-        is_solved = state.best() is not None and not _has_lost_a_goal(state)
-        if is_solved or state.deadline.passed or not _activate(state):
-            break
+    if not explore_least_work(state, solve_open):
+        while True:
+            explore_families(state, solve_open)
+            is_solved = state.best() is not None and not _has_lost_a_goal(state)
+            if is_solved or state.deadline.passed or not _activate(state):
+                break
+    solve_along_paths(state)
 
 
 def _has_lost_a_goal(state: SearchState) -> bool:

@@ -22,6 +22,7 @@ from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
 from joulepath.optimizer.solve.methods import METHODS, planned_paths, solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
+from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
 from joulepath.optimizer.solve.methods.planned_paths import (
     PLANNED_PATHS,
@@ -31,7 +32,12 @@ from joulepath.optimizer.solve.methods.planned_paths import (
 )
 from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
-from joulepath.optimizer.solve.methods.solve_result import MotionOrigin, SolveStatus
+from joulepath.optimizer.solve.methods.solve_result import (
+    MotionOrigin,
+    SolveReason,
+    SolveResult,
+    SolveStatus,
+)
 from tests.optimizer.moves import ROBOT, problem_with
 from tests.selection import long_but
 
@@ -123,6 +129,19 @@ def test_every_method_passes_the_post(method: MethodName) -> None:
     reason, expected = solution.candidates[0].reason, origins.get(method)
     for origin in (MotionOrigin.ALONG_PLANNED_PATH, MotionOrigin.FROM_PLANNED_PATH):
         assert reason.endswith(origin.value) == (origin is expected)
+
+
+def test_a_path_from_which_no_solve_leads_has_a_motion_along_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The answer needs no more energy than the time scaling along the path."""
+    failed = SolveResult(SolveStatus.FAILED, SolveReason.NO_COLLISION_FREE_MOTION)
+    monkeypatch.setattr(FreeSpline, "along_path", lambda *_: failed)
+    monkeypatch.setattr(FreeSpline, "solve", lambda method: method.from_planned_paths(failed))
+    monkeypatch.setattr(FreeSpline, "solve_from", lambda *_: failed)
+    along, found = (optimize(blocked(method, POST)) for method in ("time_scaling", "bspline"))
+    assert found.certificate.valid
+    assert found.energy.electrical.total <= along.energy.electrical.total * (1 + LIMIT_TOLERANCE)
 
 
 @pytest.mark.parametrize("method", ["time_scaling", "uniform_scaling"])
