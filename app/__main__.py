@@ -12,12 +12,7 @@ from types import FrameType
 
 def main() -> None:
     """Serves until SIGTERM or Ctrl-C, then exits with 0; with 1 and a message if a setting is
-    wrong, if there are arguments, or if another program has the address."""
-    if len(sys.argv) > 1:
-        sys.exit(
-            f"The service takes no arguments, but {sys.argv[1]!r} was given: set JOULEPATH_… in "
-            "the environment, or use the commands of `joulepath --help`."
-        )
+    wrong, or if another program has the address."""
     # for the time before uvicorn handles signals, and after: when it is done, it raises the signal
     # again
     signal.signal(signal.SIGTERM, _exit)
@@ -55,4 +50,9 @@ def _exit(signum: int, frame: FrameType | None) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        sys.exit(
+            f"The service takes no arguments, but {sys.argv[1]!r} was given: set JOULEPATH_… in "
+            "the environment, or use the commands of `joulepath --help`."
+        )
     main()

@@ -57,11 +57,11 @@ def test_arguments_are_refused_and_not_ignored() -> None:
 
 @pytest.mark.parametrize("code", [0, 3])
 def test_the_exit_code_of_the_server_is_kept(code: int) -> None:
-    """Only an end without an error skips the end of the interpreter."""
+    """Also by `joulepath serve`. Only an end without an error skips the end of the interpreter."""
     program = (
         "import sys, joulepath.app.server as server; "
-        f"server.serve = lambda settings: sys.exit({code}); sys.argv = ['joulepath']; "
-        "from joulepath.app.__main__ import main; main()"
+        f"server.serve = lambda settings: sys.exit({code}); sys.argv = ['joulepath', 'serve']; "
+        "from joulepath.app.cli.main import main; main()"
     )
     assert run(("-c", program), os.environ, EXIT).returncode == code
 
