@@ -12,16 +12,19 @@ A joint that follows another is bound to it by an `equality`, and has no motor.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull
 
 from joulepath.models.possible_inertia import nearest_possible_inertia
-from joulepath.models.robot import Array, FrictionLaw, LinkCapsule, Robot
+from joulepath.models.robot import Array, FrictionLaw, LinkCapsule, LinkHull, Robot
 from joulepath.models.urdf import FLANGE
 
 
@@ -37,6 +40,8 @@ class MjcfSettings:
     """Relative margin by which the greatest principal moment is below the sum of the others."""
     ball: float = 1e-6
     """Length of a capsule below which it is a ball [m]."""
+    digits: int = 6
+    """Decimal digits of the corners of a hull [m]."""
 
 
 MJCF = MjcfSettings()
@@ -46,7 +51,8 @@ def mjcf(robot: Robot) -> str:
     """Write a robot as an MJCF file, with rotors, friction and torque motors.
 
     Bodies, joints and motors have the names of the robot's links and joints. Every joint has its
-    position limits and, on its motor, its torque limit. The geoms are the capsules of the links.
+    position limits and, on its motor, its torque limit. The geoms are the shapes by which links are
+    compared with each other: their capsules, or their hulls.
 
     Args:
         robot: the robot.
@@ -87,7 +93,9 @@ def mjcf(robot: Robot) -> str:
         )
         links.append(body)
     for capsule in robot.capsules:
-        _geom(links[capsule.link], capsule)
+        if capsule.link not in robot.links_by_hulls:
+            _geom(links[capsule.link], capsule)
+    _hulls(root, links, [hull for hull in robot.hulls if hull.link in robot.links_by_hulls])
     SubElement(links[-1], "site", name=FLANGE, **_pose(pin.SE3(robot.T_last_flange)))
     _contacts(root, robot)
     _followers(root, robot)
@@ -144,6 +152,19 @@ def _geom(link: Element, capsule: LinkCapsule) -> None:
         SubElement(link, "geom", type="sphere", pos=_text(start), **size)
     else:
         SubElement(link, "geom", type="capsule", fromto=_text(capsule.axis.ravel()), **size)
+
+
+def _hulls(root: Element, links: Sequence[Element], hulls: Sequence[LinkHull]) -> None:
+    """Adds hulls as meshes, of which MuJoCo takes the convex hulls. Cubes around the points hold
+    the balls by which a hull is grown.
+    """
+    assets = SubElement(root, "asset") if hulls else root
+    for number, hull in enumerate(hulls):
+        name, cube = f"hull_{number}", hull.radius * np.array(list(product((-1, 1), repeat=3)))
+        corners = (hull.points[:, None] + cube).reshape(-1, 3)
+        corners = corners[ConvexHull(corners).vertices].round(MJCF.digits)
+        SubElement(assets, "mesh", name=name, vertex=_text(corners.ravel()))
+        SubElement(links[hull.link], "geom", type="mesh", mesh=name)
 
 
 def _contacts(root: Element, robot: Robot) -> None:

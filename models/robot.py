@@ -230,6 +230,11 @@ class Robot:
     mains: Mains | None = None
     coupling: Coupling = UNCOUPLED
 
+    @cached_property
+    def links_by_hulls(self) -> frozenset[int]:
+        """The links that are compared with other links by their hulls; the others by capsules."""
+        return frozenset(h.link for h in self.hulls if self.hulls_between_links)
+
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {self.nq} joints, payload up to {self.rated_payload:g} kg)"
 

@@ -116,7 +116,7 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
     of_tool = [body for body in attached if not body.is_hull]
     hulls = [*hulls, *(body for body in attached if body.is_hull)]
     obstacles = [body for obstacle in arm.scene.obstacles for body in _bodies_of_obstacle(obstacle)]
-    compared = robot.hulls_between_links or obstacles
+    compared = robot.links_by_hulls or obstacles
     return (*capsules, *of_tool, *(hulls if compared else ()), *obstacles)
 
 

@@ -53,7 +53,7 @@ class CollisionModel:
 
     Two links are checked unless they are adjacent or can never be in collision. Tool and payload
     are checked against all links except the links that they touch by design. Links are represented
-    by their capsules, or by their hulls with `Robot.hulls_between_links`. The scene is checked
+    by their capsules, or by their hulls (`Robot.links_by_hulls`). The scene is checked
     against every moving body; of a link or a tool with hulls, these are checked, except against
     clouds, and its capsules otherwise. All distances have the margin of the obstacle subtracted.
     """
@@ -320,13 +320,11 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
 
 def _compared_between_links(robot: Robot, bodies: Sequence[Body]) -> list[int]:
     """Indices of the bodies by which links are compared with each other, with tool and payload."""
-    capsules = range(len(robot.capsules))
-    if not robot.hulls_between_links:
-        return list(capsules)
+    by_hulls = robot.links_by_hulls
+    capsules = [k for k, capsule in enumerate(robot.capsules) if capsule.link not in by_hulls]
     # the hulls of links precede those of a tool
     hulls = [k for k, body in enumerate(bodies) if body.is_hull][: len(robot.hulls)]
-    hulled = {bodies[k].link for k in hulls}
-    return [k for k in capsules if bodies[k].link not in hulled] + hulls
+    return capsules + [k for k in hulls if by_hulls]
 
 
 def collision_model(arm: Arm) -> CollisionModel:

@@ -12,8 +12,10 @@ import pytest
 from joulepath import load_robot, mjcf
 from joulepath.models.possible_inertia import nearest_possible_inertia
 from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.problem.arm import Arm
 from tests.by_pinocchio import flange
-from tests.models.own_arm.arms import RICH_ARM, robot
+from tests.models.own_arm.arms import RICH_ARM, URDF, changed, robot
 from tests.selection import long_but
 
 # N·m: rounding of torques of some 500 N·m, and of inertias that MuJoCo would refuse
@@ -62,12 +64,41 @@ def test_friction_is_that_of_the_law(arm: Robot) -> None:
     assert np.abs(theirs - ours).max(axis=0) == pytest.approx(0.0, abs=share * ours.max())
 
 
+def test_links_meet_as_in_the_collision_model() -> None:
+    """Of an arm above a wide plate, whose capsule would meet the forearm everywhere. The hulls in
+    the file reach up to 2 mm further.
+    """
+    plate = '<collision><geometry><box size="1.5 1.5 0.02"/></geometry></collision>'
+    rod = '<collision><origin xyz="0 0 0.15"/><geometry>{}</geometry></collision>'
+    text = URDF.replace('<link name="base"/>', f'<link name="base">{plate}</link>')
+    text = text.replace(
+        '<link name="forearm">',
+        '<link name="forearm">' + rod.format('<cylinder radius="0.03" length="0.3"/>'),
+    )
+    above = robot(changed(urdf=text))
+    assert not above.never_in_collision and above.links_by_hulls == {0, 1, 2}
+    model, compared = mujoco.MjModel.from_xml_string(mjcf(above)), CollisionModel(Arm(robot=above))
+    data, rng = mujoco.MjData(model), np.random.default_rng(4)
+    met = []
+    for q in rng.uniform(above.limits.q_min, above.limits.q_max, (200, above.nq)):
+        distance = compared.least_distance(q[None], 1.0)
+        if -1e-4 < distance < 2 * 2e-3:
+            continue
+        data.qpos[:] = q
+        mujoco.mj_forward(model, data)
+        assert (data.ncon > 0) == (distance < 0)
+        met.append(data.ncon > 0)
+    assert 0.05 < np.mean(met) < 0.95
+
+
 def test_limits_names_and_capsules(arm: Robot) -> None:
     model = mujoco.MjModel.from_xml_string(mjcf(arm))
     assert (model.jnt_range == np.column_stack([arm.limits.q_min, arm.limits.q_max])).all()
     assert (model.actuator_ctrlrange[:, 1] == arm.limits.tau_max).all()
     assert [model.joint(k).name for k in range(arm.nq)] == list(arm.joint_names)
-    assert model.ngeom == len(arm.capsules)
+    capsules = [each for each in arm.capsules if each.link not in arm.links_by_hulls]
+    hulls = [each for each in arm.hulls if each.link in arm.links_by_hulls]
+    assert model.ngeom == len(capsules) + len(hulls)
     data = mujoco.MjData(model)
     data.qpos[:] = (arm.limits.q_min + arm.limits.q_max) / 2 + 0.1
     mujoco.mj_forward(model, data)
