@@ -68,8 +68,9 @@ def main() -> None:
 def build(site: Path = SITE) -> None:
     """Build the site, whole or not at all. Raises BuildFailed."""
     python = sys.executable if has_tools() else _own_tools()
-    site.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=site.parent, prefix=".help-") as folder:
+    ENVIRONMENT.parent.mkdir(exist_ok=True)
+    # Outside the package: a search for sources would follow the links to it for ever.
+    with tempfile.TemporaryDirectory(dir=ENVIRONMENT.parent, prefix="help-") as folder:
         stage = Path(folder)
         _stage(stage)
         command = [python, "-m", "zensical", "build", "--strict"]
@@ -91,7 +92,8 @@ def build(site: Path = SITE) -> None:
         (new / STYLE).write_text(_style_of_search(new), encoding="utf-8")
         (new / DIGEST).write_text(digest(), encoding="utf-8")
         shutil.rmtree(site, ignore_errors=True)
-        new.rename(site)
+        site.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(new, site)
 
 
 def is_current(site: Path = SITE) -> bool:

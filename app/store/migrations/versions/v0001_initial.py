@@ -216,7 +216,6 @@ def _job_requests() -> None:
         "job_requests",
         sa.Column("job_id", sa.String(36), nullable=False),
         sa.Column("number", sa.Integer(), autoincrement=False, nullable=False),
-        sa.Column("owner", sa.String(64), nullable=True),
         sa.Column("name", sa.String(200), nullable=True),
         sa.Column("kind", sa.String(32), nullable=False),
         sa.Column("deadline", sa.Double(), nullable=False),
@@ -244,9 +243,7 @@ def _job_requests() -> None:
     )
     op.create_index("ix_job_requests_job_id_state", "job_requests", ["job_id", "state"])
     op.create_index(
-        "ix_job_requests_state_owner_number_job_id",
-        "job_requests",
-        ["state", "owner", "number", "job_id"],
+        "ix_job_requests_state_number_job_id", "job_requests", ["state", "number", "job_id"]
     )
 
 
