@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import json
 import os
 import sqlite3
@@ -19,9 +20,11 @@ from typing import Any
 
 import httpx2
 import pytest
+from alembic import command
 from alembic.autogenerate import compare_metadata
+from alembic.config import Config
 from alembic.migration import MigrationContext
-from sqlalchemy import func, select, text, update
+from sqlalchemy import Engine, func, inspect, select, text, update
 from starlette.testclient import TestClient
 
 from joulepath.app.access.client import Client
@@ -30,11 +33,11 @@ from joulepath.app.engine.result import StoredAnswer, TaskResult
 from joulepath.app.exceptions.stored import StoreUnavailable, UnknownAnswer
 from joulepath.app.settings import Settings
 from joulepath.app.store import answers, database
-from joulepath.app.store.database import create_database_engine, migrate
+from joulepath.app.store.database import create_database_engine, migrate, sqlite_file
 from joulepath.app.store.faults import OtherVersion, fault_of
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import store_answers
-from joulepath.app.store.tables import Answer, Table, new_id, now
+from joulepath.app.store.tables import Answer, JobRequest, Table, new_id, now
 from tests.app.databases import Postgres, opened, why_no_postgres
 from tests.app.forks import Fork
 from tests.app.live import ROOT, WARM_UP, Server, serving
@@ -92,6 +95,62 @@ def test_the_comparison_above_can_fail(tmp_path: Path) -> None:
     with engine.begin() as connection:
         connection.execute(text("DROP INDEX ix_answers_study_id"))
     assert len(tables(url)) == 1
+
+
+def migrate_to(engine: Engine, revision: str) -> None:
+    """Migrates the tables of an empty database to an earlier version."""
+    file = sqlite_file(engine.url)
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+    config = Config()
+    config.set_main_option("script_location", str(Path(database.__file__).parent / "migrations"))
+    with engine.execution_options(writes=True).begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, revision)
+
+
+def test_requests_of_an_earlier_version_get_the_owner_of_their_job(url: str) -> None:
+    engine = create_database_engine(url)
+    migrate_to(engine, "initial")
+    job = {"state": "waiting", "keep_going": False, "total": 1, "ended_before": 0, "events": 0}
+    job |= {"id": "j", "owner": "cell 7", "created": now(), "fingerprint": "f"}
+    request = {"job_id": "j", "number": 0, "kind": "optimize", "deadline": 10.0, "body": b"{}"}
+    request |= {"state": "waiting", "attempt": 0, "deaths": 0, "preempted": 0}
+    with engine.execution_options(writes=True).begin() as connection:
+        for name, row in (("jobs", job), ("job_requests", request)):
+            columns = ", ".join(row), ", ".join(f":{each}" for each in row)
+            connection.execute(
+                text(f"INSERT INTO {name} ({columns[0]}) VALUES ({columns[1]})"), row
+            )
+    migrate(engine)
+    assert tables(url) == []
+    with engine.connect() as connection:
+        assert connection.execute(select(JobRequest.owner)).scalar_one() == "cell 7"
+    engine.dispose()
+
+
+def test_an_early_first_migration_made_the_owners_itself(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/joulepath.db"
+    engine = create_database_engine(url)
+    migrate(engine)
+    with engine.execution_options(writes=True).begin() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = 'initial'"))
+    migrate(engine)
+    assert tables(url) == []
+
+
+def test_migrations_that_databases_have_seen_stay_as_they_are(tmp_path: Path) -> None:
+    """A database keeps the number of its last migration: a change of the tables needs a new one."""
+    engine = create_database_engine(f"sqlite:///{tmp_path}/joulepath.db")
+    migrate_to(engine, "initial")
+    found = inspect(engine)
+    columns = [
+        f"{table} {each['name']} {each['type']} {each['nullable']}"
+        for table in sorted(found.get_table_names())
+        for each in found.get_columns(table)
+    ]
+    digest = hashlib.sha256("\n".join(columns).encode()).hexdigest()
+    assert digest[:16] == "863d42923786df84"
 
 
 def test_a_database_of_another_version_is_refused_with_what_to_do(url: str) -> None:

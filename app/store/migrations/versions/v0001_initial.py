@@ -245,21 +245,3 @@ def _job_requests() -> None:
     op.create_index(
         "ix_job_requests_state_number_job_id", "job_requests", ["state", "number", "job_id"]
     )
-
-
-def downgrade() -> None:
-    """Back to an empty database."""
-    for name in (
-        "job_requests",
-        "iterations",
-        "cached_answers",
-        "job_events",
-        "answers",
-        "studies",
-        "robots",
-        "logs",
-        "known_motions",
-        "jobs",
-        "figures",
-    ):
-        op.drop_table(name)
