@@ -10,7 +10,8 @@ from concurrent.futures import CancelledError as Cancelled
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from joulepath.app.cluster.machine import RESOURCES, compute, resource, version
+from joulepath.app.cluster.machine import RESOURCES, compute, resource
+from joulepath.app.engine.code_version import code_version
 from joulepath.app.engine.task import Ended, Take, Work
 from joulepath.app.exceptions.queue import ClusterUnavailable, WorkerLost
 from joulepath.optimizer.progress import no_listener
@@ -171,7 +172,7 @@ class Cluster:
         """Raises _Unsuitable unless the scheduler, which unpickles tasks, has this version."""
         try:
             async with asyncio.timeout(LINK.patience):
-                found = await client.run_on_scheduler(version)
+                found = await client.run_on_scheduler(code_version)
         except (OSError, TimeoutError, Cancelled):
             raise
         except Exception as error:
@@ -179,10 +180,10 @@ class Cluster:
                 "the scheduler cannot import this package: install joulepath[cluster] there "
                 f"({error!r})"
             ) from None
-        if found != version():
+        if found != code_version():
             raise _Unsuitable(
                 "the scheduler has another version of this package: install the same one on all "
-                f"machines (there {found}, here {version()})"
+                f"machines (there {found}, here {code_version()})"
             )
 
     async def _watch(self, client: Client) -> None:
@@ -216,7 +217,7 @@ class Cluster:
         if new := others - self._others:
             logger.warning(
                 "machines of another version get no work: install the same one there",
-                extra={"machines": sorted(new), "version": version()},
+                extra={"machines": sorted(new), "version": code_version()},
             )
         self._others = others
 

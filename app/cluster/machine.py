@@ -9,14 +9,12 @@ the result.
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import pickle
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
-import joulepath
+from joulepath.app.engine.code_version import code_version
 from joulepath.app.engine.pool import Engine
 from joulepath.app.engine.task import Ended, Task, Work, taking
 from joulepath.app.engine.warm_up import warm
@@ -35,27 +33,13 @@ _WANTED = ("executing", "long-running", "resumed")
 """States of a wanted task in a Dask worker."""
 _engines: WeakKeyDictionary[Worker, Engine] = WeakKeyDictionary()
 
-_CODE = ("*.py", "*.c", "*.yaml")
-
-
-@cache
-def version() -> str:
-    """A digest of the code and figures: objects are exchanged only between equal installations."""
-    digest = hashlib.sha256()
-    package = Path(joulepath.__file__).parent
-    for folder in sorted(each for each in package.iterdir() if each.is_dir()):
-        for file in sorted(file for kind in _CODE for file in folder.rglob(kind)):
-            digest.update(f"{file.relative_to(package)}\n".encode())
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
-
 
 def resource() -> str:
     """Dask's name for one process of an engine of this version.
 
     A worker without this module, or of another version, has none, and gets no task of ours.
     """
-    return f"{RESOURCES}{version()}"
+    return f"{RESOURCES}{code_version()}"
 
 
 Asked = tuple[Task, float, bool]

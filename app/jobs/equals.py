@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
-from joulepath import __version__
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
 from joulepath.app.engine.result import TaskResult
@@ -22,6 +21,7 @@ from joulepath.app.store.leases import Outcome
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import Answer
 from joulepath.app.tasks.answer_cache import asked_for
+from joulepath.app.tasks.request_key import VERSION
 
 ALONE = ("optimize", "compare", "evaluate")
 """Endpoints with self-contained answers; others refer to answers kept as long as their job."""
@@ -69,7 +69,7 @@ class Equals:
     async def _recall(self, held: Held) -> None:
         """Gives a cycle the known motions of its cell."""
         meaning = held.lease.meaning
-        if meaning is not None and "cell" in meaning:
+        if held.asked is not None and meaning is not None and "cell" in meaning:
             with suppress(StoreUnavailable):
                 held.motions = await self._store.read(
                     partial(known_motions.find, cell=meaning["cell"])
@@ -126,7 +126,7 @@ class Equals:
     async def _asked(self, held: Held) -> Asked | None:
         lease = held.lease
         # Another version may have interpreted the request differently.
-        if lease.meaning is None or lease.meaning["version"] != __version__:
+        if lease.meaning is None or lease.meaning["version"] != VERSION:
             return None
         job_id = None if lease.kind in ALONE else lease.job_id
         return await asked_for(self._store, lease.meaning, lease.deadline, lease.owner, job_id)

@@ -8,14 +8,14 @@ from typing import Any
 import orjson
 from pydantic import BaseModel
 
-from joulepath import __version__
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.whatif.task import WhatifRequest
+from joulepath.app.engine.code_version import code_version
 from joulepath.app.schemas.arm import ArmRequest
 from joulepath.app.store.cache import Meaning
 
-_FORM = 2
-"""Form of the answers: requests are not answered by one of another form."""
+VERSION = code_version()
+"""Version of the answers: requests are not answered by those of other code."""
 _CELL = set(ArmRequest.model_fields) - {"payload"}
 
 
@@ -25,10 +25,10 @@ def meaning_of(kind: str, body: Any) -> Meaning:
     It does not depend on the order of fields, on explicit defaults, or on the deadline.
     """
     assert isinstance(body, BaseModel)
-    content = [__version__, _FORM, kind, body.model_dump(mode="json", exclude={"deadline"})]
+    content = [VERSION, kind, body.model_dump(mode="json", exclude={"deadline"})]
     base = (body.optimize or body.evaluate) if isinstance(body, WhatifRequest) else body
     robot = base.robot  # type: ignore[union-attr]
-    meaning: Meaning = {"version": __version__, "digest": _hash(content), "robot": robot}
+    meaning: Meaning = {"version": VERSION, "digest": _hash(content), "robot": robot}
     if isinstance(body, CycleRequest):
         meaning["cell"] = cell_of(body)
     return meaning
@@ -36,7 +36,7 @@ def meaning_of(kind: str, body: Any) -> Meaning:
 
 def cell_of(body: CycleRequest) -> str:
     """A key of the arm and the cell of a cycle: cycles with equal keys may share moves."""
-    return _hash([__version__, body.model_dump(mode="json", include=_CELL)])
+    return _hash([VERSION, body.model_dump(mode="json", include=_CELL)])
 
 
 def key_of(

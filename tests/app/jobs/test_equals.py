@@ -8,7 +8,6 @@ from typing import Any
 import orjson
 import pytest
 
-from joulepath import __version__
 from joulepath.app.access.client import OPERATOR
 from joulepath.app.answers.envelope import AnswerFigures
 from joulepath.app.convert.packed import packed, unpacked
@@ -20,6 +19,7 @@ from joulepath.app.store.jobs import NewJob, NewRequest
 from joulepath.app.store.store import Store
 from joulepath.app.store.tables import JobRequest
 from joulepath.app.tasks.job_request import JobRequestTask, JobResult
+from joulepath.app.tasks.request_key import VERSION
 from joulepath.optimizer.exceptions import OutsideLimits
 from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, until
 
@@ -43,7 +43,7 @@ def computed(task: JobRequestTask, status: str = "optimal") -> TaskResult:
 
 
 def asks(
-    digest: str = "a", deadline: float = 10.0, kind: str = "optimize", version: str = __version__
+    digest: str = "a", deadline: float = 10.0, kind: str = "optimize", version: str = VERSION
 ) -> NewRequest:
     return NewRequest(kind, BODY, deadline, Meaning(version=version, digest=digest, robot="ur5e"))
 

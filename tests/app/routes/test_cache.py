@@ -23,7 +23,7 @@ from joulepath.app.store.cache import Asked
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import keep_answer
 from joulepath.app.store.tables import CachedAnswer
-from joulepath.app.tasks import answer_cache
+from joulepath.app.tasks import answer_cache, request_key
 from joulepath.app.tasks.answer_cache import AnswerCache, InFlight
 from joulepath.app.tasks.answer_collector import figures_of
 from joulepath.app.tasks.read_body import HeldBody
@@ -51,6 +51,15 @@ def is_hit(answer: Any) -> bool:
     cached = answer.headers.get("joulepath-cache") == "hit"
     assert cached == ("age" in answer.headers)
     return cached
+
+
+def test_answers_of_other_code_are_computed_again(
+    recorded: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body = move(method="time_scaling", payload=load(0.122))
+    sent(recorded, body, **KNOWN)
+    monkeypatch.setattr(request_key, "VERSION", "after an update")
+    assert not is_hit(sent(recorded, body, **KNOWN))
 
 
 def test_an_equal_request_has_the_same_answer(recorded: TestClient) -> None:
