@@ -118,16 +118,24 @@ def _number(told: socket.socket) -> int:
 
 @functools.cache
 def _origin() -> socket.socket:
-    """The way to the process that forks, which ends with the last process that has a way to it."""
-    address = os.environ.get(ORIGIN) or start_origin()
-    way = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    way.connect(f"\0{address}")
-    return way
+    """The connection of this process to the process that forks."""
+    if ORIGIN not in os.environ:
+        start_origin()
+    return _connection()
 
 
-def start_origin() -> str:
-    """Starts the process that forks, for this process and those that it starts: to import the
-    package takes as long as the tests of a room. Returns its address."""
+def _connection() -> socket.socket:
+    """A connection to the process that forks, which ends with its last connection."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    connection.connect(f"\0{os.environ[ORIGIN]}")
+    atexit.register(connection.close)
+    return connection
+
+
+def start_origin() -> None:
+    """Starts the process that forks, for this process and the processes that it starts: to import
+    the package takes as long as the tests of a room.
+    """
     address = f"joulepath-forks-{os.getpid()}"
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
         listening.bind(f"\0{address}")
@@ -137,9 +145,9 @@ def start_origin() -> str:
         one_thread = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
         process = subprocess.Popen(command, cwd=ROOT, stdin=listening.fileno(), env=one_thread)
     os.environ[ORIGIN] = address
+    # after the connections of this process, which are closed first
     atexit.register(process.wait)
-    atexit.register(_origin().close)
-    return address
+    _connection()
 
 
 def _asked() -> list[str]:
