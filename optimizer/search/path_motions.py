@@ -1,7 +1,8 @@
 """Motions along planned paths, where solves from these paths end in collisions.
 
 The nonlinear program may find no way back from a collision in a narrow space. A smooth path has a
-proven clearance: only its time law remains to be found, and there is always one.
+proven clearance, and only its time law remains to be found. There is one whenever the durations are
+not limited and the robot can hold every configuration of the path.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from joulepath.optimizer.solve.methods.time_scaling import TimeScaling
 
 
 def solve_along_paths(state: SearchState) -> None:
-    """Without any motion, solve failed candidates along their planned paths, and then from these
-    motions.
+    """If no candidate has a motion, solve the failed candidates along their planned paths, and then
+    freely from the motions along these paths.
 
-    It does nothing for methods that are restricted to motions of another form.
+    Methods that are restricted to motions of another form are left out.
     """
     if state.best() is not None or method_of(state.problem) is not FreeSpline:
         return
@@ -38,6 +39,6 @@ def _solve(state: SearchState, candidate: Candidate) -> None:
         context = context_of(state, candidate, interval)
         result = in_time(state, TimeScaling(context).solve)
         if result.spline is not None:
-            energy = state.prepared.energy(result.spline)
-            state.accept_if_better(candidate, result, energy)
-            solve_from(state, candidate, sampled(result.spline), fine=False)
+            state.accept_if_better(candidate, result, state.prepared.energy(result.spline))
+    if candidate.motion is not None:
+        solve_from(state, candidate, sampled(candidate.motion), fine=False)

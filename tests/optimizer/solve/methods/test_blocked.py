@@ -131,15 +131,17 @@ def test_every_method_passes_the_post(method: MethodName) -> None:
         assert reason.endswith(origin.value) == (origin is expected)
 
 
+@pytest.mark.parametrize("limits", [{}, {"duration_min": 2.0, "duration_max": 2.0}])
 def test_a_path_from_which_no_solve_leads_has_a_motion_along_it(
-    monkeypatch: pytest.MonkeyPatch,
+    limits: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The answer needs no more energy than the time scaling along the path."""
     failed = SolveResult(SolveStatus.FAILED, SolveReason.NO_COLLISION_FREE_MOTION)
     monkeypatch.setattr(FreeSpline, "along_path", lambda *_: failed)
     monkeypatch.setattr(FreeSpline, "solve", lambda method: method.from_planned_paths(failed))
     monkeypatch.setattr(FreeSpline, "solve_from", lambda *_: failed)
-    along, found = (optimize(blocked(method, POST)) for method in ("time_scaling", "bspline"))
+    methods: list[MethodName] = ["time_scaling", "bspline"]
+    along, found = (optimize(replace(blocked(each, POST), **limits)) for each in methods)
     assert found.certificate.valid
     assert found.energy.electrical.total <= along.energy.electrical.total * (1 + LIMIT_TOLERANCE)
 
