@@ -15,8 +15,8 @@ from joulepath.models.from_figures import BETWEEN_LINKS
 from joulepath.models.hull_cover import HULL_FIT
 from joulepath.models.own_arm.description import PLAUSIBLE, Description, InvalidArm
 from joulepath.models.own_arm.figure import assumed, stated
-from joulepath.models.own_arm.link_shapes import LinkShapes, Rows, check_near
-from joulepath.models.own_arm.meeting_pairs import Cover, MeetingPairs, pairs_that_meet
+from joulepath.models.own_arm.link_shapes import Cover, LinkShapes, Rows, check_near
+from joulepath.models.own_arm.meeting_pairs import MeetingPairs, pairs_that_meet
 from joulepath.models.own_arm.robot_xml import robot_element
 from joulepath.models.own_arm.rules import RULES
 from joulepath.models.own_arm.upright import UprightChain
@@ -48,22 +48,20 @@ def shape_figures(
         warnings: messages about unread shapes are appended here.
         checkpoint: ends the computation by an exception.
     """
-    shapes, radius = (
-        LinkShapes.of(description, chain, upright, checkpoint),
-        _radius(description, upright),
-    )
+    shapes = LinkShapes.of(description, chain, upright, checkpoint)
+    radius = _radius(description, upright)
     covers, guessed, figures = list[Cover](), list[bool](), {}
-    hulls = dict[str, list[Rows]]()
     for k, name in enumerate([BASE, *links]):
-        own = shapes.rows(k)
-        rows = own or _between_joints(upright, k, radius)
+        cover = shapes.cover(k)
+        guessed.append(not cover.capsules)
+        if guessed[-1]:
+            cover = Cover(_between_joints(upright, k, radius), [])
+        rows = cover.capsules
         check_near(name, rows)
-        if parts := shapes.hulls(k):
-            hulls[name] = parts
-        covers.append(Cover(rows, parts))
-        guessed.append(not own)
+        covers.append(cover)
         of_user = stated(description, rows, "m", _FRAME)
-        figures[name] = of_user if own else assumed(rows, "m", f"From joint to joint. {_FRAME}")
+        note = f"From joint to joint. {_FRAME}"
+        figures[name] = assumed(rows, "m", note) if guessed[-1] else of_user
     pairs = _given_pairs(description, chain, checkpoint)
     if pairs is None:
         meeting = pairs_that_meet(chain, upright, covers, guessed, checkpoint)
@@ -85,7 +83,10 @@ def shape_figures(
         )
     if shapes.unknown:
         warnings.append(f"Shapes that are not read count as nothing: {_listed(shapes.unknown)}.")
-    return {"collision": figures} | _hull_figures(description, hulls)
+    hulls = zip([BASE, *links], (cover.hulls for cover in covers), strict=True)
+    return {"collision": figures} | _hull_figures(
+        description, {k: each for k, each in hulls if each}
+    )
 
 
 def _hull_figures(

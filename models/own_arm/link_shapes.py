@@ -81,6 +81,19 @@ class _Solid:
         return [part.reshape(-1, 3) for part in parts] if len(parts) > 1 else [self.corners]
 
 
+_Placed = tuple[pin.SE3, _Solid]
+"""Pose of a shape in the frame of its moving link, and the shape."""
+
+
+@dataclass(frozen=True)
+class Cover:
+    """The shapes of a link in its frame."""
+
+    capsules: Rows
+    hulls: list[Rows]
+    """Points of the hulls [m]. A link with hulls is compared by them instead of its capsules."""
+
+
 @dataclass(frozen=True)
 class LinkShapes:
     """Shapes of the links of a chain.
@@ -97,7 +110,6 @@ class LinkShapes:
     unknown: list[str] = field(default_factory=list)
     _seen: list[str] = field(default_factory=list)
     _made: dict[tuple[str, str | None], _Solid] = field(default_factory=dict)
-    _of_link: dict[int, list[tuple[pin.SE3, _Solid]]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -111,27 +123,26 @@ class LinkShapes:
             )
         return cls(chain, upright, given, description.meshes or {}, checkpoint)
 
-    def rows(self, k: int) -> Rows:
-        """Capsules of all URDF links fixed to link k, 0 for the base. Raises InvalidArm."""
-        given = [row for link in self.chain.rigid[k] for row in self._given(k, link)]
-        of_urdf = [
-            row
-            for link in self.chain.rigid[k]
-            if link not in self.capsules
-            for row in self._of_urdf(k, link)
-        ]
-        return given + of_urdf
-
-    def hulls(self, k: int) -> list[Rows]:
-        """Points of the hulls of the shapes of link k, after `rows`. Empty with capsules of the
-        user, with a round shape, of which its capsule is the closest hull, and if too many points
-        would be needed.
+    def cover(self, k: int) -> Cover:
+        """The capsules and hulls of all URDF links fixed to link k, 0 for the base. Raises
+        InvalidArm.
         """
-        shapes, found = self._of_link.get(k, []), list[Rows]()
-        if any(link in self.capsules for link in self.chain.rigid[k]):
-            return []
-        for T, solid in shapes:
-            parts = solid.parts(self.checkpoint) if len(shapes) == 1 else [solid.corners]
+        links = self.chain.rigid[k]
+        given = [row for link in links for row in self._given(k, link)]
+        placed = [
+            each for link in links if link not in self.capsules for each in self._of_urdf(k, link)
+        ]
+        rows = given + [_row(T, solid.around) for T, solid in placed]
+        is_given = any(link in self.capsules for link in links)
+        return Cover(rows, [] if is_given else self._hulls(placed))
+
+    def _hulls(self, placed: list[_Placed]) -> list[Rows]:
+        """Points of the hulls of the shapes of a link. Empty with a round shape, of which its
+        capsule is the closest hull, and if too many points would be needed.
+        """
+        found = list[Rows]()
+        for T, solid in placed:
+            parts = solid.parts(self.checkpoint) if len(placed) == 1 else [solid.corners]
             for part in parts:
                 try:
                     points = hull_around(
@@ -155,23 +166,20 @@ class LinkShapes:
             self._count("collision.capsules", link)
             with _of_field("collision.capsules"):
                 check_lengths(f"The radius of a capsule of {link!r}", row[6], PLAUSIBLE.radius)
-        return [
-            _placed(self._frame(k, link), (np.array(row[:6]).reshape(2, 3), row[6])) for row in rows
-        ]
+        T = self._frame(k, link)
+        return [_row(T, (np.array(row[:6]).reshape(2, 3), row[6])) for row in rows]
 
-    def _of_urdf(self, k: int, link: str) -> Rows:
-        """A capsule around each collision shape of a URDF link."""
-        frame, rows = self._frame(k, link), list[list[float]]()
+    def _of_urdf(self, k: int, link: str) -> list[_Placed]:
+        """The collision shapes of a URDF link."""
+        frame, found = self._frame(k, link), list[_Placed]()
         for shape in self._of(link):
             self._count("urdf", link)
             where = f"A <collision> of link {link!r} has"
             geometry = shape.find("geometry")
             solid = None if geometry is None else self._solid(geometry, where)
             if solid is not None:
-                T = frame * _origin(shape.find("origin"), where)
-                self._of_link.setdefault(k, []).append((T, solid))
-                rows.append(_placed(T, solid.around))
-        return rows
+                found.append((frame * _origin(shape.find("origin"), where), solid))
+        return found
 
     def _solid(self, geometry: Element, where: str) -> _Solid | None:
         """A shape in its frame; None for an unknown or missing shape."""
@@ -279,7 +287,7 @@ def _prism(radius: float, half: float) -> Array:
     )
 
 
-def _placed(T: pin.SE3, around: Around) -> list[float]:
+def _row(T: pin.SE3, around: Around) -> list[float]:
     axis, radius = around
     return [*(axis @ T.rotation.T + T.translation).ravel().tolist(), float(radius)]
 

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from joulepath.models.hull_cover import HULL_FIT
-from joulepath.models.own_arm.link_shapes import Rows
+from joulepath.models.own_arm.link_shapes import Cover
 from joulepath.models.own_arm.upright import UprightChain, turn_onto
 from joulepath.models.own_arm.urdf_chain import Chain
 from joulepath.models.robot import Array
@@ -40,14 +40,6 @@ class OverlapSettings:
 
 
 OVERLAP = OverlapSettings()
-
-
-@dataclass(frozen=True)
-class Cover:
-    """The capsules of a link, and the points of its hulls, which take precedence."""
-
-    capsules: Rows
-    hulls: list[Rows]
 
 
 @dataclass(frozen=True)

@@ -183,6 +183,24 @@ def test_a_bent_mesh_has_hulls_of_its_parts() -> None:
     assert outside(in_upper_arm(np.array([[0.1, 0.1, 0.0]])), hulls).min() > 0.03
 
 
+@pytest.mark.parametrize("seed", long_but(range(3), range(40)))
+def test_hulls_hold_bodies_of_any_form(seed: int) -> None:
+    """Blocks side by side at random, in a mesh with uneven scales, of which some mirror it."""
+    rng = np.random.default_rng(seed)
+    blocks = [trimesh.creation.box(rng.uniform(10.0, 150.0, 3)) for _ in range(2 + seed % 4)]
+    for block in blocks:
+        turned = trimesh.transformations.random_rotation_matrix(rng.uniform(size=3))
+        block.apply_transform(turned)
+        block.apply_translation(rng.uniform(-80.0, 80.0, 3))
+    body = trimesh.util.concatenate(blocks)
+    scale = rng.choice([-1e-3, 1e-3], 3) * rng.uniform(0.5, 1.5, 3)
+    text = meshed(f'scale="{scale[0]} {scale[1]} {scale[2]}"').replace("link.obj", "link.stl")
+    made = robot(changed(urdf=text, meshes={"link.stl": stl(body)}))
+    hulls = [each for each in made.hulls if each.link == 1]
+    triangles = in_upper_arm(body.triangles.reshape(-1, 3) * scale).reshape(-1, 3, 3)
+    assert hulls and not len(not_held(triangles, hulls))
+
+
 def test_links_whose_hulls_are_apart_are_compared() -> None:
     """The capsule around a wide plate beneath the arm meets the forearm everywhere."""
     plate = '<collision><geometry><box size="1.5 1.5 0.02"/></geometry></collision>'
