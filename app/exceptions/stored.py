@@ -8,7 +8,9 @@ from typing import Annotated, Literal
 from joulepath.app.exceptions.base import ServiceError
 from joulepath.optimizer.declared import Internal, Unit
 
-StoreFault = Literal["full", "read-only", "locked", "deleted", "other-version", "unreachable"]
+StoreFault = Literal[
+    "full", "read-only", "locked", "deleted", "other-version", "damaged", "unreachable"
+]
 """Faults of the database."""
 _FAULTS: dict[StoreFault, str] = {
     "full": "The disk of the database is full: delete answers, jobs, logs or studies that are "
@@ -21,6 +23,9 @@ _FAULTS: dict[StoreFault, str] = {
     "put it back, or restart the service, which then begins an empty one.",
     "other-version": "Another version of the service made the database: the operator must start "
     "that version, or move the database away, after which the service begins an empty one.",
+    "damaged": "The database cannot be read: its file is damaged or no database, or its tables are "
+    "not those of the service. The operator must restore a backup, or move the database away, "
+    "after which the service begins an empty one.",
     "unreachable": "The database does not answer: try again later, or ask the operator of the "
     "service.",
 }
@@ -40,7 +45,8 @@ class StoreUnavailable(ServiceError):
     cause: StoreFault
     """`full`: no space is left. `read-only`: it takes no changes. `locked`: another process locks
     it. `deleted`: its file was deleted or replaced while the service ran. `other-version`: another
-    version of the service made its tables. `unreachable`: it does not answer, or cannot be read."""
+    version of the service made its tables. `damaged`: its file is damaged or no database, or its
+    tables are not those of the service. `unreachable`: it does not answer."""
 
     def __str__(self) -> str:
         return _FAULTS[self.cause]

@@ -14,12 +14,13 @@ from alembic import command
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy import URL, Connection, Engine, create_engine, event, inspect, make_url, text
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from joulepath.app.store.faults import OtherVersion
+from joulepath.app.store.faults import OtherTables, OtherVersion
 from joulepath.app.store.sqlite_file import check, identity
+from joulepath.app.store.tables import Table
 
 logger = logging.getLogger(__name__)
 
@@ -136,7 +137,9 @@ def _keep_log(connection: sqlite3.Connection) -> None:
 def migrate(engine: Engine) -> None:
     """Migrates the tables to this version; concurrent processes wait for the first one.
 
-    Raises OtherVersion if this version has no migration for the tables.
+    Raises:
+        OtherVersion: this version has no migration for the tables.
+        OtherTables: the tables are not those of their last migration.
     """
     file = sqlite_file(engine.url)
     if file is not None:
@@ -147,15 +150,27 @@ def migrate(engine: Engine) -> None:
         # Read without a lock, in case the database is read-only.
         present = MigrationContext.configure(connection).get_current_revision()
     scripts = ScriptDirectory.from_config(config)
-    if present == scripts.get_current_head():
-        return
     if present is not None and present not in {
         script.revision for script in scripts.walk_revisions()
     }:
         raise OtherVersion(present, engine.url)
-    with _migrating(engine) as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, "head")
+    if present != scripts.get_current_head():
+        with _migrating(engine) as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, "head")
+    _check_tables(engine)
+
+
+def _check_tables(engine: Engine) -> None:
+    """Raises OtherTables if a column is missing, as after a restore that was interrupted."""
+    found = {
+        f"{table}.{column['name']}"
+        for (_, table), columns in inspect(engine).get_multi_columns().items()
+        for column in columns
+    }
+    needed = {str(column) for table in Table.metadata.tables.values() for column in table.columns}
+    if missing := sorted(needed - found):
+        raise OtherTables(missing, engine.url)
 
 
 @contextmanager

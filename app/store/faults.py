@@ -16,10 +16,27 @@ LEAST_ROOM = 1 << 20
 """Below this many free bytes the disk counts as full: a commit of an ordinary answer may fail."""
 
 # https://sqlite.org/rescode.html: the first 8 bits of a result code are its kind
-_SQLITE: dict[int, StoreFault] = {5: "locked", 6: "locked", 8: "read-only", 13: "full"}
+_SQLITE: dict[int, StoreFault] = {
+    1: "damaged",  # of a statement: a table or column is missing, or is there already
+    5: "locked",
+    6: "locked",
+    8: "read-only",
+    11: "damaged",
+    13: "full",
+    26: "damaged",
+}
 _SQLITE_IO_ERROR = 10
 # https://www.postgresql.org/docs/current/errcodes-appendix.html
-_POSTGRESQL: dict[str, StoreFault] = {"53100": "full", "25006": "read-only", "55P03": "locked"}
+_POSTGRESQL: dict[str, StoreFault] = {
+    "25006": "read-only",
+    "42703": "damaged",
+    "42P01": "damaged",
+    "42P07": "damaged",
+    "53100": "full",
+    "55P03": "locked",
+    "XX001": "damaged",
+    "XX002": "damaged",
+}
 
 
 class DatabaseMoved(OSError):
@@ -37,12 +54,25 @@ class OtherVersion(CommandError):
         )
 
 
+class OtherTables(CommandError):
+    """The tables lack columns that the migrations make; `missing` are names with their table."""
+
+    def __init__(self, missing: list[str], url: URL) -> None:
+        super().__init__(
+            f"The tables of {url.render_as_string()} are not as this service makes them, since "
+            f"they lack {', '.join(missing)}: restore a backup, or move the database away (or set "
+            "another JOULEPATH_DATABASE_URL), and a new one is made."
+        )
+
+
 def fault_of(error: Exception, file: Path | None) -> StoreFault:
     """The fault behind an error of the driver; `file` is the file of an SQLite database."""
     if isinstance(error, DatabaseMoved):
         return "deleted"
     if isinstance(error, OtherVersion):
         return "other-version"
+    if isinstance(error, OtherTables):
+        return "damaged"
     if not isinstance(error, DBAPIError):
         return "unreachable"
     code = getattr(error.orig, "sqlite_errorcode", None)

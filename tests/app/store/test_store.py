@@ -25,6 +25,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from sqlalchemy import Engine, func, inspect, select, text, update
+from sqlalchemy.exc import DBAPIError
 from starlette.testclient import TestClient
 
 from joulepath.app.access.client import Client
@@ -34,7 +35,7 @@ from joulepath.app.exceptions.stored import StoreUnavailable, UnknownAnswer
 from joulepath.app.settings import Settings
 from joulepath.app.store import answers, database
 from joulepath.app.store.database import create_database_engine, migrate, sqlite_file
-from joulepath.app.store.faults import OtherVersion, fault_of
+from joulepath.app.store.faults import OtherTables, OtherVersion, fault_of
 from joulepath.app.store.store import Store
 from joulepath.app.store.store_answers import store_answers
 from joulepath.app.store.tables import Answer, JobRequest, Table, new_id, now
@@ -163,6 +164,28 @@ def test_a_database_of_another_version_is_refused_with_what_to_do(url: str) -> N
     assert "secret" not in str(caught.value)
     assert fault_of(caught.value, None) == "other-version"
     engine.dispose()
+
+
+@pytest.mark.parametrize(
+    "change", ["ALTER TABLE studies DROP COLUMN threshold", "DROP TABLE alembic_version"]
+)
+def test_tables_of_other_makers_are_told_as_damage(url: str, change: str) -> None:
+    engine = create_database_engine(url)
+    migrate(engine)
+    with engine.execution_options(writes=True).begin() as connection:
+        connection.execute(text(change))
+    named = r"lack studies\.threshold: restore" if "studies" in change else "figures"
+    with pytest.raises((OtherTables, DBAPIError), match=named) as caught:
+        migrate(engine)
+    assert fault_of(caught.value, None) == "damaged"
+    engine.dispose()
+
+
+def test_a_file_that_is_no_database_is_told_as_damage(tmp_path: Path) -> None:
+    (tmp_path / "joulepath.db").write_bytes(b"something else" * 100)
+    with pytest.raises(DBAPIError) as caught:
+        migrate(create_database_engine(f"sqlite:///{tmp_path}/joulepath.db"))
+    assert fault_of(caught.value, None) == "damaged"
 
 
 def test_several_processes_may_migrate_at_once(url: str) -> None:
