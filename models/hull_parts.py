@@ -1,4 +1,4 @@
-"""Surfaces of bent links, divided by planes into parts that are nearly convex."""
+"""Division of the surfaces of bent links by planes into nearly convex parts."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from joulepath.models.robot import Array, Mask
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 Inside = Callable[[Array], Mask]
-"""Whether points (k, 3) [m] lie where no obstacle can be."""
+"""Whether points (k, 3) [m] lie in places out of reach of obstacles."""
 
 
 def nowhere(points: Array) -> Mask:
-    """No point lies where no obstacle can be."""
+    """The `Inside` of a surface without such places: false for all points."""
     return np.zeros(len(points), dtype=bool)
 
 
@@ -27,33 +27,35 @@ class PartSettings:
     """Settings of the division."""
 
     most: int = 8
-    """Largest number of parts of a link. Every part adds a distance per obstacle."""
+    """Largest number of parts of a link. Every part adds one distance computation per obstacle."""
     p99: float = 1.2e-3
-    """99th percentile of the excess of the parts' hulls, before they are grown, over the surface
-    [m] from which on no part is divided."""
+    """Limit on the 99th percentile of the excess [m]. The excess of a point on the hull of a part,
+    before the hull is grown, is its distance from the surface of the link. The division ends when
+    this limit and `maximum` hold."""
     maximum: float = 4.5e-3
-    """Largest such excess [m]."""
+    """Limit on the largest excess [m]."""
     free: float = 0.5e-3
-    """Excess [m] that costs nothing: about the distance between the points of the surface."""
+    """Excess [m] without cost: about the distance between neighbouring points of the surface."""
     overlap: float = 1e-4
-    """Distance [m] by which both parts reach beyond the plane. The proof of the cover then ends at
-    triangles of this size."""
+    """Distance [m] by which the parts on both sides extend beyond the dividing plane. The proof
+    that the hulls cover the link then ends at triangles of this size."""
     gain: float = 0.0
-    """Least decrease of the cost of a part by its division, relative to this cost."""
+    """Smallest decrease of the cost of a part at which it is divided, relative to this cost."""
     surface: int = 200_000
-    """Points of every mesh, from which distances are measured."""
+    """Number of points sampled on every mesh, to measure distances from the surface."""
     points: int | None = None
-    """Random points of a part, from which its planes are chosen; None for its triangles."""
+    """Number of random points that represent a part in the choice of its plane; None: triangles."""
     density: float = 12_000.0
-    """Points of a hull per m², at which its excess is measured."""
+    """Density of the points on a hull at which the excess is measured [1/m²]."""
     offsets: int = 9
-    """Planes per direction, of thirteen directions."""
+    """Number of planes per direction; `DIRECTIONS` has thirteen directions."""
     trials: int = 40
-    """Random planes around the best plane, per entry of `spreads`."""
+    """Number of random planes near the best plane, per entry of `spreads`."""
     spreads: tuple[float, ...] = (0.3, 0.1)
-    """Standard deviations of the normal [rad]."""
+    """Standard deviations of the random normals from the best normal [rad]."""
     shift: float = 0.03
-    """Standard deviation of the offset per spread [m]: some tenths of the width of a link."""
+    """Standard deviation of the random offsets per rad of spread [m/rad]: some tenths of a link's
+    width."""
 
 
 PARTS = PartSettings()
@@ -69,8 +71,10 @@ QUICK = PartSettings(
     offsets=4,
     spreads=(),
 )
-"""For an arm of a user, who waits: a bent link takes about a second, and random configurations
-rarely collide other than on the meshes."""
+"""Settings for the upload of a user's arm: a bent link takes about one second.
+
+In random configurations, these hulls rarely give another collision result than the meshes.
+"""
 DIRECTIONS = [
     np.array(each) / np.linalg.norm(each)
     for each in product((-1.0, 0.0, 1.0), repeat=3)
@@ -80,8 +84,15 @@ DIRECTIONS = [
 
 
 def below(triangles: Array, normal: Array, offset: float) -> Array:
-    """The pieces (k, 3, 3) of triangles (t, 3, 3) with `normal · x <= offset`; of points (t, 1, 3),
-    those (k, 1, 3) that meet it.
+    """Cut triangles or points to the half-space `normal · x <= offset`.
+
+    Args:
+        triangles: triangles, shape (t, 3, 3), or points, shape (t, 1, 3) [m].
+        normal: unit normal of the plane, shape (3,).
+        offset: offset of the plane along the normal [m].
+
+    Returns:
+        Triangles (k, 3, 3) that cover the cut surface, or the points (k, 1, 3) in the half-space.
     """
     height = triangles @ normal - offset
     if triangles.shape[1] == 1:
@@ -107,18 +118,22 @@ def below(triangles: Array, normal: Array, offset: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A part of a surface: its triangles, those or points from which planes are chosen, planes of
-    the hull, points on the hull in order of decreasing distance from the surface of the link, and
-    the area [m²] per point. The first `far` points are farther away than `PartSettings.free`.
-    """
+    """A part of the surface of a link, with its convex hull."""
 
     triangles: Array
+    """Triangles of the part, shape (t, 3, 3) [m]."""
     chosen: Array
+    """Triangles or random points (c, 1, 3) [m] that represent the part in the choice of a plane."""
     planes: Array
+    """Normals and offsets of the hull's faces, shape (f, 4), outward normals."""
     points: Array
+    """Points on the hull (k, 3) [m], in order of decreasing distance from the link's surface."""
     distances: Array
+    """Distances of the points from the link's surface, shape (k,) [m]."""
     far: int
+    """Number of points with a distance above `PartSettings.free`; they come first."""
     area: float
+    """Area of the hull per sampled point [m²]."""
 
     def above(self, points: Array) -> Array:
         """Heights (k,) [m] of points above the hull."""
@@ -131,11 +146,11 @@ class Division:
 
     Attributes:
         tree: points of the surface.
-        inside: the places that do not count.
+        inside: tells which points lie in places where the excess does not count.
         radius: radius by which the hulls are grown [m].
         settings: settings of the division.
         checkpoint: called for every plane; may raise to interrupt.
-        rng: of the random planes.
+        rng: generator of the random planes.
     """
 
     tree: cKDTree
@@ -146,7 +161,7 @@ class Division:
     rng: np.random.Generator
 
     def part(self, triangles: Array) -> _Part:
-        """A part of these triangles. Raises QhullError for flat ones."""
+        """The part with the given triangles or points. Raises QhullError if they are flat."""
         chosen, few = triangles, self.settings.points
         if few is not None and triangles.shape[1] == 3 and len(triangles) > few:
             chosen = sampled(triangles, few, np.random.default_rng(0))[:, None]
@@ -170,21 +185,22 @@ class Division:
         )
 
     def distances(self, part: _Part, others: Sequence[_Part], most: int | None = None) -> Array:
-        """Distances (k,) [m] of the first `most` points of a part, but those inside the others."""
+        """Distances (k,) [m] of the first `most` points that no grown hull of `others` contains."""
         counts = np.ones(len(part.points[:most]), dtype=bool)
         for other in others:
             counts[counts] = other.above(part.points[:most][counts]) >= self.radius
         return np.asarray(part.distances[:most][counts])
 
     def cost(self, part: _Part, others: Sequence[_Part]) -> float:
-        """Integral of the fourth power of the excess over the surface [m⁶]: deep hollows cost most,
-        and are divided first.
+        """Integral of the fourth power of the excess over the hull of a part [m⁶].
+
+        The fourth power makes the deepest hollows the most expensive, so they are divided first.
         """
         excess = self.distances(part, others, part.far) - self.settings.free
         return float(part.area * (excess**4).sum())
 
     def halves(self, part: _Part, others: Sequence[_Part]) -> tuple[_Part, _Part] | None:
-        """Divide a part into two, by the best plane found; None if that would gain too little."""
+        """Divide a part by the best plane; None if the cost would decrease by less than `gain`."""
         corners = part.chosen.reshape(-1, 3)
         best: tuple[float, Array, float] | None = None
 
@@ -216,8 +232,11 @@ class Division:
         return self._sides(part.triangles, *best[1:])
 
     def _sides(self, triangles: Array, normal: Array, offset: float) -> tuple[_Part, _Part]:
-        """The parts below and above a plane. Raises QhullError for a flat one, ValueError for one
-        without a triangle.
+        """The parts below and above a plane.
+
+        Raises:
+            QhullError: a part is flat.
+            ValueError: a part has no triangle.
         """
         overlap = self.settings.overlap
         return (
@@ -228,16 +247,19 @@ class Division:
 
 @dataclass(frozen=True)
 class Rim:
-    """The rim of a hollow in the face of a flange. No single plane opens such a hollow."""
+    """The rim around a hollow in the face of a flange. A single plane cannot open such a hollow."""
 
     floor: float
-    """Height z in the link frame [m] beyond its floor by more than the overlap of parts, with the
-    sign of the side that the face is on."""
+    """Coordinate z of the dividing plane in the link frame [m].
+
+    The plane lies beyond the floor of the hollow by more than the overlap of parts. The sign of z
+    is the side of the face.
+    """
     sectors: int
-    """Number of equal sectors about the z axis into which it is divided."""
+    """Number of equal sectors about the z axis into which the rim is divided."""
 
     def parts(self, triangles: Array) -> list[Array]:
-        """Triangles (k, 3, 3) [m] of the link behind the floor, then those of each sector."""
+        """Triangles (k, 3, 3) [m] of the link behind the plane, followed by one part per sector."""
         z = np.array([0.0, 0.0, np.sign(self.floor)])
         rim = below(triangles, -z, PARTS.overlap - abs(self.floor))
         found = [below(triangles, z, abs(self.floor))]
@@ -263,7 +285,7 @@ def divided(
     Args:
         surfaces: triangles (t, 3, 3) [m] of every mesh.
         radius: radius by which the hulls will be grown [m].
-        inside: the places where the excess does not count.
+        inside: tells which points lie in places where the excess does not count.
         settings: settings of the division.
         checkpoint: called in every iteration; may raise to interrupt.
 

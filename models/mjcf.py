@@ -1,13 +1,13 @@
 """The MJCF of a robot: its URDF's chain with rotor inertias and friction, for MuJoCo.
 
-Rotor inertias are `armature`, Coulomb friction is `frictionloss`, and viscous friction `damping`.
-The torque of MuJoCo's inverse dynamics, without constraints, is therefore that of the links and
-rotors here, and the viscous friction. MuJoCo refuses inertias that no body can have: such a link
-gets the nearest possible one, which changes torques by some mN·m in published arms. The concave
-rise of friction in strain-wave gears, which MuJoCo does not have, is divided between `frictionloss`
-and `damping` by least squares over the speeds up to the limit; friction that grows with the load is
-left out.
-A joint that follows another is bound to it by an `equality`, and has no motor.
+Rotor inertias become `armature`, Coulomb friction `frictionloss`, and viscous friction `damping`.
+MuJoCo's inverse dynamics without constraints therefore gives the torques of the links and rotors in
+this library plus the viscous friction. MuJoCo rejects physically impossible inertias. A link with
+an impossible inertia gets the nearest possible inertia, which changes the torques of published arms
+by some mN·m. MuJoCo has no term for the concave rise of friction with speed in strain-wave gears: a
+least-squares fit over the speeds up to the limit divides it between `frictionloss` and `damping`.
+Load-dependent friction is left out. An `equality` binds a follower joint to its leader; a follower
+has no motor.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ class MjcfSettings:
     """Settings of the simulation in the file."""
 
     timestep: float = 1e-3
-    """Time step [s]; the controllers of arms have 1 to 8 ms."""
+    """Time step [s]; robot controllers have time steps of 1 to 8 ms."""
     speeds: int = 100
     """Number of speeds at which friction is fitted."""
     rounding: float = 1e-12
-    """Relative margin by which the greatest principal moment is below the sum of the others."""
+    """Relative margin of the greatest principal moment below the sum of the other two."""
     ball: float = 1e-6
-    """Length of a capsule below which it is a ball [m]."""
+    """Axis length below which a capsule becomes a sphere [m]."""
     digits: int = 6
     """Decimal digits of the corners of a hull [m]."""
 
@@ -51,8 +51,8 @@ def mjcf(robot: Robot) -> str:
     """Write a robot as an MJCF file, with rotors, friction and torque motors.
 
     Bodies, joints and motors have the names of the robot's links and joints. Every joint has its
-    position limits and, on its motor, its torque limit. The geoms are the shapes by which links are
-    compared with each other: their capsules, or their hulls.
+    position limits and, on its motor, its torque limit. The geoms are the shapes of the check for
+    self-collisions: capsules or hulls.
 
     Args:
         robot: the robot.
@@ -61,7 +61,7 @@ def mjcf(robot: Robot) -> str:
         The text of the file; `mujoco.MjModel.from_xml_string` reads it.
 
     Raises:
-        ValueError: a link has no mass; MuJoCo would refuse it.
+        ValueError: a link has no mass; MuJoCo would reject the file.
     """
     for name, body in zip(robot.link_names[1:], list(robot.model.inertias)[1:], strict=True):
         if not body.mass > 0:
@@ -108,7 +108,7 @@ def mjcf(robot: Robot) -> str:
 
 
 def _followers(root: Element, robot: Robot) -> None:
-    """Binds followers to their leaders."""
+    """Binds follower joints to their leaders."""
     if not robot.coupling.follows:
         return
     equality, names = SubElement(root, "equality"), list(robot.model.names)[1:]
@@ -123,7 +123,7 @@ def _inertial(body: Element, inertia: pin.Inertia) -> None:
     tensor = nearest_possible_inertia(inertia.inertia)
     moments, axes = np.linalg.eigh(tensor)
     axes[:, 2] *= np.linalg.det(axes)
-    # the compiler takes no rounding for possible
+    # the compiler of MuJoCo has no tolerance for rounding errors
     moments[2] = min(moments[2], (1 - MJCF.rounding) * (moments[0] + moments[1]))
     SubElement(
         body,
@@ -135,8 +135,14 @@ def _inertial(body: Element, inertia: pin.Inertia) -> None:
 
 
 def _friction(law: FrictionLaw, v_max: Array) -> tuple[Array, Array]:
-    """Coulomb [N·m] and viscous [N·m·s/rad] friction (nq,) nearest to a law up to v_max (nq,)
-    [rad/s].
+    """Coulomb and viscous friction nearest to a law over the speeds up to `v_max`.
+
+    Args:
+        law: friction law of the joints.
+        v_max: greatest speeds, shape (nq,) [rad/s].
+
+    Returns:
+        Coulomb [N·m] and viscous [N·m·s/rad] friction, shape (nq,) each.
     """
     share = np.linspace(0.0, 1.0, MJCF.speeds + 1)[1:]
     rise = np.arcsinh(share[:, None] * v_max / law.speed)
@@ -155,8 +161,10 @@ def _geom(link: Element, capsule: LinkCapsule) -> None:
 
 
 def _hulls(root: Element, links: Sequence[Element], hulls: Sequence[LinkHull]) -> None:
-    """Adds hulls as meshes, of which MuJoCo takes the convex hulls. Cubes around the points hold
-    the balls by which a hull is grown.
+    """Adds hulls as meshes; MuJoCo collides the convex hull of a mesh.
+
+    A hull is grown by a radius. The mesh covers it by cubes around the points, which contain the
+    spheres of this radius.
     """
     assets = SubElement(root, "asset") if hulls else root
     for number, hull in enumerate(hulls):
@@ -168,7 +176,7 @@ def _hulls(root: Element, links: Sequence[Element], hulls: Sequence[LinkHull]) -
 
 
 def _contacts(root: Element, robot: Robot) -> None:
-    """Excludes pairs of links if they never meet or are neighbours."""
+    """Excludes contacts between neighbouring links, and between links that never meet."""
     contact, names = SubElement(root, "contact"), robot.link_names
     neighbours = {(k, k + 1) for k in range(robot.last_link)}
     for first, second in sorted(neighbours | robot.never_in_collision):

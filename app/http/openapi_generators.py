@@ -1,8 +1,8 @@
-"""The OpenAPI document in the words that generators of clients read.
+"""Adapts the OpenAPI document to the schema keywords that client generators support.
 
-Each rewriting keeps the meaning of the schema. Without them, openapi-python-client leaves out every
-endpoint whose request has an object as a default or a constant among alternatives, `/optimize`
-among them, and openapi-generator refuses the document.
+The adaptation keeps the meaning of every schema. Without it, openapi-python-client omits all
+endpoints with an object as a default value or with a `const` alternative in the request, such as
+`/optimize`, and openapi-generator rejects the document.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Any
 
 
 def rewrite_for_generators(node: Any) -> None:
-    """Rewrites a part of the document in place."""
+    """Adapts a part of the document in place, with all its children."""
     if isinstance(node, list):
         for each in node:
             rewrite_for_generators(each)
     if not isinstance(node, dict):
         return
-    # a keyword of OpenAPI 3.2, which FastAPI writes into a document of 3.1
+    # FastAPI writes this keyword of OpenAPI 3.2 into a document of version 3.1
     node.pop("itemSchema", None)
     if _is_schema(node) and "const" in node:
         node["enum"] = [node.pop("const")]
@@ -32,14 +32,18 @@ def rewrite_for_generators(node: Any) -> None:
 
 
 def _is_schema(node: dict[str, Any]) -> bool:
-    """Whether a node is a schema; a map of properties may have fields of the names of keywords."""
+    """Whether a node is a schema.
+
+    A map of properties is no schema, although its properties may be named like keywords: the
+    property `type` has an object as its value, the keyword `type` never has.
+    """
     return not {"$ref", "anyOf", "oneOf", "allOf", "type"}.isdisjoint(node) and not isinstance(
         node.get("type"), dict
     )
 
 
 def _without_nulls(value: Any) -> Any:
-    """An object without the fields that have no value of their own."""
+    """Removes the fields with null, an empty object or an empty list from nested objects."""
     if not isinstance(value, dict):
         return value
     inner = {name: _without_nulls(each) for name, each in value.items()}

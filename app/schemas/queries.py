@@ -1,6 +1,4 @@
-"""What query strings have in common: `Query`, the page of a list that is asked for, and the search
-for the names that clients give to what the service keeps.
-"""
+"""Common parts of query strings and lists: the base class `Query`, pages, names and text search."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ PAGE_PATTERN = r"^[0-9]{1,16}_[0-9a-f-]{36}$"
 class Query(Request):
     """The parameters of a query string."""
 
-    # every value in a query string is text
+    # a query string contains text only, so numbers are parsed from text
     model_config = ConfigDict(strict=False)
 
 
@@ -54,13 +52,13 @@ Name = Annotated[str, Field(min_length=1, max_length=LENGTHS.name, pattern=NO_CO
 
 
 class NewName(Request):
-    """Another name of something that the service keeps."""
+    """New name of a stored object, such as a job or a log."""
 
     name: Name | None = described("The name. Null: none.", None, "Night cell")
 
 
 def search_in(places: str) -> Any:
-    """The field `search` of the page of a list, whose texts are in `places`."""
+    """The field `search` of a list; `places` names the searched fields in its description."""
     return described(
         f"A text in {places}, in upper or lower case. Null: any.", None, "night", default=None
     )

@@ -1,6 +1,4 @@
-"""Answers of tasks: those to which a result refers, the check of their certificates, and their
-figures in lists.
-"""
+"""Answers of tasks: collection for storage, check of certificates, and figures for lists."""
 
 from __future__ import annotations
 
@@ -26,12 +24,18 @@ class AnswerCollector:
         self._answers: list[StoredAnswer] = []
 
     def add(self, content: Answer, endpoint: str | None = None, asked: bytes | None = None) -> str:
-        """Adds an answer, sets its fields `id` and `answer`, and returns its path.
+        """Adds an answer, and sets its fields `id` and `answer`.
 
-        `endpoint` is its kind where it differs from that of most answers of the result, and `asked`
-        its request (JSON).
+        Args:
+            content: the answer.
+            endpoint: endpoint of the answer; None: the endpoint of most answers of the result.
+            asked: request of the answer as JSON; None: not stored.
 
-        Raises InvalidRequest above MOST_BYTES.
+        Returns:
+            The path of the answer.
+
+        Raises:
+            InvalidRequest: the answers together exceed `MOST_BYTES`.
         """
         answer_id = str(uuid.uuid4())
         own = {"id": answer_id, "answer": StoredAnswer(answer_id, b"").path}
@@ -53,8 +57,11 @@ class AnswerCollector:
 
 
 def certified(solution: Solution) -> Solution:
-    """The solution. Raises AssertionError if its certificate is not valid: the optimizer returns
-    certified motions.
+    """Returns the solution unchanged, after a check of its certificate.
+
+    Raises:
+        AssertionError: the certificate is not valid, although the optimizer returns certified
+            motions only.
     """
     if not solution.certificate.valid:
         raise AssertionError(
@@ -64,10 +71,10 @@ def certified(solution: Solution) -> Solution:
 
 
 def figures_of(answer: Mapping[str, Any]) -> AnswerFigures:
-    """The figures of the JSON answer of any endpoint.
+    """Figures of the JSON answer of any endpoint.
 
-    The energy of a motion or cycle is the one of its objective, electrical for `evaluate`; that of
-    a placement is the one of the best place.
+    A motion or a cycle is listed with the energy of its objective, an evaluation with the
+    electrical energy, and a placement with the energy of its best place.
     """
     best = answer.get("best")
     if isinstance(best, Mapping):

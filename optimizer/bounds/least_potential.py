@@ -1,4 +1,4 @@
-"""Least values Ψ of a dual bound's terms of position on each step; proof in `dual_bound`."""
+"""Minima Ψ of the position terms of a dual bound on the steps of a path; proof in `dual_bound`."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ TAU = 1.0
 
 @dataclass(frozen=True)
 class LeastPotential:
-    """Least values Ψ of the terms of a path."""
+    """Lower bounds on the minimum Ψ of the position terms around a path."""
 
     terms: PathTerms
 
     def __call__(self, weights: Weights, fast: Array, slow: Array) -> Array:
-        """Ψ in cells of durations, shape (B, S) [W].
+        """Bounds on Ψ for B intervals of the duration T, shape (B, S) [W].
 
         Args:
             weights: weights of the bound.
-            fast: greatest 1 / T of each cell, shape (B,) [1/s].
-            slow: least 1 / T of each cell, shape (B,) [1/s].
+            fast: greatest 1 / T of the intervals, shape (B,) [1/s].
+            slow: least 1 / T of the intervals, shape (B,) [1/s].
         """
         terms, (at_terms, _) = self.terms, self._as_c
         S, nq = terms.half.shape
@@ -57,7 +57,7 @@ class LeastPotential:
 
     @cached_property
     def _as_c(self) -> tuple[list[int], list[NDArray[Any]]]:
-        """Addresses of the terms in the order of the C function, and the arrays they point to."""
+        """Addresses of the terms in the order of the C arguments, and the arrays they point to."""
         terms = self.terms
         given = (
             *terms.cells.axes,
@@ -81,8 +81,10 @@ class LeastPotential:
         return [address(each) for each in arrays], arrays
 
     def _cross(self, weights: Weights) -> Array:
-        """Stiffness (S, others) that the square of the momentum's change takes from other joints,
-        by 1 / T².
+        """Reduction of the stiffness by the momentum's dependence on the other joints.
+
+        For joint l it is (1 + 1 / τ) Σ_j a_lj (Σ_m a_mj) / μ_j in the symbols of the proof. The
+        result, shape (S, others), is a factor of 1 / T².
         """
         moved = weights.scale * self.terms.momentum_others
         return np.asarray(
@@ -92,15 +94,15 @@ class LeastPotential:
 
 
 def _hold(weights: Weights) -> Array:
-    """κ π² (nq,)."""
+    """Stiffness κ π² of the confinement, shape (nq,), as a factor of 1 / T²."""
     return np.asarray(weights.confinement * np.pi**2)
 
 
 def _weight(weights: Weights) -> Array:
-    """(1 + τ) / (2 μ) (nq,) times the square of the multipliers' factor."""
+    """Factor (1 + τ) / (2 μ) of the squared momentum, times the squared scale, shape (nq,)."""
     return np.asarray(weights.scale**2 * (1 + TAU) / (2 * weights.mixing))
 
 
 def _excess(fast: Array, slow: Array) -> Array:
-    """Greatest excess of Γ̇ over the gradient within a cell (B,), as a share of the gradient."""
+    """Greatest excess of Γ̇ over the gradient within an interval, relative to it, shape (B,)."""
     return np.asarray((fast - slow) ** 2 / (4 * fast * slow))

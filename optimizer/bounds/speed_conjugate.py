@@ -1,4 +1,4 @@
-"""Greatest values H of a dual bound's terms of speed, over a motion; proof in `dual_bound`."""
+"""Maxima H of the speed terms of a dual bound, integrated over a motion; proof in `dual_bound`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from joulepath.optimizer.collision.bodies import Indices
 from joulepath.optimizer.native.shared_library import address, library
 
 BISECTIONS = 9
-"""Halvings of the interval of the multiplier m of a joint's displacement."""
+"""Number of bisections in the search for the multiplier m of a joint's displacement."""
 
 
 class _Friction(ctypes.Structure):
@@ -50,7 +50,7 @@ class _Parts(ctypes.Structure):
 
 @dataclass(frozen=True)
 class SpeedConjugate:
-    """Σ_j ∫ H_j ds with the terms of a path."""
+    """Upper bounds on Σ_j ∫ H_j ds, where H_j is the maximum of the speed terms of joint j."""
 
     friction: FrictionConjugate
     limits: Limits
@@ -61,12 +61,16 @@ class SpeedConjugate:
     """Durations in ascending order, shape (E,) [s]."""
 
     def __call__(self, weights: Weights) -> tuple[Array, Array]:
-        """Bounds on the integrals at each duration.
+        """Bound the integral of H at every duration.
 
-        Speeds are bounded by those of the next greater duration. m is linear in 1 / T.
+        The speed limits at a duration are the speed limits at the next greater duration, so that a
+        bound also holds in between. The multiplier m is linear in 1 / T.
+
+        Args:
+            weights: weights of the dual bound.
 
         Returns:
-            Bounds (E,) [W], and ∫ p · x' ds (E,) [N·m·rad].
+            Bounds, shape (E,) [W], and ∫ p · x' ds, shape (E,) [N·m·rad].
         """
         structures, _ = self._as_c
         stiffness, slowness = weights.confinement + weights.mixing, self._slowness(weights)
@@ -83,7 +87,7 @@ class SpeedConjugate:
 
     @cached_property
     def _as_c(self) -> tuple[tuple[ctypes.Structure, ...], list[NDArray[Any]]]:
-        """The structs, which do not depend on the weights, and the arrays that they point to."""
+        """Structs of the C function that do not depend on the weights, and their arrays."""
         friction, terms, parts = self.friction, self.terms, self._parts
         path = [
             np.ascontiguousarray(each)
@@ -112,8 +116,9 @@ class SpeedConjugate:
 
     @cached_property
     def _mean(self) -> Array:
-        """Means by step (2, S, nq) [rad/s] of the greatest speeds for the first and the last
-        duration.
+        """Means over every step of the speed bounds at the first and the last duration.
+
+        The shape is (2, S, nq) [rad/s].
         """
         return self._parts.mean_speed(np.array([0, -1]))
 
@@ -132,10 +137,10 @@ class SpeedConjugate:
 
 @dataclass(frozen=True)
 class PartSettings:
-    """Settings of the division of steps into parts."""
+    """Settings of the division of a path's steps into parts."""
 
     longest: float = 0.015
-    """Longest part [s] while the limits on acceleration and jerk restrict the speed."""
+    """Longest part [s] near the ends, while the acceleration and jerk limits bound the speed."""
     most_parts: int = 24
     """Largest number of parts of a step."""
 
@@ -148,13 +153,13 @@ class TimeParts:
     """Parts of the steps of a path."""
 
     step: Indices
-    """Step of each part, shape (P,)."""
+    """Index of the step of a part, shape (P,)."""
     within: Array
-    """First and last instant of each part as shares of its step, shape (P, 2)."""
+    """First and last instant of a part as shares of its step, shape (P, 2)."""
     length: Array
-    """Length of each part as a share of the motion, shape (P,); the sum is 1."""
+    """Length of a part as a share of the motion, shape (P,); the sum is 1."""
     speed: Array
-    """Bounds on the speed in each part for B durations, shape (B, P, nq) [rad/s]."""
+    """Bounds on the speed in a part for B durations, shape (B, P, nq) [rad/s]."""
 
     @classmethod
     def of(cls, steps: int, limits: Limits, duration: Array) -> TimeParts:
@@ -178,7 +183,7 @@ class TimeParts:
         part = np.arange(len(step)) - np.repeat(np.cumsum(count) - count, count)
         within = np.stack([part, part + 1], axis=1) / count[step][:, None]
         share = (step[:, None] + within) / steps
-        # the instant of each part at the greatest distance from both ends of the motion
+        # instant of the part at the greatest distance from the nearer end of the motion
         inner = np.where(
             (share[:, 0] < 0.5) & (share[:, 1] > 0.5), 0.5, np.minimum(share[:, 1], 1 - share[:, 0])
         )
@@ -190,7 +195,7 @@ class TimeParts:
         )
 
     def mean_speed(self, which: Indices) -> Array:
-        """Mean bounds on the speed in each step, shape (k, S, nq) [rad/s].
+        """Mean of the speed bounds over every step, shape (k, S, nq) [rad/s].
 
         Args:
             which: indices of durations, shape (k,).

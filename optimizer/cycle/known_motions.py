@@ -1,7 +1,7 @@
-"""Memo of found motions by their problems, so that a changed cycle solves only its changed moves.
+"""Memo of the motions found for problems: a changed cycle solves its changed moves only.
 
-A motion is found again for exactly the same question only. The memo thus changes the computing time
-but no answer, and every motion of an answer is certified anew.
+A motion is recalled only for exactly the same problem. The memo thus reduces the computing time
+without a change of the answers. Every motion of an answer is certified anew.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.solve.methods.solve_result import SolveReason, SolveResult, SolveStatus
 
-# question that a motion answers: first motion, converged motion, at a price of time, or fastest
+# kind of motion: first solve, converged, least energy at a price of time, or fastest
 Stage = Literal["tried", "finished", "priced", "fastest"]
 # fields of a problem without influence on its best motion
 _IGNORED_FIELDS = ("arm", "sample_period", "deadline")
@@ -33,14 +33,14 @@ _IGNORED_FIELDS = ("arm", "sample_period", "deadline")
 
 @dataclass(frozen=True)
 class KnownMotion:
-    """A motion, with the stationarity at the end of its optimisation."""
+    """A motion, and its stationarity at the end of the optimisation."""
 
     spline: Spline
     stationarity: float | None
 
     @property
     def result(self) -> SolveResult:
-        """The result of a solve that ended in this motion."""
+        """The motion as the result of a converged solve."""
         return SolveResult(
             SolveStatus.SOLVED,
             SolveReason.CONVERGED,
@@ -50,27 +50,27 @@ class KnownMotion:
 
 
 class KnownMotions:
-    """Motions by the keys of their questions; `used` has the motions recalled or found since."""
+    """Motions by the keys of their problems; `used` has all motions recalled or added so far."""
 
     def __init__(self, before: Mapping[str, KnownMotion] | None = None) -> None:
         self._before = dict(before or {})
         self.used: dict[str, KnownMotion] = {}
-        # a scene may be large: every arm is read once
+        # hashing a large scene takes long: every arm is hashed once
         self._arms: list[tuple[Arm, bytes]] = []
 
     def recall(self, key: str) -> KnownMotion | None:
-        """Motion for a key; None if none is known."""
+        """Motion for a key; None for an unknown key."""
         known = self.used.get(key) or self._before.get(key)
         if known is not None:
             self.used[key] = known
         return known
 
     def keep(self, key: str, motion: KnownMotion) -> None:
-        """Store a motion that more time would not improve."""
+        """Store a converged motion, which more time would not improve."""
         self.used[key] = motion
 
     def forget(self, key: str) -> None:
-        """Drop a motion that failed its certificate."""
+        """Remove a motion after a failed certificate."""
         self._before.pop(key, None)
         self.used.pop(key, None)
 
@@ -82,12 +82,12 @@ class KnownMotions:
         return known
 
     def key(self, stage: Stage, problem: Problem, *more: Any) -> str:
-        """Key of a question.
+        """Key of a problem.
 
         Args:
-            stage: kind of the question.
-            problem: problem to be solved; its deadline and sample period do not matter.
-            more: further values that distinguish questions.
+            stage: kind of the motion.
+            problem: problem to be solved; the key disregards its deadline and sample period.
+            more: further values that distinguish problems.
         """
         own = {
             each.name: getattr(problem, each.name)
@@ -101,12 +101,12 @@ _in_use: ContextVar[KnownMotions | None] = ContextVar("known motions", default=N
 
 
 def knowing(motions: KnownMotions) -> AbstractContextManager[None]:
-    """Context in which cycles recall and store motions."""
+    """Context for cycles that recall and store motions in the given memo."""
     return assigned(_in_use, motions)
 
 
 def known_motions() -> KnownMotions:
-    """The motions of the context; outside any context a new, empty memo."""
+    """The memo of the context; a new, empty memo outside of any context."""
     return _in_use.get() or KnownMotions()
 
 
@@ -132,7 +132,7 @@ def _content_of_fields(value: Any) -> Iterator[bytes]:
 
 
 def _content(value: Any) -> Iterator[bytes]:
-    """Bytes of everything a value consists of; equal for equal questions only."""
+    """Bytes of a value and of all its parts; they differ for different problems."""
     match value:
         case None | bool() | int() | float() | str() | bytes():
             yield repr(value).encode() + b";"
@@ -147,7 +147,7 @@ def _content(value: Any) -> Iterator[bytes]:
         case pin.Model():
             yield value.saveToString().encode()
         case Robot():
-            # the figures of a robot are by far the most of an arm, and many arms share them
+            # most data of an arm are the figures of its robot, which many arms share
             yield _digest_of_robot(value)
         case _ if is_dataclass(value):
             yield from _content_of_fields(value)

@@ -26,12 +26,12 @@ class EvaluatedMotion:
     total: IntervalEnergy
     """The whole motion."""
     segments: Sequence[IntervalEnergy]
-    """Segments between configurations. A trajectory is one segment, and a log has one per move and
-    rest. Empty if there are more than 10,000. Up to 200 segments have intervals of their
-    electrical energies."""
+    """Segments between configurations. A trajectory is one segment. A log has one segment per move
+    and per rest. Empty if there are more than 10,000 segments. Up to 200 segments have intervals of
+    their electrical energies."""
     cycles: Sequence[IntervalEnergy]
-    """Cycles of a log that repeats, from the first on, each of whole segments. Empty for other
-    motions, and for a log that does not repeat."""
+    """Cycles of a log of a repeated motion, from the first cycle on. A cycle consists of whole
+    segments. Empty for other motions, and for a log without repetition."""
     segment_count: Count
     """Number of segments."""
     speed_jumps: Count
@@ -54,12 +54,12 @@ class Evaluation(Result):
     """Energy of a given motion, and its use of the limits.
 
     Attributes:
-        segments: energy of each segment; empty if there are more than are listed.
-        cycles: energy of each cycle of a recording that repeats; empty for other motions.
+        segments: energy of the segments; empty if there are more than 10,000.
+        cycles: energy of the cycles in a log of a repeated motion; empty for other motions.
         speed_jumps: number of velocity steps inside the motion.
         nearest: least clearance with margins subtracted; None if collisions are not checked.
         close_pass: least distance without margins; None unless it is below 2 mm.
-        unmodelled: as of a `Solution`.
+        unmodelled: as in `Solution`.
     """
 
     total: IntervalEnergy
@@ -106,7 +106,7 @@ class Evaluation(Result):
         return self.evaluated_motion()
 
     def _columns(self) -> dict[str, Any]:
-        """One row per segment, or the whole motion where they are too many."""
+        """One row per segment; one row for the whole motion if there are too many segments."""
         intervals = self.segments or [self.total]
         electrical = [each.energy.electrical for each in intervals]
         return {

@@ -1,9 +1,10 @@
 """Least mechanical work between ends that slide along self-motions, for one duration.
 
-The postures at both ends and the way between them decide on the work. From straight lines between a
-few postures, solves ended up to 38 % too high. A coarse motion takes some milliseconds
-(`BatchedMotions`): coarse motions start from straight lines and from random motions between many
-postures. The best of them, each of another kind, are solved with ends that slide.
+The work depends on the postures at both ends and on the route between the two postures. Solves that
+started from straight lines between a few postures ended with up to 38 % too much work. A coarse
+motion takes only some milliseconds (`BatchedMotions`). The search therefore optimises many coarse
+motions, from straight lines and from random motions between many postures, and then solves the best
+distinct motions with sliding ends.
 """
 
 from __future__ import annotations
@@ -32,25 +33,28 @@ class SlidingWorkSettings:
     """Settings of the search for least work between sliding ends."""
 
     straight: int = 36
-    """Largest number of coarse motions from straight lines: those of locally least estimate."""
+    """Largest number of coarse motions from straight lines of locally least estimated work."""
     restarts: int = 96
-    """Number of coarse motions from random ones.
+    """Number of coarse motions from random guesses.
 
-    With random postures they lead further than between the best postures of straight lines.
+    The guesses connect random postures, because the best postures of straight lines led to more
+    work.
     """
     estimate_ratio: float = 2.0
-    """Largest ratio of a pair's estimated work to the least for a random motion."""
+    """Largest ratio of a pair's estimated work to the least estimate at which it is drawn."""
     most_restarted: int = 600
-    """Largest number of pairs, of least estimate, of which those for random motions are drawn."""
+    """Number of pairs of least estimate from which the pairs for random guesses are drawn."""
     progress: float = 1e-2
-    """Relative decrease promised by a further step of a coarse motion at least."""
+    """Smallest predicted relative decrease at which a coarse motion takes a further step."""
     most_solved: int = 6
-    """Largest number of coarse motions that are solved."""
+    """Largest number of coarse motions solved with sliding ends."""
     work_ratio: float = 1.5
-    """Largest ratio of a coarse motion's work to the least if it is solved: ends that slide save up
-    to a third of it."""
+    """Largest ratio of a coarse motion's work to the least work at which the motion is solved.
+
+    Sliding ends save up to a third of the work.
+    """
     distance: float = 0.3
-    """Distance of control points [rad] up to which two motions count as of one kind."""
+    """Largest difference of control points [rad] between two motions that count as equal."""
     seed: int = 0
     """Seed of the random pairs."""
 
@@ -59,10 +63,10 @@ SLIDING_WORK = SlidingWorkSettings()
 
 
 def explore_sliding_work(state: SearchState) -> bool:
-    """Find motions of least work between ends that slide, from coarse motions.
+    """Find motions of least work between sliding ends, from coarse motions.
 
-    It does nothing where `explore_least_work` does nothing, or if no end slides; nor does it a
-    second time.
+    The search runs at most once per request, under the conditions of `explore_least_work`, and only
+    if an end slides.
 
     Args:
         state: state of the search; candidates with a motion are appended to its list.
@@ -95,7 +99,7 @@ def explore_sliding_work(state: SearchState) -> bool:
 
 
 def _coarse(state: SearchState, candidates: Sequence[Candidate]) -> list[CoarseMotion]:
-    """Coarse motions between many postures, the motion of least work first."""
+    """Coarse motions between many postures, in ascending order of their work."""
     settings, prepared = SLIDING_WORK, state.prepared
     solver = CoarseSolver(prepared, float(state.problem.duration_max or 0.0))
     energy = estimates(prepared, candidates)
@@ -117,7 +121,7 @@ def _coarse(state: SearchState, candidates: Sequence[Candidate]) -> list[CoarseM
 
 
 def _of_other_kinds(found: Sequence[CoarseMotion]) -> Iterator[CoarseMotion]:
-    """The coarse motions worth a solve, each of another kind, from motions in order of work."""
+    """Distinct coarse motions worth a solve, from motions in ascending order of their work."""
     kept = list[CoarseMotion]()
     for each in found:
         too_much = each.work > SLIDING_WORK.work_ratio * found[0].work
@@ -129,14 +133,14 @@ def _of_other_kinds(found: Sequence[CoarseMotion]) -> Iterator[CoarseMotion]:
 
 
 def _near(points: np.ndarray, others: np.ndarray) -> bool:
-    """Whether motions with these control points (n, nq) [rad] are of one kind."""
+    """Whether motions with the given control points (n, nq) [rad] count as equal."""
     return bool(np.abs(points - others).max() <= SLIDING_WORK.distance)
 
 
 def _solve(state: SearchState, motion: CoarseMotion, found: list[Candidate]) -> None:
-    """Solve a coarse motion with ends that slide, as a candidate of its own.
+    """Solve a coarse motion with sliding ends, and append the solution as a new candidate.
 
-    Of motions that come to be of one kind, only the best stays a candidate.
+    If several solutions count as equal, only the solution of least energy remains a candidate.
     """
     fresh, space = copy(motion.candidate), bspline.uniform(COARSE.control_points)
     points, duration = motion.points, float(state.problem.duration_max or 0.0)

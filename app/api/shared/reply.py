@@ -1,6 +1,4 @@
-"""How the tasks of a request are run, and how it is answered: at once when its work is done, or by
-events from the begin of the work on.
-"""
+"""Runs the tasks of a request, and answers it after the work or by a stream of events during it."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ from joulepath.app.store.store_answers import keep_answer, store_answers
 from joulepath.optimizer.progress import no_listener
 
 BY_EVENTS: dict[str, Any] = {EVENT_STREAM: {"schema": {"type": "string"}, "example": EVENTS}}
-"""Content of the 200 of a route whose progress can be listened to."""
+"""Content of the response 200 of routes with an event stream of their progress."""
 
 
 @dataclass(frozen=True)
@@ -49,23 +47,26 @@ class Tasks:
         return request_id
 
     def deadline(self, body: WithDeadline | None = None) -> float:
-        """The time for a request with this body [s]; None: the longest time.
+        """Time for a request with the given body [s]; None: the longest time of the service.
 
-        Raises InvalidRequest for a later deadline.
+        Raises:
+            InvalidRequest: the deadline in the body is later than the longest time.
         """
         longest = self.settings.max_deadline
         return longest if body is None else deadline_of(body, longest)
 
     async def result(self, task: Task, body: WithDeadline | None = None) -> TaskResult:
-        """The result of a task, by the deadline of the request's body; None: in the longest time.
+        """Result of a task within the deadline of the body; None: within the longest time.
 
-        Raises InvalidRequest for a later deadline, ClientDisconnected, and what `ArmEngine.run`
-        raises.
+        Raises:
+            InvalidRequest: the deadline in the body is later than the longest time.
+            ClientDisconnected: the client closed the connection.
+            DeclaredError: any error of `ArmEngine.run`.
         """
         return await unless_disconnected(self.request, self.engine.run(task, self.deadline(body)))
 
     async def answer(self, task: Task, body: WithDeadline | None = None) -> Response:
-        """The response with the result of a task, as `result`."""
+        """Response with the result of a task; arguments and errors as for `result`."""
         return result_response(await self.result(task, body))
 
     async def kept(
@@ -76,20 +77,21 @@ class Tasks:
         cell: str | None = None,
         parts: str = "optimize",
     ) -> TaskResult:
-        """Store the answers to which a result refers, and the result itself if it is to be kept.
+        """Store the answers referenced by a result, and the result itself under `result.kept_as`.
 
         Args:
             kind: endpoint of the result.
             result: the result.
-            asked: what equal requests are known by; None: none is answered by this result.
-            cell: cell whose motions are kept.
-            parts: endpoint of the answers to which it refers.
+            asked: key that identifies equal requests, which this result will answer; None: the
+                result answers no later request.
+            cell: cell of a cycle whose motions are kept; None: no motions are kept.
+            parts: endpoint of the referenced answers.
 
         Returns:
             The result to send.
 
         Raises:
-            StoreUnavailable: the answers to which the result refers cannot be stored.
+            StoreUnavailable: the referenced answers cannot be stored.
         """
         store, settings, owner = self.store, self.settings, self.client.owner
         result = await store_answers(store, settings, parts, result, owner, cell)
@@ -98,7 +100,7 @@ class Tasks:
         return await keep_answer(store, settings, kind, result, owner, asked)
 
     async def search(self, kind: str, task: Task, body: WithDeadline) -> Response:
-        """The response with the result of a search, which is stored as `kept` has it."""
+        """Response with the result of a search, stored by `kept`."""
 
         async def work(tell: Listener) -> TaskResult:
             return await self.kept(kind, await self.engine.run(task, self.deadline(body), tell))
@@ -106,8 +108,9 @@ class Tasks:
         return await self.respond(work)
 
     async def respond(self, work: Work) -> Response:
-        """The response with what `work` returns, by events if the client wants them. If the client
-        closes the connection, the work is cancelled.
+        """Response with the result of `work`, as a stream of events if the client accepts one.
+
+        If the client closes the connection, the work is cancelled.
         """
         if is_wanted(self.request, EVENT_STREAM):
             return EventStream(self.request, work)

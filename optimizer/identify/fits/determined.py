@@ -1,7 +1,8 @@
 """Decides whether a term takes its estimate or keeps the robot's own value.
 
-An undetermined term keeps the robot's own value, unless the logs reject this value, or it is known
-even less well than the estimate: engineering defaults are right within a factor of three.
+An undetermined term keeps the robot's own value, with two exceptions: the logs reject this value,
+or its standard deviation is larger than the deviation of the estimate. Engineering defaults are
+right within a factor of three.
 """
 
 from __future__ import annotations
@@ -27,17 +28,17 @@ class DeterminedSettings:
     """Limits for a determined term."""
 
     max_relative_sd: float = 0.3
-    """Largest standard deviation of an identified figure over its value [1]."""
+    """Largest ratio of an identified figure's standard deviation to its value [1]."""
     max_sd_ratio: float = 0.7
-    """Largest standard deviation of a figure over that before the logs, at which the logs tell
-    something of it [1]: half of the variance."""
+    """Largest ratio of a figure's standard deviation after the logs to the deviation before, at
+    which the logs count as informative [1]: they then halve the variance."""
     least_scale: float = 0.2
-    """Smallest plausible factor on the robot's own torque constants [1], whose errors are some
-    tens of per cent at most."""
+    """Smallest plausible factor on the robot's own torque constants [1]. The constants are wrong
+    by some tens of per cent at most."""
     most_load: float = 0.999
     """Largest plausible load friction [1]; a drive with a load friction of 1 does not move."""
     rejecting_sds: float = 4.0
-    """Distance of a rejected own value from the estimate, in standard deviations [1]."""
+    """Distance from the estimate [standard deviations] beyond which an own value is rejected."""
 
 
 DETERMINED = DeterminedSettings()
@@ -59,7 +60,7 @@ LESS_KNOWN = (
 
 
 def reason_of(value: float, sd: float) -> str:
-    """Reason for not counting a figure as identified; empty if it is."""
+    """Reason why a figure does not count as identified; empty for an identified figure."""
     if value == 0 or sd == 0:
         return AT_BOUND.format(value)
     if not np.isfinite(sd):
@@ -69,7 +70,7 @@ def reason_of(value: float, sd: float) -> str:
 
 
 def with_reasons(found: Estimate, judged: Iterable[int]) -> Estimate:
-    """The estimate with reasons for the unidentified ones among the `judged` figures."""
+    """The estimate, with a reason for every unidentified figure among the `judged` indices."""
     deviations, reasons = np.sqrt(np.diag(found.covariance)), [*found.reasons]
     for k in judged:
         reasons[k] = reasons[k] or reason_of(float(found.value[k]), float(deviations[k]))
@@ -78,14 +79,14 @@ def with_reasons(found: Estimate, judged: Iterable[int]) -> Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Unbounded:
-    """Solution with p unknowns, each without its own bound."""
+    """Solutions for p unknowns, with the own bound of an unknown lifted for its solution."""
 
     value: Array
-    """Values (p,): the own bound of an unknown is lifted, and all other bounds hold."""
+    """Values (p,). For the value of an unknown, its bound is lifted and all other bounds hold."""
     replicates: Array
-    """Values (G, p) without one group each, around the bounded values."""
+    """Values (G, p) after leaving out one group of equations, around the bounded values."""
     undetermined: Mask
-    """Unknowns (p,) that the logs without some group do not determine."""
+    """Unknowns (p,) left undetermined by the logs if some group is left out."""
 
     @property
     def sd(self) -> Array:
@@ -101,7 +102,7 @@ def unbounded(
     gradient: Array,
     prior: Array | None = None,
 ) -> Unbounded:
-    """Solve again for each unknown at its bound, with this bound lifted.
+    """Solve again for every unknown at its bound, with this bound lifted.
 
     Args:
         grouped: normal equations of the G groups.
@@ -131,16 +132,19 @@ def unbounded(
 
 
 def impossible(names: Sequence[Name], value: Array) -> Mask:
-    """Terms (p,) whose values (p,) no drive has: too small a factor on its torque, or a load
-    friction under which it does not move."""
+    """Terms (p,) with impossible values (p,): too small a factor on the torque constant, or a load
+    friction at which the drive does not move.
+    """
     term = np.array([name[0] for name in names])
     too_small = (term == SCALE) & (value < DETERMINED.least_scale)
     return np.asarray(too_small | ((term == "load") & (value > DETERMINED.most_load)))
 
 
 def rejections(value: Array, sd: Array, own: Array) -> Array:
-    """Distances (p,) of the robot's own values (p,) from estimates, in standard deviations; 0 where
-    the logs do not reject them."""
+    """Distances (p,) of rejected own values from the estimates, in standard deviations.
+
+    The distance is 0 for all own values (p,) that the logs do not reject.
+    """
     distance = np.abs(own - value) / np.where(sd > 0, sd, np.inf)
     return np.where(distance > DETERMINED.rejecting_sds, distance, 0.0)
 
@@ -148,14 +152,14 @@ def rejections(value: Array, sd: Array, own: Array) -> Array:
 def remarks_of(
     reasons: Sequence[str], value: Array, sd: Array, own: Array, own_sd: Array
 ) -> list[str]:
-    """Why the robot's own values of doubted terms are not kept; empty for all other terms.
+    """Reasons (p,) why the robot's own values of doubted terms are not kept; empty for other terms.
 
     Args:
         reasons: reasons (p,) for a doubt, or empty.
-        value: estimates (p,) without bounds; those beyond a bound, 0, are no source.
-        sd: standard deviations (p,) of the estimates; infinite for estimates that replace nothing.
+        value: estimates (p,) without bounds; estimates below the bound 0 replace no own value.
+        sd: standard deviations (p,) of the estimates; infinite: replaces no own value.
         own: the robot's own values (p,).
-        own_sd: their standard deviations (p,); 0 for values that are kept unless they are rejected.
+        own_sd: standard deviations (p,) of the own values; 0 for values kept unless rejected.
     """
     rejected = rejections(value, sd, own)
     better = (value > 0) & (sd <= DETERMINED.max_sd_ratio * own_sd) & (own_sd > 0)

@@ -1,10 +1,10 @@
 """Inverse kinematics of any seven-joint arm: self-motions traced point by point.
 
-If the closed form of a nearby arm is known (`nearby_arm`), the seeds are points along its curves.
-For other arms, they come from a table of configurations within the joint ranges (`seed_table`).
-Newton's method leads seeds onto curves, and each curve is traced once around (`curve_tracing`). A
-curve without a seed is missed, and so may be curves through a singularity: the result is never
-`complete`.
+If the closed form of a nearby arm is known (`nearby_arm`), the seeds are points along the curves of
+the nearby arm. For other arms, the seeds come from a table of configurations within the joint
+ranges (`seed_table`). Newton's method moves the seeds onto curves, and every curve is traced once
+around (`curve_tracing`). A curve without a seed is missed, and a curve through a singularity may be
+missed. The result is therefore never `complete`.
 """
 
 from __future__ import annotations
@@ -39,23 +39,22 @@ class TracedArmSettings:
     solved: float = 1e-9
     """Largest pose error of a seed on a curve [m, rad]."""
     few_seeds: int = 24
-    """Number of seeds that get more steps if none is solved."""
+    """Number of seeds that get more Newton steps if no seed reaches the pose."""
     most_steps: int = 60
-    """Newton steps of these seeds."""
+    """Newton steps of the `few_seeds`."""
     nearly_solved: float = 1e-5
-    """Largest pose error of a seed that further seeds are drawn around [m, rad]."""
+    """Largest pose error of a seed as the centre of further, random seeds [m, rad]."""
     nearest: int = 8
-    """Largest number of such seeds."""
+    """Largest number of these centres."""
     around: int = 40
-    """Number of seeds drawn around each of them."""
+    """Number of random seeds around a centre."""
     deviation: float = 0.1
-    """Standard deviation of the seeds drawn around another one [rad]."""
+    """Standard deviation of the random seeds from their centre [rad]."""
     edge: float = 1e-6
     """Largest pose error, after many steps, of a pose at the edge of the workspace [m, rad]."""
     singular: float = 1e-4
-    """Smallest singular value below which no curve is traced: configurations may move in several
-    directions.
-    """
+    """Singular value of the Jacobian at or below which no curve is traced, because the arm can move
+    in several directions without moving the flange."""
     cached_poses: int = 32
     """Number of poses with cached curves."""
 
@@ -64,8 +63,9 @@ SETTINGS = TracedArmSettings()
 
 
 class TracedArm:
-    """`PoseSolver` of a seven-joint arm without a closed form; it has no isolated
-    configurations.
+    """`PoseSolver` of a seven-joint arm without a closed form.
+
+    All configurations of a pose lie on self-motions.
     """
 
     complete, confirmed = False, False
@@ -76,8 +76,8 @@ class TracedArm:
 
     @classmethod
     def of(cls, model: pin.Model) -> TracedArm | None:
-        """Inverse kinematics of a Pinocchio model with a frame `flange`; None unless it has seven
-        joints.
+        """Inverse kinematics of a Pinocchio model with a frame `flange`; None unless the model has
+        seven joints.
         """
         if model.nq != 7:
             return None
@@ -89,8 +89,10 @@ class TracedArm:
         return cls(chain, seeds, NearbyArm.of(chain))
 
     def label(self, q: Array) -> NumberedBranch:
-        """Number of the curve of its pose nearest to a configuration (7,) [rad]; 1 if the pose has
-        none.
+        """Number of the curve nearest to a configuration (7,) [rad].
+
+        The curves are the self-motions of the configuration's flange pose. The number is 1 if no
+        curve is found.
         """
         try:
             curves = self.self_motions(self._chain.flange(q[None])[0])
@@ -117,8 +119,7 @@ class TracedArm:
         """The curves found for the flange pose T (4, 4), cut to the limits.
 
         Raises:
-            SingularPose: T was reached in singular configurations only, from which no curve is
-                traced.
+            SingularPose: T was reached in singular configurations only, where no curve is traced.
         """
         curves = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
         return curves if limits is None else cut_to_limits(curves, limits.q_min, limits.q_max)
@@ -128,9 +129,17 @@ class TracedArm:
         return
 
     def _with_near(self, q: Array, residual: Array, T: Array) -> tuple[Array, Array]:
-        """The seeds, and further seeds around those that nearly reached the pose T (4, 4).
+        """Adds solutions from random seeds around configurations that nearly reach a pose.
 
-        Next to a singularity Newton's method is slow from most seeds, but not from all.
+        Next to a singularity, Newton's method converges slowly from most seeds, but not from all.
+
+        Args:
+            q: configurations after Newton's method, shape (n, 7) [rad].
+            residual: their pose errors, shape (n,) [m, rad].
+            T: flange pose, shape (4, 4).
+
+        Returns:
+            The given and the additional configurations, and their pose errors.
         """
         near = q[
             np.argsort(np.where(residual < SETTINGS.solved, np.inf, residual))[: SETTINGS.nearest]
@@ -151,10 +160,13 @@ class TracedArm:
         return self._different(TracedCurveStack.of(paths), T) if paths else []
 
     def _starts(self, T: Array) -> Array:
-        """Configurations (n, 7) [rad] that reach the flange pose T (4, 4), without singular ones.
+        """Regular configurations (n, 7) [rad] of the flange pose T (4, 4), one or more per curve.
 
-        The seeds are those of the nearby arm. If none of them reaches T, seeds of the table and of
-        the nearby arm at poses beside T are used.
+        The first seeds are configurations of the nearby arm at T. If no seed reaches T, the next
+        seeds come from the table, and from the nearby arm at poses beside T.
+
+        Raises:
+            SingularPose: T was reached in singular configurations only.
         """
         none, nearby = np.zeros((0, 7)), self._nearby
         seeds = none if nearby is None else nearby.seeds(T)
