@@ -1,4 +1,4 @@
-"""Inertias that a body can have."""
+"""Physically possible inertias."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from joulepath.models.robot import Array
 
 
 def nearest_possible_inertia(inertia: Array) -> Array:
-    """The nearest inertia (3, 3) [kg·m²] of a body to a tensor, in the Frobenius norm of its
-    distribution of mass.
+    """The physically possible inertia tensor nearest to a tensor (3, 3) [kg·m²].
 
-    The second moments of the mass, trace(I)/2 - I, must not be negative along any axis (Traversaro
-    et al., "Identification of fully physical consistent inertial parameters using optimization on
-    manifolds", 2016): negative ones become zero.
+    The distance is the Frobenius norm of the difference of the second moments of mass, trace(I)/2 -
+    I. Second moments must not be negative along any axis (Traversaro et al., "Identification of
+    fully physical consistent inertial parameters using optimization on manifolds", 2016): negative
+    second moments become zero.
     """
     symmetric = (inertia + inertia.T) / 2
     moments, axes = np.linalg.eigh(np.trace(symmetric) / 2 * np.eye(3) - symmetric)

@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 @contextmanager
 def assigned(variable: ContextVar[T], value: T) -> Iterator[None]:
-    """Context in which a variable has a value; other threads have their own values."""
+    """Context that assigns a value to a variable, in the current thread only."""
     before = variable.set(value)
     try:
         yield

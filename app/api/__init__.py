@@ -1,1 +1,1 @@
-"""One folder per endpoint: what it answers, the task of a worker, and the route."""
+"""One folder per endpoint: its request and answer, the task of a worker, and the route."""

@@ -1,4 +1,4 @@
-"""GET /problems/{type}: the page that the `type` of a problem points to."""
+"""GET /problems/{type}: pages about types of problems, referenced by their field `type`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ async def explain(
         str, Path(description="Last part of the `type` of a problem.", examples=["invalid-request"])
     ],
 ) -> HTMLResponse:
-    """A page that explains a type of problem."""
+    """Explains a type of problem on an HTML page."""
     if slug not in _types():
         raise NotFound
     return HTMLResponse(_page(slug))

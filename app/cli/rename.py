@@ -24,9 +24,10 @@ Examples:
 def rename(
     context: click.Context, url: str, key: str | None, kind: str, id: str, name: str | None
 ) -> None:
-    """Gives what a service keeps under ID another NAME, or none. The NAME of a robot is its title.
+    """Renames the object ID of a service to NAME, or removes its name. The NAME of a robot is its
+    title.
 
-    This command needs a service that runs, and the extra `client` of the package.
+    This command needs a running service, and the extra `client` of the package.
     """
     connect(context, url, key)
     with answered():

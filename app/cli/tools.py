@@ -16,10 +16,10 @@ Examples:
 )
 @click.argument("name", required=False)
 def tools(name: str | None) -> None:
-    """Lists the grippers that the field `tool` of a request can name, or the figures of NAME.
+    """Lists the grippers for the field `tool` of a request, or the figures of the gripper NAME.
 
-    The trust letters are those of `joulepath robots`. A: published by the manufacturer, C:
-    second-hand from another's file, E: engineering default without a source.
+    The trust letters are the same as in `joulepath robots`. A: published by the manufacturer, C:
+    second-hand, from a third party's file, E: engineering default without a source.
     """
     from joulepath.models.tools.registry import tool_names
     from joulepath.optimizer.exceptions import UnknownTool

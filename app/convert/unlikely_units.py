@@ -1,4 +1,4 @@
-"""Figures of a request that are likely in another unit, as warnings of its answer."""
+"""Warnings of an answer about figures of the request in a probably wrong unit."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _off_the_earth(gravity: list[float]) -> float:
     return abs(_length(gravity) - _length(UPRIGHT.tolist()))
 
 
-# sizes of what arms carry, and a full turn, rounded up
+# lengths are the sizes of tools and payloads, angles a full turn, both rounded up
 RULES = {
     "rotvec": FieldRule(UnitRule("an angle", "rad", 6.3, DEGREES), _length),
     "rpy": FieldRule(UnitRule("an angle", "rad", 6.3, DEGREES), lambda rpy: max(map(abs, rpy))),
@@ -58,11 +58,11 @@ RULES = {
         np.ptp,
     ),
 }
-"""Rules by the name of the field, wherever a request has it."""
+"""Rules by field name, at any depth of a request."""
 
 
 def unlikely_units(request: object) -> list[str]:
-    """Warnings of the figures of a `Request` that are far from those of real arms."""
+    """Warnings about figures of a `Request` far outside the range of real arms."""
     return [*_of_fields(request, "")] if isinstance(request, Request) else []
 
 
@@ -75,6 +75,6 @@ def _of_fields(part: Request, path: str) -> Iterator[str]:
         several = value if isinstance(value, list | tuple) else [value]
         for k, each in enumerate(several):
             if not isinstance(each, Request):
-                # numbers, of which there may be a million
+                # a list of numbers may have a million entries
                 break
             yield from _of_fields(each, f"{where}/{k}/" if several is value else f"{where}/")

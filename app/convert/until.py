@@ -1,4 +1,4 @@
-"""The deadline of reading mesh files, URDFs and logs of a request."""
+"""Deadline for reading the mesh files, URDFs and logs of a request."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
 from joulepath.optimizer.exceptions import DeadlineExceeded
 
 _LEAST_TIME = 1e-3
-"""Shortest time of a computation [s]; after a long reading it then reports the deadline itself."""
+"""Shortest time of a computation [s]. After a slow read, the computation reports the deadline."""
 
 
 @contextmanager
 def until(end: Deadline) -> Iterator[None]:
-    """A context in which `checkpoint` ends the reading after `end`. Raises DeadlineExceeded."""
+    """A context whose calls of `checkpoint` stop the reading after `end`.
+
+    Raises:
+        DeadlineExceeded: the deadline passed.
+    """
     try:
         with watch(end):
             yield

@@ -1,4 +1,4 @@
-"""The listener of the task in this process, which receives its events before its result."""
+"""The listener of the running task in this process: it receives events before the result."""
 
 from __future__ import annotations
 

@@ -8,6 +8,6 @@ from joulepath.optimizer.optimize import warm_up
 
 
 def warm(robots: Sequence[str]) -> None:
-    """Loads robots and their kernels, so that first requests need not wait."""
+    """Loads robots and their kernels before the first requests."""
     for name in robots:
         warm_up(name)

@@ -1,4 +1,4 @@
-"""All types of errors that the service answers with."""
+"""All types of errors in answers of the service."""
 
 from __future__ import annotations
 

@@ -6,12 +6,12 @@ from joulepath.app.exceptions.base import ServiceError
 
 
 class NoTypst(ServiceError):
-    """The package that lays out PDFs is not installed."""
+    """The package for PDF files, Typst, is not installed."""
 
     status = 501
     title = "No PDF here"
     remedy = (
-        "Ask for `html`, whose page prints well; or install Typst by `pip install "
+        "Ask for `html` and print the page from the browser; or install Typst by `pip install "
         "'joulepath[report]'`."
     )
     detail = "PDFs need the extra `report` of the package: ask for `html`, or install it."

@@ -1,1 +1,1 @@
-"""A ROS 2 node that plans motions of least energy."""
+"""A ROS 2 node for the planning of motions of least energy."""

@@ -1,4 +1,4 @@
-"""Answers that come back in a request, by id or whole."""
+"""An answer given in a later request, by its id or as a whole."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from joulepath.app.schemas.examples.values import ANSWER_ID
 
 
 class AnswerRequest(Request):
-    """A motion that was answered before."""
+    """A motion of an earlier answer."""
 
     answer: str | dict[str, Any] = described(
         "A motion: the id (or the path) of a kept answer, or a whole answer, of `POST /optimize`, "
@@ -23,9 +23,9 @@ class AnswerRequest(Request):
         ANSWER_ID,
     )
     arm: ArmRequest | None = described(
-        "The arm of the answer: payload, limits, scene, ... as in its request. Null: what the "
-        "answer says in `arm`. Needed if that is null. Its `robot` is that of the answer. Not for "
-        "a cycle.",
+        "The arm of the answer: payload, limits, scene, ... as in the request of the answer. Null: "
+        "the field `arm` of the answer. Required if the answer has no `arm`. Its `robot` must be "
+        "the robot of the answer. Not allowed for a cycle.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
         default=None,

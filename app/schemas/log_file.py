@@ -19,8 +19,9 @@ _Efforts = Annotated[list[_Column | None], Field(min_length=1, max_length=16)]
 
 
 class LogColumns(Request):
-    """Names of the columns of a log, as in its header, or their numbers from 1; of joints one each,
-    from base to flange. Null: none. Efforts may be null for joints whose effort was not logged.
+    """Names of the columns of a log, as in its header, or their numbers from 1. A channel of joints
+    has one column per joint, from base to flange. Null: no column. An effort is null for a joint
+    without logged effort.
     """
 
     time: _Column = described("Times [s].", None, "time_s")
@@ -55,10 +56,10 @@ class LogColumns(Request):
 
 
 class LogFile(Request):
-    """What a file of a log does not say."""
+    """Information about a log beyond the content of its file."""
 
     columns: LogColumns | None = described(
-        "Which columns hold what, where their names are not known.",
+        "Columns of the channels; needed if the header has other names than the known ones.",
         None,
         {"time": "t", "q": ["q1", "q2", "q3", "q4", "q5", "q6"]},
         default=None,

@@ -9,19 +9,19 @@ from joulepath.app.schemas.examples.values import REQUEST_ID
 
 
 class ProblemDetails(Response):
-    """An error document: which error, and how to correct it."""
+    """An error document, with the type of the error and its remedy."""
 
-    # `type`, `title` and `status` have defaults in the models of the types, and are always in the
-    # answer
+    # the models of single types give `type`, `title` and `status` defaults, but every answer
+    # contains them
     model_config = ConfigDict(json_schema_serialization_defaults_required=True)
 
     type: str = described(
-        "Path of a page that explains this type of error.", None, "/problems/invalid-request"
+        "Path of a page about this type of error.", None, "/problems/invalid-request"
     )
     title: str = described("Short name of the type.", None, "Invalid request")
     status: int = described("HTTP status.", "1", 422)
     detail: str = described(
-        "One sentence that says what is wrong and how to correct it.",
+        "One sentence with the cause and the remedy.",
         None,
         "Correct the fields listed under `errors`.",
     )

@@ -1,4 +1,4 @@
-"""Imports of all modules used by workers, in the process from which they are forked."""
+"""Imports all modules of the workers in their parent process, before it forks the workers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ with importing():
             import_module(module.name)
     for name in TASKS:
         import_module(f"joulepath.app.tasks.{name}")
-    # The process answering HTTP does not need it, so that callers import it locally.
+    # Its callers import it locally, because the HTTP process does not need it.
     import_module("toppra")
-    # Messages about large bodies name its fields.
+    # Messages about large bodies name fields of this module.
     import_module("joulepath.app.schemas.studies")
 
-# SIGTERM from a service manager reaches all processes. This process ends with its parent. An
-# earlier end would end the workers before running requests are answered.
+# A service manager sends SIGTERM to all processes. This process ignores it and ends with its
+# parent: an earlier end would stop the workers before running requests are answered.
 signal.signal(signal.SIGTERM, signal.SIG_IGN)

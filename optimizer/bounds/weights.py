@@ -1,4 +1,4 @@
-"""Weights of a dual bound, which affect its quality and not its validity."""
+"""Weights of a dual bound; they affect the tightness of the bound, not its validity."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Weights:
     scale: float
     """Factor of the multipliers [1]."""
     confinement: Array
-    """κ, shape (nq,) [N·m·s/rad]."""
+    """Confinement κ, shape (nq,) [N·m·s/rad]."""
     mixing: Array
-    """μ, shape (nq,) [N·m·s/rad]."""
+    """Mixing weight μ of Young's inequality, shape (nq,) [N·m·s/rad]."""
     work: float = 0.0
-    """η [1]."""
+    """Weight η of the mechanical work [1]."""

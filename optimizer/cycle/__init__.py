@@ -1,1 +1,1 @@
-"""Cycles of many stops: least chains of configurations, with the motions between them."""
+"""Cycles of many stops: least chains of configurations with motions between the stops."""

@@ -1,1 +1,1 @@
-"""Excitation trajectories: motions that determine the parameters of an arm."""
+"""Excitation trajectories for the identification of the parameters of an arm."""

@@ -9,8 +9,8 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class ExcitationInfeasible(JoulepathError):
-    """No start led to an excitation within its limits. `limit` names a limit that the last start
-    exceeded.
+    """No start led to an excitation within its limits. `limit` names a limit exceeded from the last
+    start.
     """
 
     title = "No excitation within the limits"

@@ -1,4 +1,4 @@
-"""`joint_limits`: limits on speed and acceleration that the postures of a motion can hold."""
+"""`joint_limits`: limits on speed and acceleration within the torque limits along a motion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class LimitsOptions:
 
 
 def to_joint_limits(program: Program, options: LimitsOptions | None = None) -> WrittenFile:
-    """Write the joint limits of a program for planners that time its path anew.
+    """Write the joint limits of a program, for planners with their own timing of its path.
 
     Args:
         program: the motion.

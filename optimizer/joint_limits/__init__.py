@@ -1,1 +1,1 @@
-"""Limits on speed and acceleration that the torque limits imply."""
+"""Limits on speed and acceleration, derived from the torque limits."""

@@ -1,1 +1,1 @@
-"""Kinematics of serial chains, forward and inverse; the only room that knows the form of an arm."""
+"""Forward and inverse kinematics of serial chains; no other room depends on the form of an arm."""

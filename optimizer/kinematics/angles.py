@@ -1,4 +1,4 @@
-"""Angles that differ by full turns."""
+"""Angles modulo full turns."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from joulepath.optimizer.exceptions import NoConfigurationFound
 
 @dataclass(eq=False)
 class OrientationNotHeld(NoConfigurationFound):
-    """An arm with fewer than six joints, which reaches few orientations at a position, was not
-    found to hold the orientation of the pose."""
+    """No configuration with the orientation of the pose was found. An arm with fewer than six
+    joints reaches few orientations at a position."""
 
     title = "Orientation not held"
     remedy = (

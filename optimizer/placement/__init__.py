@@ -1,1 +1,1 @@
-"""Placement of least energy: where to put the robot, or the stops and obstacles around it."""
+"""Placement of least energy, of the robot or of the stops and obstacles around it."""

@@ -26,7 +26,7 @@ class ReasonCounts:
 
 @dataclass(eq=False)
 class NoPlacement(JoulepathError):
-    """The cycles can be run at no place of the region that was tried, the nominal one included."""
+    """The cycles can be run at no tried place of the region, not even at the nominal place."""
 
     title = "No place found"
     remedy = (
@@ -35,9 +35,9 @@ class NoPlacement(JoulepathError):
     )
 
     reasons: ReasonCounts
-    """Why not, at all places that were tried."""
+    """Number of tried places by the reason of the failure."""
     nominal: str
-    """What is wrong at the nominal place."""
+    """Reason of the failure at the nominal place."""
 
     def __str__(self) -> str:
         tried = sum(vars(self.reasons).values())

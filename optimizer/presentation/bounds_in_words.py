@@ -1,5 +1,6 @@
-"""Bounds of requests in words, rounded towards what is allowed: the number that is read is accepted
-when it is sent back.
+"""Bounds of requests in words, rounded into the allowed interval.
+
+A request with the printed number is therefore accepted.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What is asked: frozen, validated data that computes nothing."""
+"""Problems as frozen, validated data without computations."""

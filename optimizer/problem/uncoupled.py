@@ -1,4 +1,4 @@
-"""Requests that do not model arms with joints that follow others."""
+"""Check for requests without support for coupled joints."""
 
 from __future__ import annotations
 
@@ -7,8 +7,15 @@ from joulepath.optimizer.exceptions import InvalidProblem
 
 
 def check_uncoupled(robot: Robot, field: str, what: str) -> None:
-    """Raises InvalidProblem for an arm with joints that follow others, which `what` does not
-    model.
+    """Refuse an arm with follower joints, as in a parallelogram.
+
+    Args:
+        robot: the robot of the arm.
+        field: field of the problem that names the robot.
+        what: the unsupported request, as the beginning of the message.
+
+    Raises:
+        InvalidProblem: a joint of the robot follows another joint.
     """
     if robot.coupling.follows:
         raise InvalidProblem(

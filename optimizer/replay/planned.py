@@ -1,4 +1,4 @@
-"""A planned motion: the part of an answer that a replay needs."""
+"""A planned motion: the part of an answer for a replay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from joulepath.optimizer.result.energy import Objective
 
 @dataclass(frozen=True)
 class PlannedTorques:
-    """Samples of an answer: q [rad], v [rad/s], a [rad/s²], (k, nq) each."""
+    """Samples of an answer: q [rad], v [rad/s], a [rad/s²], all of shape (k, nq)."""
 
     q: Array
     v: Array

@@ -7,5 +7,5 @@ from typing import Any
 
 
 def mujoco() -> Any:
-    """The module `mujoco`, which has no annotations for mypy."""
+    """The module `mujoco`, as `Any`: it has no annotations for mypy."""
     return importlib.import_module("mujoco")

@@ -12,9 +12,9 @@ from joulepath.optimizer.search.state import SearchState
 
 
 def no_motion(state: SearchState) -> NoTrajectory | DeadlineExceeded:
-    """The error of a search that ended without a motion: the deadline, if it ended the search.
+    """The error of a search without a result: the deadline, if it ended the search.
 
-    A collision is reported after the deadline, too: it names what to move.
+    A collision is reported even after the deadline, because its pair of bodies shows the remedy.
     """
     is_open = any(each.status is CandidateStatus.UNVISITED for each in state.candidates)
     collides = any(each.attempt and each.attempt.collision for each in state.candidates)
@@ -24,7 +24,7 @@ def no_motion(state: SearchState) -> NoTrajectory | DeadlineExceeded:
 
 
 def no_trajectory(candidates: Sequence[Candidate]) -> NoTrajectory:
-    """The error for no motion, with the collision that stopped the best candidate, if any."""
+    """The error for no motion, with the shallowest collision of all candidates, if any."""
     reports = [candidate.report() for candidate in candidates]
     hits = [
         (each, each.attempt.collision)

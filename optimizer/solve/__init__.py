@@ -1,1 +1,1 @@
-"""Nonlinear programs of motions, their solvers, and the methods that use them."""
+"""Nonlinear programs of motions, their solvers, and the methods based on the solvers."""

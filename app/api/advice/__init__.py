@@ -1,1 +1,1 @@
-"""`/advice`: changes of a task that need less energy, each of them computed."""
+"""`/advice`: computed changes of a task with lower energy."""

@@ -23,7 +23,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     responses=problem_responses(*dict.fromkeys((*MOTION_PROBLEMS, *CYCLE_PROBLEMS)), UnknownAnswer),
 )
 async def advice(body: AdviceRequest, tasks: ServiceTasks) -> Response:
-    """Computes what else a task could be: a motion over the whole cycle, brakes at rest, a cycle
-    without the way home, shorter stops, a lighter tool. Each change is optimised, and listed with
-    its energy if it saves something. Nothing is kept."""
+    """Computes changes of a task: a motion over the whole cycle, brakes at rest, a cycle without
+    the way home, shorter stops, a lighter tool. Every change is optimised, and listed with its
+    energy if it saves energy. The service stores no answer."""
     return await tasks.answer(AdviceTask(body, tasks.request_id))

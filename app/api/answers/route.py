@@ -41,7 +41,7 @@ AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore) -> AnswerList:
-    """Kept answers, newest first, page by page: all, or those that are asked for."""
+    """Stored answers, newest first, page by page, with optional filters."""
     wanted = answers.Wanted(page.whole, page.job, page.search)
     found, following = await store.read(
         partial(answers.page, limit=page.limit, after=page.after, wanted=wanted)
@@ -80,7 +80,7 @@ async def show(id: AnswerId, store: ServiceStore) -> Response:
 async def rename(
     id: AnswerId, body: AnswerName, store: ServiceStore, client: ServiceClient
 ) -> AnswerSummary:
-    """Gives the answer a name, by which `GET /answers` finds it."""
+    """Names the answer; `GET /answers` searches these names."""
     rename = partial(answers.rename, answer_id=id, name=body.name, typed=body.typed, client=client)
     return await store.write(lambda session: _summary(rename(session)))
 
@@ -92,5 +92,5 @@ async def rename(
     responses=problem_responses(UnknownAnswer, AnswerInUse, NotOwner, StoreUnavailable),
 )
 async def delete(id: AnswerId, store: ServiceStore, client: ServiceClient) -> None:
-    """Deletes an answer. One of a study is deleted with its study."""
+    """Deletes an answer. An answer of a study is deleted with its study only."""
     await store.write(partial(answers.delete, answer_id=id, client=client), frees=True)

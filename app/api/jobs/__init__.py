@@ -1,1 +1,1 @@
-"""`/jobs`: requests that are computed when nobody waits for them."""
+"""`/jobs`: requests computed in the background."""

@@ -1,4 +1,4 @@
-"""POST /logs in a worker: reads the file of the received body, and says what is in it."""
+"""POST /logs in a worker: reads the file of the received body, and reports its content."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ReadLogTask:
 
 
 def _report_fields(reading: LogReading) -> dict[str, Any]:
-    """What an answer says of a log beside its name and owner."""
+    """Fields of an answer about the content of a log."""
     log, report = reading.log, reading.report
     return {
         "rows": report.rows,

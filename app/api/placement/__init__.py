@@ -1,1 +1,1 @@
-"""`POST /placement`: where to put the robot, for cycles of least energy."""
+"""`POST /placement`: the place of the robot for cycles of least energy."""

@@ -28,7 +28,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     ),
 )
 async def replay(body: ReplayRequest, tasks: ServiceTasks) -> Response:
-    """Plays the motion of an answer in MuJoCo, with a controller, and puts what happens beside what
-    the answer says: deviation, torques, contacts and energy. With `perturb`, also on arms that are
-    not quite the one planned with, and with what is left of the savings there."""
+    """Replays the motion of an answer in MuJoCo under a controller, and compares the simulation
+    with the answer: tracking deviation, torques, contacts and energy. With `perturb`, it also
+    replays the motion on arms with perturbed parameters, and returns the savings that remain."""
     return await tasks.answer(ReplayTask(body, tasks.request_id), body)

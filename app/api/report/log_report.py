@@ -1,4 +1,4 @@
-"""The report of a log: measured against predicted energy of each move."""
+"""The report of a log: measured and predicted energy of every move."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def log_report(bundle: Bundle) -> Report:
 
 
 def measured(part: Json) -> tuple[str, float] | None:
-    """The best measured energy [J] of a part of a log, and by what; None without one."""
+    """Source and value [J] of the most direct measurement of a part of a log; None without any."""
     known = part["measured"] or {}
     return next(((by, known[by]) for by in _BY if known.get(by) is not None), None)
 

@@ -1,1 +1,1 @@
-"""`/robots`: the arms of the service, and those that users add."""
+"""`/robots`: the bundled robots and the robots added by users."""

@@ -1,4 +1,4 @@
-"""GET /robots/{name}/mjcf in a worker, which has the robot's model."""
+"""GET /robots/{name}/mjcf in a worker with the loaded model of the robot."""
 
 from __future__ import annotations
 
@@ -19,5 +19,9 @@ class MjcfTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The MJCF file. `deadline` is not watched: it takes milliseconds. Raises UnknownRobot."""
+        """The MJCF file, written within milliseconds regardless of `deadline`.
+
+        Raises:
+            UnknownRobot: no robot has this name.
+        """
         return TaskResult(mjcf(robot_named(self.robot)).encode(), MEDIA_TYPE)

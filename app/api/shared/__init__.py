@@ -1,1 +1,1 @@
-"""Parameters, dependencies and ways of answering that several routes share."""
+"""Parameters, dependencies and responses shared by several routes."""

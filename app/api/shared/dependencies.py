@@ -1,5 +1,6 @@
-"""What the service provides to its routes. The only module of this room that reads the
-application's state.
+"""Dependencies of routes on parts of the service.
+
+No other module of this room reads the application's state.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from joulepath.app.tasks.arm_engine import ArmEngine
 
 
 def _of_app(name: str) -> Any:
-    """The dependency on what the application's state has under a name."""
+    """The dependency on an attribute of the application's state."""
 
     async def of_app(request: Request) -> Any:
         return getattr(request.app.state, name)
@@ -37,9 +38,9 @@ async def _client(request: Request) -> Client:
 
 
 ServiceClient = Annotated[Client, Depends(_client)]
-"""Who sent the request."""
+"""The client of the request."""
 ServiceCluster = Annotated[Cluster | None, _of_app("cluster")]
-"""The cluster that works on jobs; None without one."""
+"""The cluster for jobs; None without a cluster."""
 ServiceJobs = Annotated[Jobs, _of_app("jobs")]
 ServiceSettings = Annotated[Settings, _of_app("settings")]
 ServiceMetrics = Annotated[Metrics, _of_app("metrics")]
@@ -53,7 +54,7 @@ async def _client_engine(engine: ServiceEngine, client: ServiceClient) -> Client
 
 
 ServiceClientEngine = Annotated[ClientEngine, Depends(_client_engine)]
-"""The engine for the requests of the client that sent this one."""
+"""The engine for all requests of the client."""
 
 
 async def _arm_engine(engine: ServiceClientEngine, store: ServiceStore) -> ArmEngine:
@@ -67,5 +68,5 @@ async def _cache(
 
 
 ServiceCache = Annotated[AnswerCache, Depends(_cache)]
-"""Answers that this client was given before."""
+"""Earlier answers to this client."""
 ServiceArmEngine = Annotated[ArmEngine, Depends(_arm_engine)]

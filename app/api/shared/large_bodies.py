@@ -1,4 +1,4 @@
-"""Routes whose large JSON bodies are read in a worker."""
+"""Routes with large JSON bodies, which workers read."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from joulepath.app.http.weights import JSON
 from joulepath.app.tasks.read_body import HeldBody, ReadBodyTask, held
 
 LARGE = 1 << 16
-"""Size of a body [byte] above which a worker reads it. The largest that is read here takes a few
-milliseconds.
+"""Size [byte] above which a worker reads a body.
+
+The event loop needs a few milliseconds to read a body of this size.
 """
 
 _NAME = "body"
-"""Name of the parameter of a route that gets the body."""
+"""Name of the parameter of a route for the body."""
 
 
 class LargeBodyRoute(JsonRoute):
-    """A route that gets a `HeldBody` in place of its model if the body is large. Its model has one
-    JSON body.
+    """A route with one JSON body, which receives a `HeldBody` instead of its model if the body is
+    large.
     """
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any) -> None:
@@ -39,7 +40,7 @@ class LargeBodyRoute(JsonRoute):
         super().__init__(path, endpoint, **options)
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """The handler of a request, which depends on the size of its body."""
+        """Handler that selects the route for small or for large bodies."""
         handle = super().get_route_handler()
         if self._for_large is None:
             return handle
@@ -58,7 +59,7 @@ class LargeBodyRoute(JsonRoute):
 def _taking_held(
     endpoint: Callable[..., Any], signature: inspect.Signature, model: type[BaseModel]
 ) -> Callable[..., Any]:
-    """The endpoint, with its body from a worker."""
+    """The endpoint with a body parsed by a worker."""
 
     async def body(request: Request, tasks: ServiceTasks) -> HeldBody:
         parts = await strictly(request).parts()

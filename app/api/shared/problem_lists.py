@@ -1,4 +1,4 @@
-"""Lists of problems that several routes return."""
+"""Lists of problems common to several routes."""
 
 from __future__ import annotations
 

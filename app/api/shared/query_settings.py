@@ -1,4 +1,4 @@
-"""Settings of a request whose body is a file: query parameters, each JSON or a bare word."""
+"""Settings of a request with a file as its body: query parameters in JSON or as bare words."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ _REF = "#/components/schemas/{model}"
 
 
 def query_parameters(model: type[RequestModel], condition: str = "") -> list[dict[str, Any]]:
-    """The parameters of an OpenAPI operation whose query has the fields of the model, under a
-    condition in words.
+    """OpenAPI parameters of an operation that takes the fields of a model in its query.
+
+    Args:
+        model: model of the settings.
+        condition: text before the description of every parameter, such as a condition of its use.
     """
     schema = model.model_json_schema(ref_template=_REF)
     return [
@@ -35,7 +38,11 @@ def query_parameters(model: type[RequestModel], condition: str = "") -> list[dic
 
 
 def settings_of(model: type[M], request: Request) -> M:
-    """The settings in a query. Raises InvalidRequest, also for one that is given twice."""
+    """The settings in a query.
+
+    Raises:
+        InvalidRequest: a setting is invalid, unknown, or given more than once.
+    """
     counted = Counter(name for name, _ in request.query_params.multi_items())
     twice = next((name for name, count in counted.items() if count > 1), None)
     if twice is not None:

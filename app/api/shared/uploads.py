@@ -1,5 +1,7 @@
-"""Files of received bodies, which workers read. They have no name, so that nothing is left of them,
-however the service ends."""
+"""Temporary files with received bodies, for workers.
+
+The files have no name in the file system: no file remains, even if the service is killed.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,9 @@ from fastapi import Request
 
 @contextmanager
 def upload() -> Iterator[tuple[BinaryIO, str]]:
-    """A file to write a body to, unbuffered, and the path by which a worker can open it until the
-    context ends.
+    """A context with an unbuffered file for a body, and its path for a worker.
+
+    The path is valid until the context ends.
     """
     with TemporaryFile(prefix="joulepath-", buffering=0) as file:
         yield file, f"/proc/{os.getpid()}/fd/{file.fileno()}"

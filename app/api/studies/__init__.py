@@ -1,1 +1,1 @@
-"""`/studies`: motions that are improved step by step, and what is said of them."""
+"""`/studies`: step-by-step improvement of motions, with suggestions."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from joulepath.app.schemas.examples.files import Example
 
-# that of the example: it follows from the content
+# id of the example, derived from its content
 FIGURES_ID = "26d7fc46-dfa6-58dc-957c-af3337058506"
 UNKNOWN_ID = "9d1f4f1c-0a43-5f4a-8ad0-d1b75c0a0e0f"
 

@@ -1,4 +1,4 @@
-"""Examples of errors: one of each type that has data of its own."""
+"""Examples of errors: one example per error type with data of its own."""
 
 from __future__ import annotations
 

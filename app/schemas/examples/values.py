@@ -1,4 +1,4 @@
-"""Values that the examples of several schemas share, and examples of jobs and studies."""
+"""Values shared by the examples of several schemas, and examples of jobs and studies."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from joulepath.app.schemas.examples.files import Example, body_examples
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 """Joint positions [rad] with the tool pointing down."""
 NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
-"""Joint positions [rad] near those of HOME."""
+"""Joint positions [rad] near `HOME`."""
 PAPER_HOME = [0.0, -1.5708, 1.5708, -1.5708, 3.1416, 0.0]
 PAPER_POSE = [-0.1243, -0.9639, 1.6165, -2.2211, 4.7124, 0.1251]
 """Joint positions [rad] of the founding paper: its home, and the first configuration of its Table

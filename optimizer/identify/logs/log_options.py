@@ -15,14 +15,14 @@ from joulepath.optimizer.problem.arm import Payload
 
 @dataclass(frozen=True)
 class LogOptions:
-    """Information that the file of a log does not contain."""
+    """Information about a log beyond the content of its file."""
 
     payload: Payload | None = None
     """Payload of the arm; None for the logged payload, or none if it was not logged."""
     gravity: Sequence[float] | Array | None = None
-    """Gravity (3,) in the base frame [m/s²]; None for that of the robot."""
+    """Gravity (3,) in the base frame [m/s²]; None for the gravity of the robot."""
     columns: ColumnMap | None = None
-    """Names of the columns of each channel, or their numbers from 1; None for a header with known
+    """Names of the columns of the channels, or their numbers from 1; None for a header with known
     names."""
     units: Literal["rad", "deg"] = "rad"
     """Unit of positions, and of the angle in speeds and accelerations."""

@@ -1,4 +1,4 @@
-"""Files whose bytes come in pieces of any size."""
+"""Files read from pieces of bytes of any size."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 
 
 class PieceReader(RawIOBase):
-    """A file to read of pieces.
+    """A readable binary file over a source of pieces.
 
     Args:
-        next_piece: the next piece, for a request of so many bytes; empty at the end of the file.
-        close: closes what the pieces come from.
+        next_piece: returns the next piece, of any size, for a requested number of bytes; returns
+            an empty piece at the end of the file.
+        close: closes the source of the pieces.
     """
 
     def __init__(

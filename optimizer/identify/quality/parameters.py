@@ -19,7 +19,7 @@ from joulepath.optimizer.identify.results import IdentifiedParameter
 def parameters_of(
     robot: Robot, estimate: Estimate, options: IdentificationOptions
 ) -> tuple[IdentifiedParameter, ...]:
-    """Parameters of an estimate, with the reason for every parameter that is not identified."""
+    """Parameters of an estimate, with a reason for every unidentified parameter."""
     base = BaseTerms.of(robot, [], options) if options.reduced else None
     own = {} if base is None else dict(zip(base.names, base.own.tolist(), strict=True))
     deviations = np.sqrt(np.diag(estimate.covariance)).tolist()

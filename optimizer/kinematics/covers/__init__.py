@@ -1,1 +1,1 @@
-"""Boxes that cover all configurations of a pose, for lower bounds."""
+"""Covers of all configurations of a pose by boxes, for lower bounds."""

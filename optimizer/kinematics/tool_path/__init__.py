@@ -1,1 +1,1 @@
-"""Tool paths: the shape and course of the TCP, and joint paths along them."""
+"""Tool paths: shape and course of the TCP, and joint paths along a tool path."""

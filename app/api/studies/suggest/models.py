@@ -1,4 +1,4 @@
-"""What `GET /studies/{id}/suggest` takes and answers."""
+"""Query and answer of `GET /studies/{id}/suggest`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class _Proposal(Response):
 
 
 class Suggestion(_Proposal):
-    """A change whose best motion was computed."""
+    """A change with its computed best motion."""
 
     energy: float = described(
         "Energy of the motion found for `request`, of the study's objective.", "J", 57.5
