@@ -1,4 +1,4 @@
-"""Joints of a chain that follow others, as in the parallelogram of a palletiser."""
+"""Follower joints of a chain, as in the parallelogram of a palletiser."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Coupling:
-    """Joints of a chain that follow others: q_chain = matrix · q + offset.
+    """Followers among the joints of a chain: q_chain = matrix · q + offset.
 
-    The nq joints that follow no other are the joints of the arm: they have the motors, so that
-    positions q, limits, drives and torques are theirs.
+    A chain has n joints. The nq joints with a motor are the joints of the arm: positions q, limits,
+    drives and torques refer to the joints of the arm. A follower turns with a joint of the arm, its
+    leader.
 
-    `rows` has for each of the n joints of the chain the place in the chain of the joint that it
-    follows, the multiplier [1] and the offset [rad]; a joint of the arm follows itself. It is empty
-    for an arm without followers, whose chain has the joints of the arm: every method then returns
-    what it is given.
+    `rows` has one row per joint of the chain: the place of its leader in the chain, the multiplier
+    [1] and the offset [rad]. A joint of the arm is its own leader. `rows` is empty for an arm
+    without followers; every method then returns its argument.
     """
 
     rows: tuple[tuple[int, float, float], ...] = ()
@@ -49,7 +49,7 @@ class Coupling:
 
     @cached_property
     def leaders(self) -> list[int]:
-        """Number of the joint of the arm that turns a joint of the chain, shape (n,)."""
+        """Indices of the leaders of the chain's joints among the joints of the arm, shape (n,)."""
         return [self.own.index(leader) for leader, _, _ in self.rows]
 
     @cached_property
@@ -61,7 +61,7 @@ class Coupling:
 
     @cached_property
     def offset(self) -> Array:
-        """Positions (n,) [rad] of the chain's joints with the arm's at zero."""
+        """Positions (n,) [rad] of the chain's joints with all joints of the arm at zero."""
         return np.array([offset for _, _, offset in self.rows])
 
     def positions(self, q: Array) -> Array:
@@ -81,12 +81,14 @@ class Coupling:
         return np.asarray(x @ self.matrix) if self.rows else x
 
     def reaches(self, half: Array) -> Array:
-        """Greatest moves (..., n) of the chain's joints from moves (..., nq) of the arm's."""
+        """Greatest moves (..., n) of the chain's joints for moves (..., nq) of the arm's joints."""
         return np.asarray(half @ np.abs(self.matrix).T) if self.rows else half
 
     def most_on_arm(self, x: Array) -> Array:
-        """Bounds (..., nq) on absolute derivatives by the arm's joints from those by the chain's
-        (..., n).
+        """Bounds (..., nq) on absolute derivatives by the arm's joints.
+
+        Args:
+            x: bounds on absolute derivatives by the chain's joints, shape (..., n).
         """
         return np.asarray(x @ np.abs(self.matrix)) if self.rows else x
 

@@ -27,7 +27,7 @@ from joulepath.models.shape_sizes import check_lengths
 from joulepath.models.urdf import coupling_of, urdf_of
 
 BETWEEN_LINKS = "between_links"
-"""Figure of the section `hulls` of robots whose links are compared with each other by them."""
+"""Figure of the section `hulls`: whether collisions between links are checked with the hulls."""
 # figures of the sections `collision` and `hulls` beside the shapes of links
 NO_LINKS = ("elbow", "meshes", "never_meet", "radius", BETWEEN_LINKS)
 
@@ -96,7 +96,7 @@ def _base_link(kinematics: dict[str, Any]) -> Array:
 
 
 def _gravity(kinematics: dict[str, Any]) -> Array:
-    """Gravity (3,) [m/s²] in `base`; that of an upright base without this figure."""
+    """Gravity (3,) [m/s²] in `base`; without this figure, the gravity of an upright base."""
     if "gravity" not in kinematics:
         return UPRIGHT
     return read_only(kinematics["gravity"]["value"], (3,), "kinematics.gravity")
@@ -119,8 +119,10 @@ def _torque_side(limits: dict[str, Any]) -> TorqueSide:
 
 
 def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, ...]:
-    """Capsules of all links, from the base on; those of a link in the order of its figure. Raises
-    ValueError.
+    """Capsules of all links from the base on, within a link in the order of its figure.
+
+    Raises:
+        ValueError: a capsule has another number of values than 7, or a radius that is not allowed.
     """
     rows = [
         (link, read_only(row, (7,), f"A capsule of {name}"))
@@ -133,8 +135,10 @@ def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, .
 
 
 def _hulls(figures: dict[str, Any], model: pin.Model) -> tuple[LinkHull, ...]:
-    """Hulls of the links of the section `hulls`, from the base on; those of a link in the order of
-    its figure. Raises ValueError.
+    """Hulls of the section `hulls` from the base on, within a link in the order of its figure.
+
+    Raises:
+        ValueError: a point of a hull has another number of coordinates than 3.
     """
     return tuple(
         LinkHull(link, read_only(points, (len(points), 3), "A hull"), figures["radius"]["value"])
@@ -145,7 +149,7 @@ def _hulls(figures: dict[str, Any], model: pin.Model) -> tuple[LinkHull, ...]:
 
 
 def _default_motion(figures: dict[str, Any]) -> DefaultMotion | None:
-    """None for a robot whose maker publishes no default: one without this section."""
+    """Default motion of the robot's controller; None if its maker publishes no default motion."""
     if "default_motion" not in figures:
         return None
     return DefaultMotion(
@@ -157,9 +161,7 @@ def _default_motion(figures: dict[str, Any]) -> DefaultMotion | None:
 
 
 def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCapsule | None:
-    """The last capsule of the link that the figure `elbow` names; None for a robot without this
-    figure.
-    """
+    """The last capsule of the link named by the figure `elbow`; None without this figure."""
     if "elbow" not in figures["collision"]:
         return None
     link = figures["collision"]["elbow"]["value"]
@@ -167,10 +169,12 @@ def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCa
 
 
 def _load(name: str, law: dict[str, Any], nq: int) -> Array | None:
-    """Share of the carried torque that is lost, (nq,); None where the figures name none. Raises
-    ValueError.
+    """Share of the carried torque lost to friction, shape (nq,); None without this figure.
 
-    From a share of 1 on a joint could not be moved by its load at all.
+    A load could not move its joint at all at a share of 1 or more.
+
+    Raises:
+        ValueError: a share is negative, or at least 1.
     """
     if "load" not in law or not np.any(law["load"]["value"]):
         return None

@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 @contextmanager
 def assigned(variable: ContextVar[T], value: T) -> Iterator[None]:
-    """Context that assigns a value to a variable, in the current thread only."""
+    """Context with a value assigned to a variable; other threads keep their own values."""
     before = variable.set(value)
     try:
         yield

@@ -1,4 +1,4 @@
-"""Robots of requests: those of users and identified figures, which the task brings with it."""
+"""Robots of requests: users' robots and identified figures come with the task."""
 
 from __future__ import annotations
 
@@ -19,18 +19,22 @@ _ROBOT: ContextVar[tuple[str, dict[str, Any]] | None] = ContextVar("own robot", 
 
 
 def own_robot_named(name: str, figures: dict[str, Any]) -> AbstractContextManager[None]:
-    """Within the context, and its thread, requests may name this robot."""
+    """A context for requests with the given own robot, in the current thread only."""
     return assigned(_ROBOT, (name, figures))
 
 
 def own_figures_of(name: str) -> dict[str, Any] | None:
-    """Figures of the own robot of this name; None without them."""
+    """Figures of the own robot with the given name; None if the context has no such robot."""
     robot = _ROBOT.get()
     return robot[1] if robot is not None and robot[0] == name else None
 
 
 def own_robot_of(name: str, figures: dict[str, Any]) -> Robot:
-    """The robot of these figures. Raises InvalidProblem for invalid shapes of earlier versions."""
+    """The robot with the given figures.
+
+    Raises:
+        InvalidProblem: an earlier version stored a shape with invalid sizes.
+    """
     try:
         return own_robot(name, figures)
     except WrongSize as error:

@@ -11,12 +11,12 @@ from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.progress import no_listener
 
 Listener = Callable[[Any], None]
-"""Gets the events of a search, or the steps of another computation."""
+"""Receives the events of a search, or the steps of another computation."""
 _tell: ContextVar[Listener] = ContextVar("tell", default=no_listener)
 
 
 def listening(tell: Listener) -> AbstractContextManager[None]:
-    """A context in which `tell` receives the events of tasks."""
+    """A context with `tell` as the receiver of the events of tasks."""
     return assigned(_tell, tell)
 
 

@@ -1,4 +1,4 @@
-"""Fields of ROS messages as those of `POST /optimize`, without an installation of ROS."""
+"""Converts fields of ROS messages to fields of `POST /optimize`, without a ROS installation."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Json = dict[str, Any]
 BASE_FRAMES = ("base", "base_link")
 """Frames of poses in requests."""
 MOST_NAMES = 20
-"""Largest number of joints of a message that an error names."""
+"""Largest number of joint names of a message in an error."""
 
 
 @dataclass(frozen=True)
 class JointNames:
-    """The robot's joints as the ROS system names them.
+    """Names of the robot's joints in the ROS system.
 
     Attributes:
         joints: names in the robot's model, from base to tip.
-        prefix: what all of them begin with in ROS, such as `left_`.
+        prefix: common prefix of the names in ROS, such as `left_`.
     """
 
     joints: tuple[str, ...]
@@ -89,7 +89,7 @@ def pose_target(
     prefix: str,
     base_frame: str,
 ) -> Json:
-    """The target of a PoseStamped, which is the pose of the TCP.
+    """The target of a PoseStamped message with the pose of the TCP.
 
     Args:
         topic: topic of the message, for errors.
@@ -100,7 +100,7 @@ def pose_target(
         base_frame: frame of the robot's base in ROS: `base_link` of its description.
 
     Raises:
-        InvalidRequest: the frame is none at the base.
+        InvalidRequest: the frame is not a frame of the base.
     """
     frames = {prefix + frame: frame for frame in BASE_FRAMES}
     frames |= {base_frame: "base_link", "": "base_link"}
@@ -121,7 +121,7 @@ def pose_target(
 
 
 def summary_of(answer: Json) -> Json:
-    """What a caller needs to know about a plan, from the answer of `POST /optimize`."""
+    """Summary of a plan for its caller, from the answer of `POST /optimize`."""
     objective, energy = answer["objective"], answer["energy"]
     return {
         "state": "planned",
@@ -147,5 +147,5 @@ def summary_of(answer: Json) -> Json:
 
 
 def refusal(field: Sequence[str], message: str) -> InvalidRequest:
-    """The error for a field of a message, whose path begins with the topic."""
+    """The error for a field of a message; the path `field` begins with the topic."""
     return InvalidRequest([FieldError(loc=list(field), msg=message)], message)

@@ -20,7 +20,7 @@ Angle = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
 def one_or_each(value: Any) -> str | None:
-    """Discriminator of a union of a number, tagged `one`, and a list, tagged `each`."""
+    """Discriminator of a union of a number (tag `one`) and a list (tag `each`)."""
     if isinstance(value, bool):
         return None
     if isinstance(value, int | float):
@@ -46,20 +46,20 @@ AnglePerJoint = Annotated[
 
 
 class Payload(Request):
-    """A body that is fixed to the flange."""
+    """A body fixed to the flange."""
 
     mass: float = described("Mass.", "kg", 2.0, ge=0, le=1e3)
     com: Vector3 | None = described(
-        "Centre of mass in the flange frame. Null: that of a body of one density that fills "
-        "`shape`. Required unless there is a `shape` or `mass` is 0.",
+        "Centre of mass in the flange frame. Null: the centre of `shape`, filled with uniform "
+        "density. Required unless there is a `shape` or `mass` is 0.",
         "m",
         [0.0, 0.0, 0.05],
         default=None,
     )
     inertia: list[float] | None = described(
         "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, "
-        "iyz, izz]. Null: that of a body of one density that fills `shape` if `com` is null too, "
-        "else a point mass.",
+        "iyz, izz]. Null: the inertia of `shape`, filled with uniform density, if `com` is null "
+        "too; otherwise a point mass.",
         "kg·m²",
         [0.004, 0.0, 0.0, 0.004, 0.0, 0.003],
         default=None,
@@ -175,8 +175,8 @@ class Drives(Request):
 
 
 class SharedBus(Request):
-    """Joints exchange power. The brake resistor dissipates the net surplus, except the fraction
-    `regeneration` (a parameter of the robot) that the supply takes back."""
+    """Joints exchange power. The supply takes back the fraction `regeneration` (a parameter of the
+    robot) of the net surplus, and the brake resistor dissipates the rest."""
 
     mode: Literal["shared"] = described(
         "Surplus feeds the other joints; the rest is dissipated.", None, "shared"
@@ -184,7 +184,7 @@ class SharedBus(Request):
 
 
 class IsolatedBus(Request):
-    """Each joint dissipates its own surplus."""
+    """Every joint dissipates its own surplus."""
 
     mode: Literal["isolated"] = described(
         "The surplus of a joint feeds no other joint.", None, "isolated"
@@ -204,8 +204,8 @@ class RecuperatingBus(Request):
 
 class StorageBus(Request):
     """Joints exchange power. The net surplus charges an energy storage on the bus (capacitor or
-    flywheel), which feeds later demand. What the storage cannot take is treated as on the shared
-    bus."""
+    flywheel), and the storage feeds later demand. Surplus beyond the capacity or the power of the
+    storage is treated as on the shared bus."""
 
     mode: Literal["storage"] = described(
         "Surplus feeds the other joints; the rest charges the energy storage.", None, "storage"

@@ -59,7 +59,7 @@ class LogFile(Request):
     """Information about a log beyond the content of its file."""
 
     columns: LogColumns | None = described(
-        "Columns of the channels; needed if the header has other names than the known ones.",
+        "Columns of the channels. Required for a header with unknown column names.",
         None,
         {"time": "t", "q": ["q1", "q2", "q3", "q4", "q5", "q6"]},
         default=None,

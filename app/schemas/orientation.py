@@ -61,15 +61,14 @@ class RotvecFreeAbout(WithRotvec, _FreeAbout):
 
 class Cone(Request):
     """All orientations with an axis of the tool within an angle of a direction. The tool may rotate
-    about that axis.
+    about this axis.
     """
 
     axis: Axis = described(
         "Axis of the tool in the TCP frame; any length except zero.", "1", [0.0, 0.0, 1.0]
     )
     direction: Axis = described(
-        "Direction in the robot's base frame, or in the `frame` that is given; any length except "
-        "zero.",
+        "Direction in the robot's base frame, or in the given `frame`; any length except zero.",
         "1",
         [0.0, 0.0, -1.0],
     )
@@ -79,7 +78,7 @@ class Cone(Request):
 
 
 class InCone(Request):
-    """An orientation that is free within a cone."""
+    """An orientation with an axis of the tool in a cone."""
 
     cone: Cone = described(
         "Allowed directions of an axis of the tool.",
@@ -121,7 +120,7 @@ Orientation = Annotated[
 
 
 class ConeOrientedPose(Positioned, InFrame):
-    """A position with an orientation that is free in part."""
+    """A position with a partly free orientation."""
 
     orientation: Orientation = described(
         '"free": any orientation. `free_about`: a given orientation, rotated by any angle about an '

@@ -11,8 +11,8 @@ from joulepath.app.schemas.examples.values import REQUEST_ID
 class ProblemDetails(Response):
     """An error document, with the type of the error and its remedy."""
 
-    # the models of single types give `type`, `title` and `status` defaults, but every answer
-    # contains them
+    # every answer contains `type`, `title` and `status`, although the models of single types
+    # have defaults for these fields
     model_config = ConfigDict(json_schema_serialization_defaults_required=True)
 
     type: str = described(

@@ -76,11 +76,11 @@ class MeshObstacle(Mesh, _Obstacle):
 
 
 class PointsObstacle(Points, _Obstacle):
-    """An obstacle that is a point cloud."""
+    """A point cloud as an obstacle."""
 
 
 class VoxelsObstacle(Voxels, _Obstacle):
-    """An obstacle that is a grid of voxels."""
+    """A grid of voxels as an obstacle."""
 
 
 class MeshFileObstacle(MeshFile, _Obstacle):
@@ -88,14 +88,14 @@ class MeshFileObstacle(MeshFile, _Obstacle):
 
 
 class HalfSpaceObstacle(HalfSpace, _Obstacle):
-    """An obstacle that is a floor or a wall."""
+    """A floor or a wall as an obstacle."""
 
 
 def _by_shape(*known: str) -> Discriminator:
-    """Discriminator of a union by the field `shape`, whose members are tagged `a <shape>`.
+    """Discriminator of a union by the field `shape`; the tags of its members are `a <shape>`.
 
-    Its error does not echo an unknown shape. A tag that were the name of a field, as `points` is,
-    would be taken for one in the location of an error.
+    The error does not echo an unknown shape. The tags begin with `a `, because the location of an
+    error would present a tag such as `points` as a field.
     """
 
     def choose(value: Any) -> str | None:
@@ -125,10 +125,11 @@ LinkNames = Annotated[
 
 
 def touched_links(body: str) -> Any:
-    """The field `touches` of a body that is fixed to the flange."""
+    """The field `touches` of a body fixed to the flange."""
     return described(
-        f"Names of the links that the {body} touches by design: their distance from it is not "
-        "checked. Null: the link that carries the flange (`wrist_3`). An empty list: none.",
+        f"Names of the links that the {body} touches by design: the distance between such a link "
+        f"and the {body} is not checked. Null: the link of the flange (`wrist_3`). An empty list: "
+        "none.",
         None,
         ["wrist_3"],
         default=None,

@@ -1,13 +1,14 @@
 """Lower bounds on mechanical work + price · duration, for many motions between few pairs of ends.
 
-A motion that takes less time and then rests does the same work, so the bound on the work at the
-longest duration of an interval holds for the whole interval. The durations are cut into cells, each
-with the bound on the work at its end and the price at its beginning. The least cell is the bound.
+A motion does the same work if it takes less time and then rests. The bound on the work at the
+longest duration of an interval therefore holds for the whole interval. The durations are divided
+into cells. The bound of a cell is the bound on the work at its end plus the price of its
+shortest duration, and the result is the least bound of all cells.
 
-The work is bounded by `mechanical_bound`. Its bound by travel depends on the potential energies of
-both ends, the duration, and |Δq|_D. There are few different energies, so for each of them the
-greatest |Δq|_D is tabulated over the work, and looked up. The work is rounded down to the table, so
-that the bound stays valid.
+`mechanical_bound` bounds the work. Its bound by travel depends on the potential energies of both
+ends, the duration, and |Δq|_D. The ends have few different energies, so the greatest |Δq|_D is
+tabulated over the work once per pair of energies. The look-up rounds the work down to the table, so
+the bound stays valid.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def priced_work_bounds(
         longest: longest duration [s].
 
     Returns:
-        Bounds, shape (P,) [J]; inf for a motion that always takes longer.
+        Bounds, shape (P,) [J]; inf for a motion whose shortest duration exceeds `longest`.
     """
     arm, displacement = EnergyRange(prepared), q_goal - q_start
     limits, rotors = prepared.arm.active_limits, prepared.arm.drives.rotor_inertia
@@ -105,7 +106,7 @@ def _by_travel(
         span = float(potential.max()) - top + 2 * (float(travel[own].max()) / duration) ** 2
         energies = top + max(span, 0.0) * shares
         reached = most_travel(potential, fastest, energies[:, None], duration)
-        # the greatest tabulated energy that does not suffice
+        # the greatest tabulated energy with too little travel
         enough = energies[np.maximum(np.searchsorted(reached, travel[own]) - 1, 0)]
         work[own] = 2 * enough - start - goal
     return work

@@ -9,9 +9,7 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class ExcitationInfeasible(JoulepathError):
-    """No start led to an excitation within its limits. `limit` names a limit exceeded from the last
-    start.
-    """
+    """No start led to an excitation within its limits. The last start exceeded the limit `limit`."""
 
     title = "No excitation within the limits"
     remedy = (

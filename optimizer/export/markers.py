@@ -40,7 +40,7 @@ MARKERS = MarkerSettings()
 
 
 def markers(bodies: list[Body], frames: list[str]) -> list[Fields]:
-    """The markers of bodies, which move with the frames of their links.
+    """Markers of bodies; RViz moves a marker with the frame of its link.
 
     Args:
         bodies: bodies of the arm, its tool, its payload, and the surroundings.
@@ -76,8 +76,9 @@ def xyz(values: Any) -> Fields:
 
 
 def _solids(core: Core) -> Iterator[tuple[Array, Fields]]:
-    """The solids whose union is a core, each with its pose (4, 4) in the frame of the core. The
-    roundings of boxes and hulls are left out.
+    """Solids with the union of a core, and their poses (4, 4) in the frame of the core.
+
+    The roundings of boxes and hulls are left out.
     """
     if core.is_half_space:
         low = _at(np.array([0.0, 0.0, -MARKERS.thickness / 2]))
@@ -105,7 +106,7 @@ def _round(core: Core) -> Iterator[tuple[Array, Fields]]:
 
 
 def _turned_to(axis: Array) -> Array:
-    """A rotation (3, 3) that takes z to a unit vector (3,)."""
+    """A rotation (3, 3) from the z axis to a unit vector (3,)."""
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis)
     return np.asarray(turn.toRotationMatrix())
 

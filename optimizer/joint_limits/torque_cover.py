@@ -1,10 +1,10 @@
-"""Proof that no posture in given boxes needs more torque than is allowed.
+"""Proof that the torques at all postures in given boxes are within allowed torques.
 
 With fixed speeds, accelerations and payload, a torque τ_i(q) deviates from its multilinear
 interpolation between the corners of a box with half sides h by at most Σ_k h_k² / 2 · max
 |∂²τ_i/∂q_k²|. The greatest |τ_i| over speeds and accelerations is convex in the terms of τ_i, and
-an interpolated term is a mean of those at the corners. Hence the greatest |τ_i| in a box is at most
-that at its corners plus this deviation.
+an interpolated term is a mean of the terms at the corners. Hence the greatest |τ_i| in a box is at
+most the greatest |τ_i| at its corners plus this deviation.
 
 Bounds on the second derivatives of inertia and velocity terms hold for all postures
 (`chain_derivatives`). The second derivative of gravity torque i by joint k is at most
@@ -56,8 +56,8 @@ class _Boxes(Boxes):
 
 
 class TorqueCover(Subdivision[_Boxes]):
-    """The torques of an arm with one payload at all postures in boxes, compared with those
-    allowed.
+    """Comparison of the torques of an arm with one payload, at all postures in boxes, with allowed
+    torques.
     """
 
     def __init__(
@@ -76,10 +76,10 @@ class TorqueCover(Subdivision[_Boxes]):
             chain: the arm with its payload.
             rates: limits on speeds and accelerations.
             allowed: largest torques of the bodies, shape (nq,) [N·m].
-            unit: unit of the excess of each torque, shape (nq,) [N·m].
+            unit: units of the excess of the torques, shape (nq,) [N·m].
             postures: the postures.
-            enough: excess at which a posture ends the proof.
-            evaluations: number of postures after which the proof is given up.
+            enough: excess of a posture that ends the proof.
+            evaluations: largest number of evaluated postures of a proof.
         """
         self._chain, self._rates, self._postures = chain, rates, postures
         self._allowed, self._unit, self._enough = allowed, unit, enough
@@ -97,7 +97,7 @@ class TorqueCover(Subdivision[_Boxes]):
         last = chain.gravity_curvature(np.zeros((1, chain.nq)))[0, -1]
         self._gravity = np.where(self._later == chain.nq - 1, np.minimum(gravity, last), gravity)
         # A torque has the period 2π: its slope vanishes somewhere, and is at most π times the
-        # largest curvature, so that the torque stays within π² times this of its value anywhere.
+        # largest curvature. Any two values of the torque differ by at most π² times the curvature.
         change = np.pi**2 * (self._motion + self._gravity / unit)
         self._joints = np.flatnonzero(change.max(axis=1) > COVER.negligible)
         self._still = np.setdiff1d(k, self._joints)
@@ -105,7 +105,7 @@ class TorqueCover(Subdivision[_Boxes]):
         self._bits = np.array(list(product((0, 1), repeat=len(self._joints))))
 
     def holds(self) -> bool:
-        """Whether it is proven that no posture has an excess.
+        """Whether the proof succeeds: no posture has an excess.
 
         Raises:
             DeadlinePassed: the watched deadline passed.
@@ -125,7 +125,7 @@ class TorqueCover(Subdivision[_Boxes]):
         return np.arange(0 if ends else min(COVER.boxes_per_round, len(parts.value)))
 
     def divided(self, parts: _Boxes, rows: Indices) -> _Boxes:
-        """Both halves of each box, across the joint that adds most to its bound."""
+        """Both halves of the boxes, across the joint with the largest share in a box's bound."""
         old, each = parts[rows], np.arange(len(rows))
         deviation = self._deviation(old.half, old.curvature)
         worst = (old.excess.max(axis=1) + deviation.sum(axis=1)).argmax(axis=1)
@@ -149,15 +149,13 @@ class TorqueCover(Subdivision[_Boxes]):
         return halves[0].joined(halves[1])
 
     def _undecided(self, centre: Array, half: Array, excess: Array, curvature: Array) -> _Boxes:
-        """The boxes whose bound on the excess is above zero."""
+        """The boxes with a bound on the excess above zero."""
         deviation = self._deviation(half, curvature).sum(axis=1)
         bound = (excess.max(axis=1) + deviation + self._rest).max(axis=1)
         return _Boxes(-bound, centre, half, excess, curvature)[np.flatnonzero(bound > 0)]
 
     def _deviation(self, half: Array, curvature: Array) -> Array:
-        """Deviations from the interpolation, by the joints across which boxes are halved, (n, m,
-        nq).
-        """
+        """Deviations from the interpolation by every divided joint, shape (n, m, nq)."""
         square, most = half**2 / 2, curvature.max(axis=1)
         square[:, self._still] = np.pi**2
         for k in reversed(range(most.shape[1] - 1)):

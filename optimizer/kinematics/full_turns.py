@@ -1,4 +1,4 @@
-"""Joint positions that differ by full turns, within limits."""
+"""Joint positions shifted by full turns into limits."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from joulepath.optimizer.kinematics.reach import REACH
 
 
 def full_turn_alternatives(q: Array, q_min: Array, q_max: Array) -> list[list[float]]:
-    """Angles q + 2πk [rad] of each joint within its limits, nearest to zero first.
+    """Angles q + 2πk [rad] of the joints within their limits, nearest to zero first.
 
-    An angle beyond a limit by rounding counts as on it.
+    An angle beyond a limit by rounding is moved onto the limit.
 
     Args:
         q: joint positions (nq,) [rad].
@@ -38,7 +38,7 @@ def nearest_turns(q: Array, limits: Limits) -> tuple[Array, Sequence[bool]]:
         limits: position limits.
 
     Returns:
-        The configurations (n, nq) [rad], and for each row whether all joints are within the limits.
+        The configurations (n, nq) [rad], and per row whether all joints are within the limits.
     """
     if len(q) and (limits.q_min <= q.min(axis=0)).all() and (q.max(axis=0) <= limits.q_max).all():
         return q, [True] * len(q)

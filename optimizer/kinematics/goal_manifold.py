@@ -1,8 +1,8 @@
-"""Manifold of the configurations that reach a pose with a partly free orientation.
+"""Manifold of all configurations of a pose with a partly free orientation.
 
-With one free rotation, a seven-joint arm has a manifold of two dimensions; with a free orientation,
-of four. Many configurations move at once: by a first-order step along the manifold, then back onto
-it by Newton's method.
+The manifold of a seven-joint arm has two dimensions with one free rotation, and four dimensions
+with a free orientation. Many configurations move at once: a first-order step leads along the
+manifold, and Newton's method leads back onto the manifold.
 """
 
 from __future__ import annotations
@@ -55,9 +55,7 @@ SETTINGS = GoalManifoldSettings()
 
 @dataclass(frozen=True, eq=False)
 class GoalManifold:
-    """Configurations of an arm that reach `pose` within the joint limits `q_min`, `q_max` (nq,)
-    [rad].
-    """
+    """Configurations of an arm at `pose` within the joint limits `q_min`, `q_max` (nq,) [rad]."""
 
     pose: ConeOrientedPose
     placements: Array
@@ -89,7 +87,7 @@ class GoalManifold:
             if np.abs(error).max(initial=0.0) < SETTINGS.tolerance:
                 break
             move = self._towards(error, rows, np.ones_like(q))
-            # A joint that would leave its range stays on its limit, and the other joints take over
+            # A joint about to leave its range stays on its limit, and the other joints take over
             # its part.
             held = ((q <= self.q_min) & (move < 0)) | ((q >= self.q_max) & (move > 0))
             if held.any():
@@ -99,8 +97,13 @@ class GoalManifold:
         return q, np.asarray(np.abs(error).max(axis=1) < SETTINGS.tolerance)
 
     def free_joints(self, q: Array) -> list[tuple[int, ...]]:
-        """Joints that can move together while the pose is held, for each q (n, nq) [rad] on the
-        manifold; none where the configuration is isolated.
+        """Movable joints at configurations on the manifold, with the pose held.
+
+        Args:
+            q: configurations on the manifold, shape (n, nq) [rad].
+
+        Returns:
+            Indices of the movable joints per configuration; empty for an isolated configuration.
         """
         _, size, modes = np.linalg.svd(self._error_and_rows(q)[1])
         fixed = (size > SETTINGS.held * size[:, :1]).sum(axis=1)
@@ -118,11 +121,11 @@ class GoalManifold:
         Args:
             q: configurations (n, nq) on the manifold [rad].
             to: target configurations (n, nq) [rad].
-            weights: weight of each joint's distance, shape (nq,).
+            weights: weights of the joint distances, shape (nq,).
 
         Returns:
-            The configurations (n, nq) [rad], and a mask (n,) of the rows that reach the pose within
-            the limits.
+            The configurations (n, nq) [rad], and a mask (n,) of the rows at the pose and within the
+            limits.
         """
         for _ in range(SETTINGS.approach_steps):
             error, rows = self._error_and_rows(q)

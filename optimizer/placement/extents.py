@@ -1,4 +1,4 @@
-"""Boxes in the world that contain a point for every place of the body it moves with."""
+"""Boxes in the world around a moving point, for all places of its body."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Extent:
 
 
 class Extents:
-    """Boxes of points that move with the bodies of a placement.
+    """Boxes around the points of the movable bodies of a placement.
 
     Args:
         space: the places.
@@ -58,7 +58,7 @@ class Extents:
         }
 
     def body_of_stop(self, stop: str) -> int | None:
-        """Number of the body that a stop moves with; None for the world."""
+        """Number of the body of a stop; None for a stop fixed in the world."""
         return self._of_stop.get(stop)
 
     def of_base(self, point: Array) -> Extent:
@@ -70,7 +70,7 @@ class Extents:
         return self._of_body(self._of_base, point)
 
     def of_stop(self, stop: str, point: Array) -> Extent:
-        """The box of a point (3,) [m], given in the world, that moves with a stop."""
+        """The box of a point (3,) [m], given in the world, on the body of a stop."""
         body = self._of_stop.get(stop)
         return Extent(point, point) if body is None else self._of_body(body, point)
 

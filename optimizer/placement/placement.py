@@ -42,11 +42,11 @@ PLACEMENT_RANGES = PlacementRanges()
 
 @dataclass(frozen=True)
 class WeightedCycle:
-    """A cycle, and how often it runs beside the others.
+    """A cycle, and its frequency among the cycles of a placement.
 
     Attributes:
         cycle: the cycle, its poses in the world.
-        weight: number of runs, per any unit of time that all cycles share.
+        weight: number of runs per unit of time; the unit is the same for all cycles.
 
     Raises:
         InvalidProblem: the weight is not positive.
@@ -63,12 +63,11 @@ class WeightedCycle:
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """A request for the place of the robot, or of groups around it, at which cycles need the least
-    energy.
+    """A request for the place of least energy for cycles, of the robot or of groups around it.
 
     Attributes:
         cycles: cycles of one robot. Poses, obstacles, directions and gravity are in the world.
-        moved: what moves, and where to.
+        moved: the movable bodies, with the regions of their places.
         base: nominal pose of the robot base in the world, shape (4, 4).
         resolution: distance between the places of the map [m]; None for a map of about
             `MapSettings.points` places.
@@ -108,12 +107,12 @@ class Placement:
                 self._check_group(k, each.moves)
 
     def field(self, k: int, name: str) -> str:
-        """Field of a request with the value `name` of the body `k` that moves."""
+        """Field of a request for the value `name` of the movable body `k`."""
         return name if len(self.moved) == 1 else f"moves.{k}.{name}"
 
     @property
     def objective(self) -> Objective:
-        """The energy that is minimised."""
+        """The minimised energy."""
         return self.cycles[0].cycle.objective
 
     @property

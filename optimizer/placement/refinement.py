@@ -1,14 +1,15 @@
 """Search for a local minimum from a place of the map: a pattern search by Hooke and Jeeves (1961).
 
 The least energy of a cycle is a smooth function of the place only as long as the configurations at
-all stops stay the same and no clearance becomes active, and it has no value where a stop is out of
-reach. A pattern search needs no derivative, and a place without cycles is only a step not taken.
+all stops stay the same and no clearance becomes active. It has no value if a stop is out of reach.
+A pattern search needs no derivatives, and rejects a step to a place without cycles.
 
-Derivatives were measured against it. The energy of fixed motions whose ends follow the place is no
-guide: all moves run at limits of acceleration or jerk, so that even signs differ. Differences over
-less than some centimetres drown in the scatter of solves of 0.2 %. A quasi-Newton method with
-differences over the steps of the pattern search came to the same energies within 0.1 %, in 48, 61
-and 68 evaluations from three places of two cells of the benchmark, for 41, 26 and 48 here.
+Methods with derivatives were measured for comparison. The derivative of the energy of fixed
+motions, with ends that follow the place, is no guide: all moves run at limits of acceleration or
+jerk, so even the signs differ. Finite differences over less than some centimetres are lost in the
+scatter of the solves, 0.2 %. A quasi-Newton method with differences over the steps of the pattern
+search reached the same energies within 0.1 %. From three places of two cells of the benchmark it
+took 48, 61 and 68 evaluations, the pattern search 41, 26 and 48.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ PATTERN = PatternSettings()
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """Ranges of coordinates, shape (n,) [m, rad], and what counts like a metre of each."""
+    """Ranges of coordinates, shape (n,) [m, rad], and the change that counts as one metre."""
 
     low: Array
     high: Array
@@ -91,10 +92,10 @@ def refined(
 def _polled(
     energy: Energy, x: Array, value: float, box: Box, step: Array
 ) -> tuple[Array, float] | None:
-    """The place after a step along every axis that gains something, and its energy [J].
+    """The place after one pass over the axes with all steps of lower energy, and its energy [J].
 
     Returns:
-        Coordinates (n,) and energy, those of x if no step gains; None if the time is up.
+        Coordinates (n,) and energy, unchanged if no step lowers it; None if the time is up.
     """
     for k in range(len(x)):
         for side in (1.0, -1.0):

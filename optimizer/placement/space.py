@@ -1,4 +1,4 @@
-"""The places of a placement: mounts or listed places, and the coordinates that are free."""
+"""The places of a placement: mounts or listed places, and free coordinates."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Axis:
 
     @property
     def scale(self) -> float:
-        """Value of the coordinate that counts like a metre."""
+        """Change of the coordinate that counts as much as one metre [m, rad]."""
         return 1 / MAP.lever if self.name == "yaw" else 1.0
 
     def values(self, resolution: float) -> Array:
@@ -68,7 +68,7 @@ class Axis:
         turn, length = 2 * np.pi, self.high - self.low
         count = ceil(length / (resolution * self.scale) - MAP.inside) + 1
         values = np.linspace(self.low, self.high, max(count, 2))
-        # the last value of a whole turn is the first one
+        # the last value of a full turn repeats the first value
         is_turn = self.name == "yaw" and abs(length - turn) < MAP.inside
         return values[:-1] if is_turn and len(values) > 2 else values
 
@@ -78,10 +78,10 @@ Key = tuple[tuple[int, ...], bytes]
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place of everything that moves.
+    """A place of all movable bodies.
 
     Attributes:
-        choice: number of the mount or of the listed place, of every body.
+        choice: index of the mount or of the listed place of every body.
         x: values of the free coordinates, shape (n,) [m, rad].
         poses: pose of the base in the world, or offset of a group, shape (4, 4), of every body.
     """
@@ -92,20 +92,20 @@ class Place:
 
     @property
     def key(self) -> Key:
-        """What places have in common that are the same but for rounding."""
+        """Key of the place; places that differ only by rounding have the same key."""
         return self.choice, (np.round(self.x, 9) + 0.0).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body that moves: its discrete choices, and the nominal values of its coordinates.
+    """A movable body: its discrete choices, and the nominal values of its coordinates.
 
     Attributes:
         tilts: rotations (3, 3) at yaw 0; None for listed places.
         places: listed poses (4, 4); None for ranges.
         nominal: nominal coordinates x, y, z [m] and yaw [rad], shape (4,).
-        pivot: point about which a group turns, shape (3,) [m]; zero for the base.
-        mounts: names of the tilts; None where the nominal one has no name.
+        pivot: centre of rotation of a group, shape (3,) [m]; zero for the base.
+        mounts: names of the tilts; None for a nominal tilt without a name.
     """
 
     tilts: tuple[Array, ...] | None
@@ -116,7 +116,7 @@ class Body:
 
     @property
     def choices(self) -> int:
-        """Number of the discrete choices; the first is the nominal one."""
+        """Number of discrete choices; the first choice is the nominal one."""
         return len(self.places if self.places is not None else self.tilts or ())
 
     def pose(self, choice: int, values: Array) -> Array:
@@ -190,7 +190,7 @@ class Space:
         return Place(choice, np.array(x, dtype=float), tuple(poses))
 
     def mount(self, place: Place) -> Mount | None:
-        """The mount of the base at a place; None where it has none."""
+        """The mount of the base at a place; None without a mount."""
         for moved, body, choice in zip(
             self.placement.moved, self.bodies, place.choice, strict=True
         ):
@@ -211,9 +211,9 @@ class Space:
         return [cycle_at(each.cycle, base, *offsets) for each in self.placement.cycles]
 
     def stops(self, place: Place) -> list[dict[str, Array]]:
-        """Pose (4, 4) of the body that each stop moves with, in the frame of the base.
+        """Poses (4, 4) of the bodies of the stops in the frame of the base.
 
-        There is one mapping per cycle, by the names of its stops and of its start.
+        The list has one mapping per cycle, by the names of its stops and of its start.
         """
         T_base_world, (offsets, _) = inverted(self.base(place)), self._offsets(place)
         names = [
@@ -311,7 +311,7 @@ def _axes(placement: Placement, k: int, region: Region, body: Body) -> Iterator[
             continue
         low, high = given
         if name == "yaw":
-            # the equivalent yaw that is nearest to the middle of the range
+            # the equivalent yaw nearest to the middle of the range
             turn = 2 * np.pi
             nominal += turn * np.round(((low + high) / 2 - nominal) / turn)
         if not low - MAP.inside <= nominal <= high + MAP.inside:
@@ -327,7 +327,7 @@ def _axes(placement: Placement, k: int, region: Region, body: Body) -> Iterator[
 
 
 def _pivot(placement: Placement, group: Group) -> Array:
-    """Mean position (3,) [m] of a group's stops; of its obstacles where it has no stops."""
+    """Mean position (3,) [m] of a group's stops; without stops, of its obstacles."""
     cycles = [each.cycle for each in placement.cycles]
     targets = [(START, cycle.start) for cycle in cycles]
     targets += [(stop.name, stop.target) for cycle in cycles for stop in cycle.stops]

@@ -1,4 +1,4 @@
-"""Optional packages: the computation runs without them, and their users import them late."""
+"""Late imports of optional packages; computations need none of these packages."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def data_frame(columns: dict[str, Any]) -> Any:
     """Build a data frame of pandas, or of polars if pandas is not installed.
 
     Args:
-        columns: values of each column by its name.
+        columns: values of the columns by column name.
 
     Returns:
         A `pandas.DataFrame` or a `polars.DataFrame`.

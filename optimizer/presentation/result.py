@@ -1,4 +1,4 @@
-"""What every result of the library can do in a notebook or a script."""
+"""Representations of the library's results in notebooks and scripts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Rows = Sequence[Sequence[str]]
 class Result(Comparable, Saved):
     """Base of the library's results.
 
-    A result describes itself by the methods with an underscore; the others are made of them.
+    Subclasses implement the methods with an underscore; the public methods use them.
     """
 
     def _headline(self) -> str:
@@ -34,7 +34,7 @@ class Result(Comparable, Saved):
         raise NotImplementedError
 
     def _shown(self) -> Any:
-        """Declared values, or a dictionary of such."""
+        """Declared values, or a dictionary of declared values."""
         raise NotImplementedError
 
     def _columns(self) -> dict[str, Any]:
@@ -42,7 +42,7 @@ class Result(Comparable, Saved):
         raise NotImplementedError
 
     def _charts(self) -> Sequence[Chart]:
-        """Curves; the first are the most important ones. None for results without curves."""
+        """Charts, the most important charts first; empty for a result without curves."""
         return ()
 
     def __repr__(self) -> str:
@@ -59,14 +59,13 @@ class Result(Comparable, Saved):
         """The result as plain values, with the names and units of the service's JSON.
 
         Returns:
-            Dictionaries, lists, texts and numbers, for `json.dumps`. A number that is not finite is
-            None.
+            Dictionaries, lists, texts and numbers, for `json.dumps`; None for non-finite numbers.
         """
         found: dict[str, Any] = plain(self._shown())
         return found
 
     def to_frame(self) -> Any:
-        """The result as a table of pandas, or of polars where pandas is not installed.
+        """The result as a table of pandas, or of polars if pandas is not installed.
 
         Returns:
             A `DataFrame`; its columns have the names and units of the service's JSON, with the
@@ -109,7 +108,7 @@ def per_joint(name: str, values: Any) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """A value as dictionaries, lists, texts and numbers; None for a number that is not finite.
+    """A value as dictionaries, lists, texts and numbers; None for a non-finite number.
 
     Args:
         value: a value of a declared class, an array, or a collection of these. Internal fields are

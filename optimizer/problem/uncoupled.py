@@ -11,7 +11,7 @@ def check_uncoupled(robot: Robot, field: str, what: str) -> None:
 
     Args:
         robot: the robot of the arm.
-        field: field of the problem that names the robot.
+        field: field named in the error.
         what: the unsupported request, as the beginning of the message.
 
     Raises:

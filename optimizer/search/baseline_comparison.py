@@ -1,4 +1,4 @@
-"""Comparison of the best motion with the baselines, which may lead to better motions."""
+"""Comparison of the best motion with the baselines; a cheaper baseline improves the motion."""
 
 from __future__ import annotations
 
@@ -43,8 +43,9 @@ def compare_with_baselines(state: SearchState, best: Candidate) -> list[Baseline
     """The baselines of the best motion, after cheaper baselines were used as initial guesses.
 
     Only feasible baselines among the method's `guess_baselines` are initial guesses, first coarse,
-    then fine. A baseline of the method's own kind (`accepted_baselines`) that still needs less
-    energy becomes the answer itself. Other parametrisations may stay below the answer.
+    then fine. If a baseline of the method's own kind (`accepted_baselines`) still needs less
+    energy, it becomes the answer. Baselines of other parametrisations may need less energy than
+    the answer.
     """
     if state.problem.tool_path is not None or state.problem.passes:
         return baselines_of(state, best)
@@ -67,14 +68,14 @@ def compare_with_baselines(state: SearchState, best: Candidate) -> list[Baseline
         accept_baseline(state, candidate, better)
         best = state.best() or best
         table, candidate = _table(state, best)
-    # baselines that still need less are not confirmed
+    # a baseline of less energy is not confirmed by its certificate
     return [replace(each, reason=NOT_CONFIRMED) if each.name in better else each for each in table]
 
 
 def _better(
     state: SearchState, table: list[Baseline], names: Sequence[BaselineName]
 ) -> list[BaselineName]:
-    """Feasible baselines of given names that need less than the compared motion."""
+    """Feasible baselines of given names with less energy than the compared motion."""
     return [
         each.name
         for each in table
@@ -152,9 +153,9 @@ def _accept_certified(state: SearchState, candidate: Candidate, better: list[Bas
 
 
 def stopping_baselines(prepared: PreparedProblem, spline: Spline, ours: float) -> list[Baseline]:
-    """Baselines that rest at each pass, every part in the time that our motion takes for it.
+    """Baselines with a rest at every pass, and with the times of our motion between the passes.
 
-    A baseline without some part is left out.
+    A baseline is left out if one of its parts is missing.
 
     Args:
         prepared: the problem.
@@ -249,7 +250,7 @@ def path_baselines(state: SearchState, best: Candidate) -> list[Baseline]:
 
     even = [motion(ramped.fraction(t, ramp)) for ramp in settings.ramps]
     motions: dict[BaselineName, SampledMotion] = {
-        # rounded, so that among equal durations the first has the shortest ramps
+        # rounding makes durations equal, and `min` then takes the first, with the shortest ramps
         "even_speed": min(even, key=lambda each: round(each.duration, 9)),
         "quintic": motion(quintic.fraction(t)),
     }

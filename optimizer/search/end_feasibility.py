@@ -63,12 +63,12 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
 def raise_if_none_is_left(
     name: str, branches: Sequence[tuple[str, int, Array]], ruled: Sequence[InvalidReason | None]
 ) -> None:
-    """Raise the error for an end whose configurations are all infeasible.
+    """Raise an error if all configurations of an end are infeasible.
 
     Args:
         name: `start`, `goal`, or the name of a stop.
-        branches: label, target and q of each configuration.
-        ruled: reason of each configuration, None for a feasible one.
+        branches: label, target and q of the configurations.
+        ruled: reasons of the infeasible configurations, None for feasible configurations.
 
     Raises:
         InvalidProblem: the tool is outside of its cone in all configurations.
@@ -98,7 +98,7 @@ def raise_if_none_is_left(
 
 
 def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
-    """The joint that cannot hold the load in each configuration q (n, nq) [rad], if any."""
+    """Overloaded joints by configuration q (n, nq) [rad]; None if all joints hold the load."""
     tau_max, joints = (
         prepared.problem.arm.active_limits.tau_max,
         prepared.problem.arm.robot.joint_names,

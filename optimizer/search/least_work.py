@@ -1,13 +1,14 @@
-"""Least mechanical work at a fixed duration: coarse motions decide which candidates are solved.
+"""Least mechanical work at a fixed duration: coarse motions select the candidates to be solved.
 
-The bound on mechanical work rules out little, and a motion has many local optima. Coarse motions
-take a fifth of the time of solves (`ManyMotions`): first of tens of candidates, then of the best
-candidates on more control points and from random guesses. They may collide, and exceed a limit by a
-little. So the coarse motion of least work without collision is solved, with sharp corners. Then
-every candidate is solved whose coarse motion promises less than the best motion found.
+The bound on mechanical work rules out few candidates, and the work has many local minima. A coarse
+motion takes a fifth of the time of a solve (`ManyMotions`). The search computes coarse motions of
+tens of candidates, then of the best candidates with more control points and from random guesses.
+Coarse motions may collide, and may slightly exceed limits. The search therefore solves the
+collision-free coarse motion of least work, with sharp corners. It then solves every candidate with
+a coarse motion of less work than the best motion found.
 
-If no motion is found here, all candidates are solved as for other objectives, by `outer_turns` and
-`sharpening`.
+If this search finds no motion, all candidates are solved as for other objectives, by `outer_turns`
+and `sharpening`.
 """
 
 from __future__ import annotations
@@ -44,13 +45,13 @@ from joulepath.optimizer.solve.methods.spline_spaces import SPLINE_SPACES
 def explore_least_work(state: SearchState, explore: Callable[[], object]) -> bool:
     """Find motions of least work through coarse motions; `explore` then solves the open candidates.
 
-    It does nothing for another objective, a free duration, constraints along the path, a tight
-    bound (for which every candidate is solved), or little time, since the first motion comes late;
-    nor does it a second time.
+    The search runs at most once per request. It does nothing for another objective, a free
+    duration, constraints along the path, a tight bound (every candidate is then solved), or little
+    time, because the first motion comes late.
 
     Args:
         state: state of the search.
-        explore: solves all candidates that are open.
+        explore: solves all open candidates.
 
     Returns:
         Whether a motion was found.
@@ -94,12 +95,12 @@ class _LeastWorkSearch:
     coarse: dict[Candidate, CoarseMotion] = field(default_factory=dict)
     """Coarse motion of least work of each candidate."""
     tried: set[Candidate] = field(default_factory=set)
-    """Candidates that were solved."""
+    """Solved candidates."""
     behind: set[Candidate] = field(default_factory=set)
-    """Candidates given up because they come to need more than another candidate."""
+    """Candidates given up because another candidate needs less work."""
 
     def run(self) -> None:
-        """Find coarse motions, solve the best, then those that promise less."""
+        """Find coarse motions, solve the best one, then all candidates with less expected work."""
         self._screen()
         if not self.coarse:
             return
@@ -137,12 +138,12 @@ class _LeastWorkSearch:
         )
 
     def _solve_in_middle_space(self, guesses: Sequence[CoarseMotion]) -> list[CoarseMotion]:
-        """Coarse motions from guesses on more control points, which candidates keep."""
+        """Coarse motions from guesses, with more control points, stored for their candidates."""
         count, progress = SHARPENING.middle_points, LEAST_WORK.middle_progress
         return self._keep(self._solve(guesses, count, progress))
 
     def _screen(self) -> None:
-        """Find coarse motions of one member of each family, then of the best families' others."""
+        """Find coarse motions of one member per family, then of more members of the best ones."""
         firsts = sorted((family[0] for family in self.families), key=lambda each: each.lower_bound)
         for k in range(0, len(firsts), LEAST_WORK.batch):
             self._find(firsts[k : k + LEAST_WORK.batch])
@@ -153,13 +154,13 @@ class _LeastWorkSearch:
         self._find([each for family in best for each in family[1 : FAMILIES.members]])
 
     def _find(self, candidates: Sequence[Candidate]) -> None:
-        """Find coarse motions of the candidates whose bounds do not rule them out."""
+        """Find coarse motions of all candidates with a lower bound below the least coarse work."""
         least = min((each.work for each in self.coarse.values()), default=np.inf)
         guesses = self.solver.first([each for each in candidates if each.lower_bound < least])
         self._keep(self._solve(guesses, COARSE.control_points, LEAST_WORK.coarse_progress))
 
     def _keep(self, found: list[CoarseMotion]) -> list[CoarseMotion]:
-        """Keep the motion of least work of each candidate; returns the argument."""
+        """Store the motion of least work per candidate; returns the argument."""
         for each in best_of_each(found):
             if each.work < self._work_of(each.candidate):
                 self.coarse[each.candidate] = each
@@ -202,7 +203,7 @@ class _LeastWorkSearch:
                 continue
             count += 1
             if self._sharpen(each):
-                # without sharp corners, another motion may still get them
+                # another motion may still get sharp corners
                 least = min(least, each.work)
         self.behind -= self.tried
 
@@ -227,7 +228,7 @@ class _LeastWorkSearch:
         return True
 
     def _solve_promising(self) -> None:
-        """Solve candidates whose coarse motions promise less than the best energy."""
+        """Solve all candidates with a coarse motion of less expected work than the best energy."""
         for motion in self._by_work():
             candidate, least = motion.candidate, self._least_energy
             if self._is_settled(candidate) or LEAST_WORK.promise * motion.work >= least:
@@ -263,17 +264,17 @@ class _LeastWorkSearch:
         progress: float,
         below: float = np.inf,
     ) -> SolveResult:
-        """A candidate's solve, which it keeps.
+        """Solve a candidate from control points, and store the result with the candidate.
 
-        If it fails and no motion is known, or if time is so short that knots must be at the
-        switches of jerk, the candidate is solved from nothing.
+        Unless the control points are dense, the candidate is solved without a guess if this solve
+        fails, or if the duration is so short that the knots must be at the switches of jerk.
 
         Args:
             motion: coarse motion of the candidate.
             points: control points to start from, shape (n, nq) [rad].
             width: width of the smoothed corners [W].
-            progress: relative decrease of the cost promised by a further step at least.
-            below: cost that the motion must come below [J].
+            progress: smallest predicted relative decrease of the cost for a further step.
+            below: cost that the motion must stay below [J].
         """
         state, candidate = self.state, motion.candidate
         is_dense = len(points) == SHARPENING.dense_points
@@ -306,7 +307,7 @@ class _LeastWorkSearch:
         return in_time(self.state, partial(attempt, space, points, duration, progress))
 
     def not_promising(self) -> list[Candidate]:
-        """The open candidates whose coarse motions do not promise less than the best energy."""
+        """Open candidates without a coarse motion of less expected work than the best energy."""
         least = self._least_energy
         return [
             each.candidate

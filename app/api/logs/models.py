@@ -1,4 +1,4 @@
-"""What the routes under `/logs` answer."""
+"""Queries and answers of the routes under `/logs`."""
 
 from __future__ import annotations
 
@@ -18,46 +18,46 @@ class LogChannel(Response):
         "`q1`, `v1`, `a1`, `effort1`, `temperature1`, `wrench1`, … or `power`.", None, "effort2"
     )
     column: str | None = described(
-        "Its column in the file; null if it was made from another.", None, "i2"
+        "Its column in the file; null if it was computed from another channel.", None, "i2"
     )
     unit: str = described("Its unit.", None, "A")
     min: float = described("Least value, in this unit.", "SI", -3.2)
     max: float = described("Greatest value.", "SI", 6.5)
     noise: float = described(
-        "Robust standard deviation of what is above the filter's band.", "SI", 0.03
+        "Robust standard deviation of the signal above the band of the filter.", "SI", 0.03
     )
 
 
 class LogEffort(Response):
-    """What the efforts of a log are."""
+    """Meaning of the efforts of a log, and the evidence for it."""
 
-    meaning: EffortMeaning = described("What they are taken for.", None, "current")
+    meaning: EffortMeaning = described("Assumed meaning of the efforts.", None, "current")
     confidence: float = described(
-        "1 if the slopes are exactly those of this meaning, 0 if they could be another's or do not "
-        "tell.",
+        "1 if the slopes match this meaning exactly; 0 if they match another meaning as well, or "
+        "if the motion does not determine them.",
         "1",
         0.9,
     )
     slope: dict[str, float | None] = described(
-        "Slope of the effort against the torque of the rigid model, with friction beside it, at "
-        "the two joints next to the base that carry most. About 1 / torque constant: current; 1: "
-        "torque; 0: without gravity. Null: the motion does not tell.",
+        "Slope of the effort over the torque of the rigid model, from a fit with friction, at the "
+        "two joints next to the base with the largest load. About 1 / torque constant: current; "
+        "1: torque; 0: torque without gravity. Null: the motion does not determine the slope.",
         "1/A or 1",
         {"shoulder_lift_joint": 0.1, "elbow_joint": 0.1},
     )
     torque_side: Literal["motor", "link"] = described(
-        "Where they were measured: at the `motor`, with rotor and friction; or at the `link`, "
-        "behind the gear, without them. Currents are always of the motor.",
+        "Place of the measurement: the `motor`, with rotor inertia and friction; or the `link`, "
+        "behind the gear, without rotor inertia and friction. Currents are always of the motor.",
         None,
         "motor",
     )
 
 
 class LogMove(Response):
-    """A part of a log."""
+    """A move or a rest in a log."""
 
-    start: float = described("Time at which it starts, from the start of the log.", "s", 0.5)
-    end: float = described("Time at which it ends.", "s", 2.1)
+    start: float = described("Start time, from the start of the log.", "s", 0.5)
+    end: float = described("End time, from the start of the log.", "s", 2.1)
     at_rest: bool = described("Whether every joint rests.", None, False)
 
 
@@ -68,44 +68,44 @@ class LogSummary(Response):
     name: str | None = described("Its name; null without one.", None, "Palletiser, morning")
     robot: str = described("Name of the robot.", None, "ur5e")
     tags: list[str] = described("Its tags.", None, ["cold"])
-    created: datetime = described("Time at which it was added, in UTC.", None, CREATED)
+    created: datetime = described("Time of the upload, in UTC.", None, CREATED)
     owner: str | None = described(
-        "Name of the API key that added it; null without one.", None, "press_shop"
+        "Name of the API key of the upload; null without a key.", None, "press_shop"
     )
     size: int = described("Its size in the database, compressed.", "byte", 1_200_000)
-    rows: int = described("Rows that were read.", "1", 15_000)
+    rows: int = described("Number of rows read.", "1", 15_000)
     duration: float = described("Time from the first row to the last.", "s", 30.0)
 
 
 class LogDetail(LogSummary):
-    """A stored log, and what was seen in it. The samples themselves are not returned."""
+    """A stored log, with a report on its content. The samples themselves are not returned."""
 
     dropped: int = described(
-        "Lines that were dropped, because they have too few or too many cells.", "1", 0
+        "Number of lines dropped because of too few or too many cells.", "1", 0
     )
     rate: float = described(
-        "Rows per second of the uniform grid on which the log is used.", "Hz", 500.0
+        "Rows per second of the uniform grid to which the log is resampled.", "Hz", 500.0
     )
     jitter: list[float] = described(
         "5th and 95th percentile of the deviation of a time step from 1 / rate.", "s", [-1e-4, 1e-4]
     )
-    payload: float = described("Mass that the arm is taken to have carried.", "kg", 2.0)
+    payload: float = described("Assumed mass of the carried payload.", "kg", 2.0)
     channels: list[LogChannel] = part("All channels.")
-    effort: LogEffort | None = part("What the efforts are; null if none were logged.")
+    effort: LogEffort | None = part("Meaning of the efforts; null without logged efforts.")
     moves: list[LogMove] = part(
         "Moves and rests, in order. A move of more than 8 s is divided into blocks of about 5 s, "
         "with 0.5 s between them left out."
     )
     warnings: list[str] = described(
-        "What is odd: gaps, constant or saturated channels, velocities that do not fit, an unknown "
-        "payload, …",
+        "Doubtful properties: gaps, constant or saturated channels, velocities that contradict the "
+        "positions, an unknown payload, …",
         None,
         ["No payload is given or logged: the arm is taken to have carried nothing."],
     )
 
 
 class LogPage(Query):
-    """The part of the list of logs that is returned."""
+    """Filter and page of the list of logs."""
 
     search: Name | None = search_in("the name or the robot")
     limit: int = limit_of("logs")

@@ -1,4 +1,4 @@
-"""What `POST /pareto` takes and answers, and its work in a worker."""
+"""Request and answer of `POST /pareto`, and its task in a worker."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from joulepath.optimizer.result.solution import Solution
 
 
 class ParetoRequest(OptimizeRequest):
-    """A motion whose Pareto front of duration and energy is requested."""
+    """A request for the Pareto front of duration and energy of a motion."""
 
     points: int = described(
         "Largest number of durations to solve.",
@@ -88,7 +88,7 @@ class ParetoPoint:
 
     @classmethod
     def of(cls, motion: Solution, objective: Objective, answer: str) -> Self:
-        """The point of a motion, whose complete answer is kept under the path `answer`."""
+        """The point of a motion with its complete answer stored under the path `answer`."""
         energy = motion.energy
         return cls(
             duration=motion.duration,

@@ -74,17 +74,17 @@ def _region(region: asked.Region | asked.Places) -> Region | Places:
 
 
 def _check_frames(request: CycleRequest, field: str) -> None:
-    """Raises InvalidProblem for a pose, a direction or a scene that is not in the world."""
+    """Raises InvalidProblem for a pose, a direction or a scene in another frame than the world."""
     for path in _at_base_link(request.model_dump(exclude_unset=True)):
         raise InvalidProblem(
             f"{field}.{path}",
-            "Poses of a placement are in the world, whichever base moves in it: leave `frame` out, "
-            "and give them in the frame in which `base` is given.",
+            "Poses of a placement are in the world frame, in which `base` is given, because the "
+            "base may move: leave `frame` out, and give the poses in the world frame.",
         )
 
 
 def _at_base_link(content: Any, path: str = "") -> Iterator[str]:
-    """Paths of all fields `frame` that are `base_link`."""
+    """Paths of all fields `frame` with the value `base_link`."""
     if isinstance(content, dict):
         if content.get("frame") == "base_link":
             yield f"{path}frame"
@@ -96,7 +96,7 @@ def _at_base_link(content: Any, path: str = "") -> Iterator[str]:
 
 
 def request_at(request: CycleRequest, cycle: Cycle) -> CycleRequest:
-    """A request for a cycle of the library, whose poses are in the frame of the base.
+    """The request for a cycle at a place, with its poses in the frame of the base.
 
     Args:
         request: the request in the world.

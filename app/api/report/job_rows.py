@@ -31,7 +31,7 @@ def answered(rows: Sequence[Json]) -> list[Json]:
 
 
 def summed(rows: Sequence[Json]) -> Json:
-    """Energy and duration of all answered rows together, each times its `weight` if it has one.
+    """Sum of energy and duration over all answered rows, times the `weight` of a row if given.
 
     The ends of the interval are the sums of the ends. They are exact if all energies are too large
     or too small together, and otherwise too wide.
@@ -78,9 +78,12 @@ def _is_number(value: Any) -> bool:
 
 
 def rivals_of(rows: Sequence[Json]) -> dict[str, tuple[int, float, float]]:
-    """Of every baseline within every limit in some rows: their number, and the energies [J] of the
-    baseline and of the answers in them. `nearest` is the one of each row against which least is
-    saved.
+    """Sums over the rows with a feasible baseline, by the name of the baseline.
+
+    The name `nearest` stands for the baseline of a row with the least saving.
+
+    Returns:
+        Number of rows, energy of the baseline [J], and energy of the answers [J], by the name.
     """
     found = dict[str, tuple[int, float, float]]()
     for row in answered(rows):

@@ -25,9 +25,7 @@ MEDIA_TYPE = "model/gltf-binary"
 
 @cache
 def digest(robot: str) -> str | None:
-    """Hash of everything that the picture of a robot depends on; None if its meshes are not
-    installed.
-    """
+    """Hash of all sources of the picture of a robot; None if its meshes are not installed."""
     sources = picture_sources(robot)
     if sources is None:
         return None
@@ -55,14 +53,15 @@ def kept(robot: str) -> bytes | None:
 
 @dataclass(frozen=True)
 class PictureTask:
-    """The name of a robot whose meshes are installed, and the request's id."""
+    """The name of a robot with installed meshes, and the id of the request."""
 
     robot: str
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The GLB file, made once however many processes ask. `deadline` is not watched: it takes
-        about a second.
+        """The GLB file, within about a second regardless of `deadline`.
+
+        A lock prevents several processes from making the same file.
         """
         path = _path(self.robot)
         try:
@@ -77,7 +76,7 @@ class PictureTask:
 
 
 def _written(path: Path, content: bytes) -> bytes:
-    """Puts the whole file in its place at once: who reads it never sees a part."""
+    """Writes a file and renames it into place, so readers never see an incomplete file."""
     with work_folder(path) as folder:
         part = folder / path.name
         part.write_bytes(content)

@@ -1,4 +1,4 @@
-"""Routes with large JSON bodies, which workers read."""
+"""Routes with large JSON bodies, parsed by workers."""
 
 from __future__ import annotations
 
@@ -27,9 +27,7 @@ _NAME = "body"
 
 
 class LargeBodyRoute(JsonRoute):
-    """A route with one JSON body, which receives a `HeldBody` instead of its model if the body is
-    large.
-    """
+    """A route with one JSON body; it receives a large body as a `HeldBody` instead of its model."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any) -> None:
         signature = inspect.signature(endpoint, eval_str=True)

@@ -75,7 +75,7 @@ async def create(
     client: ServiceClient,
     key: Key = None,
 ) -> StudySummary:
-    """Begins a study: a motion that is improved step by step until its energy is at most
+    """Begins a study: the step-by-step improvement of a motion until its energy is at most
     `threshold`.
     """
     robot = await robot_in(store, body.robot)
@@ -97,7 +97,7 @@ async def create(
     responses=problem_responses(InvalidRequest, StoreUnavailable),
 )
 async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore) -> StudyList:
-    """All studies with their state, newest first, page by page, or those that are searched for."""
+    """Studies with their state, newest first, page by page, with an optional search."""
     read = partial(studies.page, limit=page.limit, after=page.after, search=page.search)
     found, following = await store.read(read)
     return StudyList(studies=[StudySummary(**summary(state)) for state in found], next=following)

@@ -68,11 +68,11 @@ def _changes_something(arm: ArmRequest) -> ArmRequest:
 
 
 class Change(Request):
-    """A changed arm: fields of the arm that replace those of the base."""
+    """A changed arm: its fields replace fields of the base."""
 
     name: Name = described("Name of the change.", None, "links of half the mass")
     arm: Annotated[ArmRequest, AfterValidator(_changes_something)] = described(
-        "Fields of the arm. Each replaces the whole field of the base. A field that is left out "
+        "Fields of the arm. A given field replaces the whole field of the base. An omitted field "
         "keeps the value of the base.",
         None,
         {"link_mass_scale": 0.5},
@@ -195,7 +195,7 @@ class _Optimized(_Work):
         share = min(asked.deadline, self.shares.next())
         with inside("optimize"):
             first = to_problem(asked, share)
-        # all of them before the first run, so that an invalid change is rejected at once
+        # all problems are built before the first run, so an invalid change is rejected at once
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
         with inside("optimize"):
             best = certified(optimize(first, progress=False))
@@ -318,12 +318,12 @@ class _Evaluated(_Work):
 
 
 def _inside_change(k: int, change: Change) -> AbstractContextManager[None]:
-    """A context whose InvalidProblem names the field of change `k`."""
+    """A context that adds the field of change `k` to an InvalidProblem."""
     return inside(f"changes.{k}.arm", change.arm.model_fields_set)
 
 
 def _changed(asked: R, change: Change) -> R:
-    """The base's request with the fields that the change sets."""
+    """The request of the base with the fields of the change."""
     arm = change.arm
     return asked.model_copy(update={name: getattr(arm, name) for name in arm.model_fields_set})
 

@@ -27,7 +27,7 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 @dataclass(frozen=True, eq=False)
 class LinkSensor:
-    """What torque sensors behind the gears see beside the bodies, per joint (nq,)."""
+    """Readings of torque sensors behind the gears beyond the rigid bodies, per joint (nq,)."""
 
     sensor_coulomb: Array
     """Coulomb friction behind the sensors [N·m]."""
@@ -38,7 +38,7 @@ class LinkSensor:
     offset: Array
     """Reading of the sensors without a torque [N·m]."""
     reversal: int
-    """Number of the distance, of those of the rows, over which the Coulomb friction reverses."""
+    """Index of the reversal distance of the Coulomb friction among the distances of the rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class FittedArm:
     """Figures of an arm, per joint (nq,) unless stated otherwise.
 
     The friction law has the terms `coulomb`, `curved`, `offset` [N·m], `viscous` [N·m·s/rad],
-    `load` [1], with the `speed` [rad/s] at which the curved term bends.
+    `load` [1]. The curved term bends at the `speed` [rad/s].
     """
 
     coulomb: Array
@@ -98,7 +98,7 @@ class FittedArm:
         return parts.rigid + parts.rotor + parts.other + friction_torque(parts)
 
     def measured_torque(self, rows: Rows) -> Array:
-        """Torque (n, nq) [N·m] that is measured: of the motors, or behind the gears."""
+        """Measured torque (n, nq) [N·m], of the motors or behind the gears."""
         if not rows.link_side:
             return self.torque(rows)
         rigid, sensor = self.rigid_torque(rows), self.sensor
@@ -109,7 +109,7 @@ class FittedArm:
         return np.asarray((1 + sensor.sensor_gain) * rigid + friction + sensor.offset)
 
     def torque_parts(self, rows: Rows) -> TorqueParts:
-        """Torque parts from which the power follows."""
+        """Torque parts for the computation of the power."""
         v, a = rows.v, rows.a
         smooth_sign = v / np.hypot(v, self.knee)
         other = np.tile(self.offset, (len(v), 1))
@@ -175,12 +175,12 @@ def with_torques(
 ) -> FittedArm:
     """The arm with some figures replaced.
 
-    A joint whose friction is fitted loses the terms of its own law that are not among the figures.
+    A joint with a fitted friction law loses all terms of its own law without a new figure.
 
     Args:
         arm: the arm.
-        reasons: names of the figures, each with the reason for keeping the robot's own value, or
-            an empty one.
+        reasons: names of the figures, with the reason for keeping the robot's own value, or an
+            empty text.
         value: values (p,) of the figures.
         couplings: motors shared by several joints.
     """

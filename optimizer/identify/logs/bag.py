@@ -87,12 +87,12 @@ def _lines(file: BinaryIO, kind: str, max_bytes: int) -> Generator[bytes]:
 
 
 def _kinds(state: Any) -> tuple[str, ...]:
-    """Kinds of values that a state has of every joint."""
+    """Kinds of values with one value per joint in a state."""
     return tuple(each for each in _KINDS if len(getattr(state, each)) == len(state.name) > 0)
 
 
 def _states(path: Path) -> Iterator[tuple[int, Any]]:
-    """Times of writing [ns] and JointState messages of the topic that has most of them."""
+    """Times of writing [ns] and JointState messages of the topic with the most messages."""
     # imported late: most logs are no bags
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
@@ -105,7 +105,7 @@ def _states(path: Path) -> Iterator[tuple[int, Any]]:
                 most = max(topics, key=lambda each: each.msgcount)
                 for _, written, raw in bag.messages([most]):
                     yield written, types.deserialize_cdr(raw, JOINT_STATE)
-    # the library has no base class of what it raises for broken files
+    # the library has no base class for its errors about broken files
     except Exception as error:
         raise InvalidTable(
             f"The bag cannot be read ({type(error).__name__}: {error}): record it anew, or export "
@@ -115,7 +115,7 @@ def _states(path: Path) -> Iterator[tuple[int, Any]]:
 
 @contextmanager
 def _on_disk(file: BinaryIO, kind: str, max_bytes: int) -> Iterator[Path]:
-    """The bag as a file of its own, which its reader needs."""
+    """The bag as a file on disk, because its reader needs a path."""
     with NamedTemporaryFile(suffix=kind) as copy:
         size = 0
         while part := file.read(BAG.copied_bytes):

@@ -1,4 +1,4 @@
-"""Columns by the names of the joints, which ROS drivers publish in an order of their own."""
+"""Columns of logs by joint names: ROS drivers publish the joints in any order."""
 
 from __future__ import annotations
 
@@ -23,8 +23,7 @@ _DELIMITER = "[^a-z0-9]+"
 
 
 def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None:
-    """Columns of a header with the names of the robot's joints, or with other names that are
-    numbered from base to flange.
+    """Columns of a header with the robot's joint names, or with numbers from base to flange.
 
     Examples are `/joint_states/elbow_joint/position` and `elbow_joint_velocity`; `lbr_A1/position`.
 
@@ -33,7 +32,7 @@ def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None
         joints: names of the joints.
 
     Returns:
-        The columns; None if the header does not have the names.
+        The columns; None if the header has neither.
 
     Raises:
         InvalidTable: a joint is missing or occurs twice.
@@ -48,7 +47,7 @@ def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None
     }
     time = time_of(names)
     if not found and len(names) == len(joints) + len(time):
-        # a table of positions alone, whose columns are named after the joints
+        # a table of positions only, with the joint names as column names
         found = {"q": _of_word(names, "", joints, False)}
     if not found.get("q") or not time:
         return None
@@ -79,7 +78,7 @@ def _of_word(
 
 
 def _numbered(names: Sequence[str], word: str, count: int) -> tuple[int, ...]:
-    """Columns of joints whose names differ by a number from 0 or 1, if there is one such list."""
+    """Columns with names that count from 0 or 1, if the header has exactly one such list."""
     lists: dict[tuple[str, str], dict[int, int]] = {}
     for k, name in enumerate(names):
         match = re.fullmatch(rf"(.*?[a-z_])([0-9]{{1,2}})(_joint|){_DELIMITER}(?:{word})", name)
@@ -122,8 +121,8 @@ def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[
 
 
 def _with_prefix(logged: Sequence[str], joints: Sequence[str]) -> list[str] | None:
-    """The names of the joints as they are logged, with the prefix that a driver gives to all of
-    them; None for other names.
+    """The joint names in a log, with the prefix of the driver for all joints; None for other
+    names.
     """
     ends = [joint for joint in joints if logged and logged[0].endswith(joint)]
     for prefix in ["", *(logged[0].removesuffix(joint) for joint in ends)]:

@@ -1,8 +1,8 @@
-"""The convention in which a six-joint arm is drawn: senses, zero positions and frames.
+"""Conventions of a six-joint arm: senses of rotation, zero positions and frames.
 
-One arm can be described with any sense and zero position of each joint, and with any frames at base
-and flange. A closed form is written for one convention, and `Drawing` converts
-the poses and joint positions of a file to it and back.
+An arm can be described with any sense of rotation and zero position of its joints, and with any
+frames at base and flange. A closed form of the inverse kinematics holds for one convention.
+`Drawing` converts poses and joint positions between this convention and the convention of a file.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from joulepath.optimizer.kinematics.six.stretched_wrist import StretchedWrist
 from joulepath.optimizer.problem.branches import Label
 
 ROUNDING = 1e-14
-"""Difference of a pose from the identity that is due to rounding [m, 1]."""
+"""Largest difference of a pose from the identity by rounding [m, 1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Convention of a file, relative to that of a closed form.
+    """Convention of a file, relative to the convention of a closed form.
 
     The joint positions of the closed form are senses * q + zeros, `senses` (6,) being 1 or -1 and
     `zeros` (6,) in [rad]. Its flange pose is T_form_base @ T_base_flange @ T_flange_form.
@@ -36,15 +36,15 @@ class Drawing:
     T_flange_form: Array
 
     def pose(self, T: Array) -> Array:
-        """Flange poses (..., 4, 4) of the closed form for those of the file."""
+        """Flange poses (..., 4, 4) of the closed form from flange poses of the file."""
         return np.asarray(self.T_form_base @ T @ self.T_flange_form)
 
     def form(self, q: Array) -> Array:
-        """Joint positions (..., 6) [rad] of the closed form for those of the file."""
+        """Joint positions (..., 6) [rad] of the closed form from joint positions of the file."""
         return np.asarray(self.senses * q + self.zeros)
 
     def file(self, q: Array) -> Array:
-        """Joint positions (..., 6) [rad] of the file for those of the closed form."""
+        """Joint positions (..., 6) [rad] of the file from joint positions of the closed form."""
         return np.asarray(self.senses * (q - self.zeros))
 
     def file_within_turn(self, q: Array) -> Array:
@@ -59,7 +59,7 @@ def without_rounding(T: NDArray[np.floating[Any]]) -> Array:
 
 
 def angles_without_rounding(q: Array) -> Array:
-    """Angles q (n,) [rad] in [-pi, pi], zero exactly where they differ by rounding alone."""
+    """Angles q (n,) [rad] in [-pi, pi]; angles within rounding of zero become exactly zero."""
     q = wrapped(q)
     return np.where(np.abs(q) < ROUNDING, 0.0, q)
 
@@ -99,6 +99,6 @@ class DrawnMotion:
         return self.drawing.file_within_turn(self.motion.at(parameter))
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """Boxes that cover the curve, see `SelfMotion.boxes`."""
+        """Boxes around the curve, see `SelfMotion.boxes`."""
         centre, sides = self.motion.boxes(parameter, half)
         return self.drawing.file(centre), sides

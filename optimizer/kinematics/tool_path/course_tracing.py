@@ -1,9 +1,9 @@
-"""Joint paths along a course of the TCP: inverse kinematics by Newton's method, each point starting
-from the previous one.
+"""Joint paths along a course of the TCP, by Newton's method from point to point.
 
-Several configurations of the first pose are continued at once. Each leads along one curve in joint
-space, as far as the arm reaches without passing a singularity. The joint path is a quintic spline
-through the result.
+Newton's method at a point starts from the configuration of the previous point. Several
+configurations of the first pose are continued at once. A configuration leads along one curve in
+joint space, as far as the arm reaches without passing a singularity. The joint path is a quintic
+spline through the points of the curve.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Trace:
 
     @property
     def followed(self) -> float:
-        """Fraction of the course up to which it was followed."""
+        """Fraction of the course that the arm followed."""
         return max(float(self.at[-1]), self.farthest)
 
 
@@ -89,9 +89,9 @@ def chain_of(robot: Robot) -> Chain:
 
 
 def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
-    """Traces of a course from each configuration q_start (n, nq) [rad] of its first pose.
+    """Traces of a course from the configurations q_start (n, nq) [rad] of its first pose.
 
-    If the tool may turn about an axis, it does so where the course cannot be followed otherwise.
+    If the tool may turn about an axis, it turns only if the arm cannot follow the course otherwise.
     From a free start the tool turns uniformly to the end, or not at all if the end is free, too.
     """
     if course.free_start and course.turning is None:
@@ -100,9 +100,9 @@ def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
 
 
 def traces_of_each(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> list[Trace]:
-    """Traces of courses with fixed ends, each from its own configuration q_start (n, nq) [rad].
+    """Traces of n courses with fixed ends, course k from configuration k of q_start (n, nq) [rad].
 
-    Courses of one shape, which may be turned about the path's free axis, are traced together.
+    Courses of one shape, up to turns about the path's free axis, are traced together.
     """
     found, left = dict[int, Trace](), list(range(len(courses)))
     while left:
@@ -119,8 +119,12 @@ def traces_of_each(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> l
 def _turned_where_needed(
     arm: Arm, courses: Sequence[ToolCourse], found: Sequence[Trace]
 ) -> list[Trace]:
-    """Traces of one course, or of one course each, with a turning where it is allowed and
-    needed.
+    """Traces with a turning of the tool if it is allowed and needed.
+
+    Args:
+        arm: the arm.
+        courses: the course of all traces, or one course per trace.
+        found: the traces without a turning.
     """
     own = list(courses) * len(found) if len(courses) == 1 else courses
     return [
@@ -178,9 +182,9 @@ def turned_start(
 
 
 def with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
-    """Trace with a turning that leads to the end of the course, in place of a `stopped` trace.
+    """Trace to the end of the course with a turning of the tool, in place of a `stopped` trace.
 
-    Without such a turning, the stopped trace with the fraction `farthest`.
+    If no turning leads to the end, the result is the stopped trace with the fraction `farthest`.
     """
     angle = _angle_at(arm, course, stopped.q[0])
     grid = TurningGrid.of(arm, chain_of(arm.robot), course, stopped.q[0], turned=angle)
@@ -199,9 +203,9 @@ def with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
 
 
 def _traces(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> list[Trace]:
-    """Traces from each start: of one course for all, or of one course each with the same shape.
+    """Traces from n starts, of one common course or of n courses of the same shape.
 
-    Where joints move far between points, the trace is repeated with more points.
+    If joints move far between points of a trace, it is repeated with more points.
     """
     found = _traced(arm, courses, q_start, courses[0].grid(TRACE.points_on_piece, TRACE.step))
     coarse = [
@@ -264,7 +268,7 @@ def turned(
         trace: trace of a course.
         lower: lower limits, shape (nq,) [rad].
         upper: upper limits, shape (nq,) [rad].
-        choices: possible positions of each joint at the start of the trace [rad].
+        choices: possible positions of the joints at the start of the trace [rad].
 
     Returns:
         The shifted trace; None if no full turns fit.

@@ -34,7 +34,7 @@ class StudyStep:
 
 @dataclass(frozen=True)
 class StudyStepTask:
-    """The body of an iteration, too large to be looked at in the service's process."""
+    """The body of an iteration, too large for the service's process."""
 
     body: IterationBody | HeldBody
     robot: str
@@ -43,8 +43,10 @@ class StudyStepTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """The content of a StudyStep. `deadline` is not watched: it takes a second at most. Raises
-        InvalidProblem.
+        """The content of a StudyStep, within a second regardless of `deadline`.
+
+        Raises:
+            InvalidProblem: the body contradicts its study.
         """
         assert not isinstance(self.body, HeldBody), "in a worker it is the model itself"
         step = study_step(self.body, self.robot, self.figures, self.objective)
@@ -59,7 +61,7 @@ def study_step(body: IterationBody, robot: str, figures: str | None, objective: 
     step = body.root
     if isinstance(step, OptimizeStep):
         asked = _about("optimize", step.optimize, robot=robot, figures=figures, objective=objective)
-        # all candidates: suggestions start from those that were ruled out, too
+        # all candidates: suggestions also start from candidates that were ruled out
         computed = asked.model_copy(update={"candidates": "all"})
         return StudyStep(
             "optimize", asked.model_dump(mode="json", exclude_unset=True), optimize=computed
@@ -83,7 +85,7 @@ def _about(kind: str, asked: R, **of_study: str | None) -> R:
                 f"{kind}.{name}",
                 f"The study has another {name}: leave {name} out, or create another study.",
             )
-    # null is left out: that is what a request without figures says
+    # a request without figures leaves the field out instead of null
     return asked.model_copy(
         update={name: value for name, value in of_study.items() if value is not None}
     )
