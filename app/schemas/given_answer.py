@@ -24,8 +24,8 @@ class AnswerRequest(Request):
     )
     arm: ArmRequest | None = described(
         "The arm of the answer: payload, limits, scene, ... as in the request of the answer. Null: "
-        "the field `arm` of the answer. Required if the answer has no `arm`. Its `robot` must be "
-        "the robot of the answer. Not allowed for a cycle.",
+        "the field `arm` of the answer. Required if the answer has no `arm`. Its `robot`, if "
+        "given, must be the robot of the answer. Not allowed for a cycle.",
         None,
         {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
         default=None,

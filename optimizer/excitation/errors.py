@@ -9,7 +9,7 @@ from joulepath.optimizer.exceptions import JoulepathError
 
 @dataclass(eq=False)
 class ExcitationInfeasible(JoulepathError):
-    """No start led to an excitation within its limits. The last start exceeded the limit `limit`."""
+    """No start led to an excitation within its limits. The last start exceeded `limit`."""
 
     title = "No excitation within the limits"
     remedy = (
