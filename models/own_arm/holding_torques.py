@@ -85,7 +85,7 @@ class HoldingTorques:
         weak = [
             f"Joint {joint!r} cannot hold the arm's own links everywhere: gravity takes up to "
             f"{torque:.3g} N·m, and its torque limit is {limit:.4g} N·m. If the URDF's `effort` is "
-            "a placeholder, give `torque`."
+            "a placeholder, give `torque`; if the links are lighter, give `masses`."
             for joint, torque, limit in zip(joints, self.holding, tau_max, strict=True)
             if limit < torque
         ]
