@@ -66,7 +66,11 @@ def build(folder: Path = FOLDER) -> Path:
             messages = []
             for command in _commands():
                 process = subprocess.run(
-                    [*command, *arguments], capture_output=True, text=True, encoding="utf-8"
+                    [*command, *arguments],
+                    capture_output=True,
+                    text=True,
+                    encoding="utf-8",
+                    env=os.environ | {"TMPDIR": work},
                 )
                 if process.returncode == 0:
                     # Processes that have loaded the previous library keep it.

@@ -160,7 +160,8 @@ def _run(command: Sequence[str], log: Path, lock: IO[bytes], settings: CacheSett
     """Runs the compiler and all its processes in a process group of their own.
 
     The compiler inherits the lock: if this process is killed, no other process starts a second
-    compiler beside it.
+    compiler beside it. Its temporary files are in the folder of the log, because it leaves them
+    behind where it is killed.
     """
     with log.open("wb") as output:
         process = subprocess.Popen(
@@ -168,6 +169,7 @@ def _run(command: Sequence[str], log: Path, lock: IO[bytes], settings: CacheSett
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
+            env=os.environ | {"TMPDIR": str(log.parent)},
             start_new_session=True,
             pass_fds=[lock.fileno()],
         )
@@ -208,10 +210,14 @@ def _kill_all() -> None:
 def work_folder(target: Path) -> Iterator[Path]:
     """Empty folder beside a file of the cache, for the holder of the file's lock.
 
-    A process that is killed leaves its folder behind; the next holder of the lock deletes it.
+    A process that is killed leaves its folder behind; the next holder of the lock deletes it. After
+    an update, another file has taken the place of `target`: old folders of any file go, too.
     """
-    for stale in target.parent.glob(f"{target.name}-*.part"):
-        shutil.rmtree(stale, ignore_errors=True)
+    old = time.time() - CACHE.retry_delay
+    for stale in target.parent.glob("*.part"):
+        with suppress(OSError):  # another process has deleted it
+            if stale.name.startswith(f"{target.name}-") or stale.stat().st_mtime < old:
+                shutil.rmtree(stale, ignore_errors=True)
     with tempfile.TemporaryDirectory(
         dir=target.parent, prefix=f"{target.name}-", suffix=".part"
     ) as folder:

@@ -115,6 +115,24 @@ def test_a_compiler_that_hangs_is_killed_with_all_that_it_started(
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
+def test_temporary_files_of_a_compiler_go_with_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A compiler that is killed leaves them, and so does a process with the folder of its work."""
+    compiler, names = tmp_path / "compiler", tmp_path / "names"
+    compiler.write_text(f"#!/bin/sh\nmktemp >> {names}\nexit 1\n", encoding="utf-8")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    killed, at_work = (tmp_path / "cache" / f"{name}.so-x.part" for name in ("old", "new"))
+    for folder in (killed, at_work):
+        folder.mkdir(parents=True)
+    os.utime(killed, (0, 0))
+    with pytest.raises(RuntimeError, match="the C compiler failed"):
+        compile_library(tmp_path / "cache" / "arm.so", (), str)
+    assert names.read_text().split() and not Path(names.read_text().strip()).exists()
+    assert not killed.exists() and at_work.exists()
+
+
 def test_a_compiler_that_hung_rests(
     tmp_path: Path, hung: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
