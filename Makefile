@@ -36,13 +36,25 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-.PHONY: serve test test-long docs bench lock clean ready lint mypy style types kernels bytecode pytest pytest-long vitest
+# Two of these at once would install into one another's environment: the second one waits.
+WAIT = flock --nonblock Makefile true || echo "Another make is setting up this folder: waiting for its end ..."
 
-serve: $(VENV)/.runtime $(VENV)/.package kernels
+.PHONY: serve service test test-long docs bench lock clean ready tools lint mypy style types kernels bytecode pytest \
+	pytest-long vitest
+
+serve:
+	@$(WAIT)
+	@flock Makefile $(MAKE) --no-print-directory service
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
 
 # what the tests need, side by side; bytecode, since they start many processes, even where those may write none
-ready: $(VENV)/.runtime $(NATIVE)
+ready:
+	@$(WAIT)
+	@flock Makefile $(MAKE) --no-print-directory tools
+
+service: $(VENV)/.runtime $(VENV)/.package kernels
+
+tools: $(VENV)/.runtime $(NATIVE)
 	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels $(ROS2)/.ready
 	@$(PY) -m compileall -q app optimizer models
 
@@ -151,8 +163,13 @@ $(VENV)/bin/cc: requirements-compiler.lock $(PY)
 	@printf '#!/bin/sh\nexec "$${0%%/*}/python" -m ziglang cc "$$@"\n' > $@
 	@chmod +x $@
 
-$(PY):
-	@$(PYTHON) scripts/bootstrap.py $(VENV)
+# An environment whose making was cut short has a Python, too, but no pip.
+$(PY): | $(VENV)/.made
+	@test -x $@ || $(PYTHON) scripts/bootstrap.py $(VENV)
+
+$(VENV)/.made:
+	@$(PY) -m pip --version > /dev/null 2>&1 || $(PYTHON) scripts/bootstrap.py $(VENV)
+	@touch $@
 
 LOCK = $(VENV)/bin/uv pip compile --universal --generate-hashes --no-emit-index-url --quiet \
 	--custom-compile-command "make lock" $(LOCK_ARGS)

@@ -174,6 +174,8 @@ def _run(command: Sequence[str], log: Path, lock: IO[bytes], settings: CacheSett
             pass_fds=[lock.fileno()],
         )
         _running.add(process)
+        if _ending.is_set():  # since the start of the compiler
+            _kill(process)
         try:
             code = process.wait(settings.compiler_timeout)
         except subprocess.TimeoutExpired:
