@@ -1,8 +1,8 @@
 """Triangles of the meshes of tools in the flange frame, at every opening.
 
-The meshes are not part of this package. A folder contains them as the repository does from which
-they come. A piece that turns moves along arcs between two openings; `sagitta` bounds how far an arc
-leaves its chord.
+The meshes are not part of this package. A folder contains the meshes in the layout of their source
+repository. A turning piece moves along arcs between two openings; `sagitta` bounds the distance of
+an arc from its chord.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ class Piece:
         travel. All joints of a piece turn about parallel axes.
 
         A piece at angle w · travel to the flange adds w² times its reach to the second derivative
-        of a corner's position by the travel, and a chord of step h misses at most h² / 8 of that.
+        of a corner's position by the travel. A chord of step h deviates from its arc by at most
+        h² / 8 times this derivative.
         """
         reaches = [np.linalg.norm(joint.origin.translation[1:]) for joint in self.joints[1:]]
         reaches.append(np.linalg.norm(triangles[..., 1:], axis=-1).max())
@@ -84,18 +85,18 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Pieces of a tool that have hulls in common, one per cell.
+    """Pieces of a tool with common hulls, one hull per cell.
 
-    A cell is a box between two opposite corners in the flange frame [m]. Cells overlap, so that the
-    proof of the cover ends at triangles of the size of the overlap. Pieces that move have one
-    cell, the whole space, because a triangle on its way from one cell to the next is in no hull.
+    A cell is a box between two opposite corners in the flange frame [m]. Cells overlap, so the
+    proof of the cover ends at triangles of the size of the overlap. Moving pieces have one cell,
+    the whole space, because a triangle on its way between two cells would be in no hull.
     """
 
     pieces: tuple[Piece, ...]
     cells: tuple[tuple[Vector, Vector], ...] = (FARTHEST,)
 
     def within(self, triangles: Array) -> list[Array]:
-        """The pieces (k, 3, 3) of triangles (t, 3, 3) [m] of the flange frame in each cell."""
+        """The pieces (k, 3, 3) of triangles (t, 3, 3) [m] of the flange frame, by cell."""
         found = []
         for low, high in self.cells:
             inside = triangles
@@ -119,8 +120,8 @@ class ToolMeshes:
         return max(piece.sagitta(piece.triangles(folder), step) for piece in pieces)
 
     def swept(self, folder: Path, part: Part) -> list[Array]:
-        """Triangles (n, t, 3, 3) [m] in the flange frame of each piece of a part at n openings;
-        n = 1 for a piece that does not move.
+        """Triangles (n, t, 3, 3) [m] in the flange frame, by piece of a part, at n openings; n = 1
+        for a fixed piece.
         """
         found = []
         for piece in part.pieces:
@@ -132,8 +133,11 @@ class ToolMeshes:
 
 
 def between(openings: Array) -> Array:
-    """The way of triangles (n, t, 3, 3) from each opening to the next: triangles (k, 3, 6), both
-    places of every corner; of a piece that does not move, its triangles (t, 3, 3).
+    """Moves of triangles (n, t, 3, 3) between consecutive openings.
+
+    Returns:
+        Triangles (k, 3, 6) with both places of every corner; the triangles (t, 3, 3) of a fixed
+        piece.
     """
     if len(openings) == 1:
         return np.asarray(openings[0])
@@ -141,14 +145,14 @@ def between(openings: Array) -> Array:
 
 
 def on_flange(points: Array) -> Mask:
-    """Whether points (k, 3) [m] of the flange frame are in the flange of the arm, where no obstacle
-    can be.
+    """Whether points (k, 3) [m] of the flange frame are in the flange of the arm, out of reach of
+    obstacles.
     """
     return np.asarray((points[:, 2] < 0) & (np.hypot(points[:, 0], points[:, 1]) < FLANGE))
 
 
 def _placed(*xyz_yaw: float) -> pin.SE3:
-    """A pose: x, y, z [m] and the angle about z [rad], which are zero if not given."""
+    """A pose from x, y, z [m] and the angle about z [rad]; missing values are zero."""
     x, y, z, yaw = (*xyz_yaw, 0.0, 0.0, 0.0, 0.0)[:4]
     return pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.array([x, y, z]))
 
@@ -173,8 +177,9 @@ def _robotiq_2f_85() -> ToolMeshes:
     """Meshes and joints: airo_models/grippers/robotiq_2f_85 of the package `airo-models`.
 
     Coupling and base are at the heights of robotiq_2f85/2f85.xml in
-    github.com/google-deepmind/mujoco_menagerie, from which the TCP is. The travel is the angle of
-    the outer knuckles, up to the greater of the limits of both, at which the pads touch.
+    github.com/google-deepmind/mujoco_menagerie, the source of the TCP. The travel is the angle of
+    the outer knuckles. It ends when the pads touch, at the greater one of the limits of both
+    sources.
     """
     base = Joint(_placed(0.0, 0.0, 0.0108))
 
@@ -218,8 +223,8 @@ def _onrobot_rg2() -> ToolMeshes:
     github.com/ABC-iRobotics/onrobot-ros2.
 
     The joints are 2.457 mm higher than in onrobot_rg2/urdf/onrobot_rg2_macro.xacro of the maker's
-    github.com/OnRobot/onrobot-ros2, from which the TCP is, and the fingers move along y. The
-    housing's mesh for collision checks is its convex hull, and left out.
+    github.com/OnRobot/onrobot-ros2, the source of the TCP, and the fingers move along y. The
+    housing's mesh for collision checks is left out, because it is only the convex hull.
     """
     mount = Joint(_placed(0.0, 0.0, -0.002457, np.pi / 2))
 

@@ -29,13 +29,13 @@ from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.search.ends import label_of
 
 FREE_SAMPLES = 32
-"""Largest number of configurations, up to full turns, of an orientation that is free in part: twice
-the number of branches of a full pose."""
+"""Largest number of configurations, up to full turns, of a partly free orientation: twice the
+number of branches of a full pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class IKSolution:
-    """One arm configuration that reaches the pose."""
+    """One arm configuration of the pose."""
 
     label: str
     """Branch: shoulder/elbow/wrist, or its number for an arm whose branches have no names. Full
@@ -69,8 +69,8 @@ class IKSolutions(Result, Sequence[IKSolution]):
     """All configurations found for a pose, as a sequence.
 
     `complete`: whether every branch is among the configurations. Otherwise the inverse kinematics
-    of the robot is not proven to find all, and some may be missing. For an orientation that is free
-    in part, this is never proven.
+    of the robot is not proven to find all configurations, and some may be missing. Completeness is
+    never proven for a partly free orientation.
     """
 
     solutions: tuple[IKSolution, ...]
@@ -126,19 +126,19 @@ def inverse_kinematics(
     deadline: float = np.inf,
     clock: Clock = time.perf_counter,
 ) -> IKSolutions:
-    """Find all configurations within the position limits that put the TCP at a pose.
+    """Find all configurations of a TCP pose within the position limits.
 
     If infinitely many configurations reach the pose, as with seven joints, the result has evenly
-    spread samples of every self-motion. If the orientation is free in part, the configurations are
-    found by a search within the limits, for an arm of any number of joints: all of them if they are
-    isolated, as with five joints and a free rotation about an axis, or else samples.
+    spread samples of every self-motion. For a partly free orientation, a search within the limits
+    finds the configurations, for an arm of any number of joints: all configurations if they are
+    isolated, as with five joints and a free rotation about an axis, otherwise samples.
 
     Args:
         arm: arm with its TCP, limits, tool, payload and scene; a robot stands for a bare arm.
-        pose: pose of the TCP in the robot's base frame, whose orientation may be free in part.
+        pose: pose of the TCP in the robot's base frame; its orientation may be partly free.
         windings: whether to include every full turn of a joint within the limits; otherwise there
             is one solution per branch, nearest to zero.
-        deadline: wall time after which the computation is given up [s].
+        deadline: limit of the wall time [s].
         clock: function that returns the time [s].
 
     Returns:
@@ -188,7 +188,7 @@ def _solution(arm: Arm, found: LimitedSolution) -> IKSolution:
 
 
 def _of_free_orientation(arm: Arm, pose: ConeOrientedPose, windings: bool) -> list[IKSolution]:
-    """Solutions of a pose whose orientation is free in part; isolated ones with their full
+    """Solutions of a pose with a partly free orientation; isolated solutions with their full
     turns.
     """
     limits, names = arm.active_limits, arm.robot.joint_names

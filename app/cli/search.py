@@ -56,7 +56,7 @@ def search(
         body: JSON of the request.
         output: file of the answer; None for standard output.
         summary_of: the lines of the summary of an answer.
-        answers: folder for the complete answers that the answer refers to.
+        answers: folder for the complete answers referenced by the answer.
 
     Raises:
         Refused: there is no answer.
@@ -77,7 +77,7 @@ def search(
 
 
 def robot_in(request: Any) -> str:
-    """Name of the robot in a request: its own, or that of the base of a what-if."""
+    """Name of the robot in a request, or in the base of a what-if request."""
     for base in ("optimize", "evaluate"):
         request = getattr(request, base, None) or request
     name: str = request.robot
@@ -85,7 +85,7 @@ def robot_in(request: Any) -> str:
 
 
 def write_answers(result: TaskResult, folder: Path) -> None:
-    """Writes the complete answers that a result refers to. Raises click.FileError."""
+    """Writes the complete answers referenced by a result. Raises click.FileError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Common parts of the commands that need a service: its address, its problems, bodies for it."""
+"""Common parts of commands for a running service: its address, its problems, request bodies."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def connect(context: click.Context, url: str, key: str | None) -> None:
 
 @contextmanager
 def answered() -> Iterator[None]:
-    """Raises Refused for the problem that the service answers with, or if none answers."""
+    """Raises Refused for a problem of the service, or for an unreachable service."""
     from joulepath.app.client.errors import ServiceUnreachable
     from joulepath.optimizer.exceptions import DeclaredError
 

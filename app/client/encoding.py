@@ -12,8 +12,11 @@ from joulepath.app.exceptions.base import InvalidRequest
 
 
 def key_header(key: str | None) -> dict[str, str]:
-    """The header with an API key; none without a key. Raises Unauthenticated for a key with other
-    characters than those of a header."""
+    """The header with an API key; empty without a key.
+
+    Raises:
+        Unauthenticated: the key has characters that a header cannot contain.
+    """
     key = (key or "").strip()
     # httpx would repeat the key in its error
     if not (key.isascii() and key.isprintable()):
@@ -22,16 +25,19 @@ def key_header(key: str | None) -> dict[str, str]:
 
 
 def part(name: str) -> str:
-    """A name or an id as one part of a path: none leads to another path."""
+    """A name or an id, quoted as a single part of a path."""
     quoted = quote(name, safe="")
     return quoted if quoted.strip(".") else quoted.replace(".", "%2E")
 
 
 def json_text(value: Any) -> str:
-    """JSON of a value with arrays. Raises InvalidRequest.
+    """JSON of a value with arrays.
 
-    NaN and infinities stay, for the service to say where they are: null would mean that the field
-    is left out.
+    NaN and infinities stay in the text, and the service reports their place: null would stand for
+    an omitted field.
+
+    Raises:
+        InvalidRequest: the value has a part without a JSON form.
     """
     return json.dumps(value, default=_plain)
 

@@ -1,4 +1,4 @@
-"""The version of the code, which an update changes even between releases."""
+"""Version of the code; every update changes it, even between releases."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PAGES = ("static", "studio")
 
 @cache
 def code_version(package: Path = Path(joulepath.__file__).parent) -> str:
-    """A digest of the code and figures of an installation, by default of this one.
+    """A digest of the code and figures of an installation, by default the running installation.
 
     Answers and Python objects of another version may differ. Read first when the service starts:
     later, an update may have replaced files that this process does not use.

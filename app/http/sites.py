@@ -15,15 +15,19 @@ from joulepath.app.exceptions.access import CrossSite, WrongHost
 EVERYONE = "*"
 _HOST = re.compile(r"(\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[^:\[\]]+))(:[0-9]*)?")
 PROBES = ("/healthz", "/readyz")
-"""They tell nothing, and load balancers send any name."""
+"""Paths without a check of the host: their answers are public, and load balancers send any name."""
 
 
 def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
-    """A check of the header Host, which raises WrongHost. `own` is the address of the service.
+    """A check of the header Host that raises WrongHost for an unknown name.
 
     A web page can map its own name to the address of this service; the browser then takes the
-    service for the page's server (DNS rebinding). The header still has the page's name. Addresses
-    cannot be mapped, so that all of them are allowed.
+    service for the page's server (DNS rebinding). The header still has the page's name. Numeric
+    addresses cannot be mapped, so every address is allowed.
+
+    Args:
+        names: known names of the service.
+        own: address of the service.
     """
     known = {*names, own.lower(), "localhost", socket.gethostname().lower()}
 
@@ -41,10 +45,11 @@ def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
 
 
 def same_site(origins: Collection[str]) -> Callable[[Request], None]:
-    """A check of Sec-Fetch-Site and Origin, which raises CrossSite; pages of `origins` pass.
+    """A check of Sec-Fetch-Site and Origin; it raises CrossSite except for pages of `origins`.
 
-    Browsers set both headers, and pages cannot change them. Requests of other programs have neither
-    and pass. Read-only requests pass as well, since a foreign page cannot see the answer.
+    Browsers set both headers, and pages cannot change these headers. Requests of other programs
+    have neither header and pass. Read-only requests pass as well, because a foreign page cannot see
+    the answer.
     """
 
     def check(request: Request) -> None:

@@ -1,4 +1,4 @@
-"""Paths that the TCP must follow."""
+"""Prescribed paths of the TCP."""
 
 from __future__ import annotations
 
@@ -56,14 +56,12 @@ class SpeedRange(Request):
 
     @property
     def fixed(self) -> float | None:
-        """The speed that is held [m/s]; None if there is a range."""
+        """The constant speed [m/s]; None for a range."""
         return self.min if self.min == self.max else None
 
     @property
     def limit(self) -> float | None:
-        """The limit on the speed of the TCP [m/s]: none of a fixed speed, which is held from both
-        sides.
-        """
+        """The upper limit on the speed of the TCP [m/s]; None for a constant speed."""
         return self.max if self.fixed is None else None
 
 
@@ -76,7 +74,7 @@ PathSpeed = Annotated[
 
 
 class PathTolerance(Request):
-    """By how much the motion may be off its path."""
+    """Largest deviations of the motion from its path."""
 
     position: float = described(
         "Largest distance of the TCP.",
@@ -144,8 +142,8 @@ class _OnPath(Request):
 
 
 class Path(_OnPath):
-    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns
-    evenly about one axis; a smooth curve; or an arc.
+    """A path of the TCP from `start` to `goal`: straight lines with an even rotation about one axis
+    per line; a smooth curve; or an arc.
 
     The branch and the timing are chosen; the tool is on the path from the start to the goal.
     """
@@ -160,8 +158,8 @@ class Path(_OnPath):
 
 
 class StopPath(_OnPath):
-    """A path of the TCP at a stop, like that of a bead of glue: the arm rests at its first pose,
-    follows it, and rests at its last. The branch is chosen for the whole cycle."""
+    """A path of the TCP at a stop, such as a bead of glue: the arm rests at the first pose, follows
+    the path, and rests at the last pose. The branch is chosen for the whole cycle."""
 
     points: Annotated[
         list[TargetPose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)

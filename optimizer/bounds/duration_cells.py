@@ -1,13 +1,13 @@
 """The dual bound of one pair of end configurations over all durations.
 
-The plain bound at a fixed duration T (`net_energy.electrical`) is convex in T. Outside of the
-durations between which it is below a target it stays above it. Between them, each cell of durations
-has the greater of the plain bound and the dual bound (`dual_bound`).
+The plain bound at a fixed duration T (`net_energy.electrical`) is convex in T. It is below a target
+only within one interval of durations. The interval is divided into cells. The bound of a cell is
+the greater one of the plain bound and the dual bound (`dual_bound`).
 
-The dual bound is built around the pair's own motion, or around a straight motion if it has none.
-Its multipliers are linear in time and nearest to the motor torques (least squares), times a factor.
-Joints that carry no gravity have multipliers, and the joints with the greatest copper loss of
-holding. A share of the plain bound's own multiplier of speed goes with them.
+The dual bound is built around the pair's own motion, or around a straight motion if the pair has no
+motion. Its multipliers are linear in time and nearest to the motor torques (least squares), times a
+factor. Two kinds of joints have multipliers: all joints without gravity torque, and the joints with
+the greatest copper loss of holding. A share of the plain bound's multiplier of speed is added.
 """
 
 from __future__ import annotations
@@ -118,8 +118,8 @@ class DurationCells:
     def raise_bounds(self, effort: Effort, deadline: Deadline) -> None:
         """Raise the bounds of cells with some effort, in groups, the lowest cells first.
 
-        It ends if a cell that was raised is the lowest, if all reach the target, or if time is
-        short.
+        The computation ends if a raised cell is the lowest cell, if all cells reach the target, or
+        if time is short.
         """
         self._divide(effort.cell_ratio)
         left = self.values < self.target
@@ -175,7 +175,7 @@ class DurationCells:
             edges: edges of the cells, shape (n + 1,) [s].
             values: bounds so far, shape (n,) [J].
             effort: effort.
-            deadline: instant before which the computation ends, between two numbers of joints.
+            deadline: end of the computation, checked between two numbers of joints.
         """
         middles = np.sqrt(edges[:-1] * edges[1:])
         middle = float(np.sqrt(edges[0] * edges[-1]))
@@ -194,7 +194,7 @@ class DurationCells:
                 return
 
     def _best_factors(self, dual: DualBound, duration: float, work: float, rounds: int) -> Factors:
-        """Factors near which the bound for a duration [s] is greatest, by coordinate search."""
+        """Factors of nearly the greatest bound for a duration [s], by coordinate search."""
         cell = dual.over(np.full(2, duration))
         first, step = self._first_factor(dual, duration), DUAL.factor_step
         starts = [(first * share, stiffness) for share, stiffness in DUAL.starts]
@@ -218,7 +218,7 @@ class DurationCells:
         return cells(Weights(scale, confined, stiffness - confined, work), self.power)
 
     def _first_factor(self, dual: DualBound, duration: float) -> float:
-        """A factor of the multipliers that was near the best factor in many trials."""
+        """An empirical factor of the multipliers, near the best factor in many trials."""
         grid = list(dual.terms.grid)
         bending = (
             np.abs(dual.terms.omega).mean(axis=0)
@@ -246,12 +246,12 @@ class DurationCells:
 
     @cached_property
     def _carries_gravity(self) -> Mask:
-        """Whether a joint (nq,) carries gravity."""
+        """Joints (nq,) with a gravity torque."""
         change = self.shared.chain.potential_bound(2).max(axis=1)
         return np.asarray(change > DUAL.weightless)
 
     def _joints_with_multipliers(self, loaded_joints: tuple[int, ...]) -> list[Mask]:
-        """Joints (nq,) that carry no gravity, and some of those with the greatest loss."""
+        """Joints (nq,) without gravity torque, and some joints of the greatest loss of holding."""
         rank = np.argsort(np.argsort(-self._holding_loss, kind="stable"))
         return [~self._carries_gravity | (rank < count) for count in loaded_joints]
 
@@ -270,7 +270,7 @@ class DurationCells:
         return first, other
 
     def _work(self, duration: float) -> float:
-        """η of `dual_bound`, a share of the plain bound's; 0 for friction that grows with load."""
+        """η of `dual_bound`, a share of the η of the plain bound; 0 for load-dependent friction."""
         if self.shared.friction.load is not None:
             return 0.0
         return DUAL.work_share * copper_multiplier(

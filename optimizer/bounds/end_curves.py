@@ -52,7 +52,7 @@ class Cells(Rows):
 
 @dataclass(frozen=True)
 class EndCurves:
-    """All configurations that reach the targets at one end of a motion."""
+    """All configurations of the targets at one end of a motion."""
 
     joints: int
     """Number of joints."""
@@ -72,7 +72,7 @@ class EndCurves:
         return EndCurves(len(ends[0].q), list(curves.values()), all(end.fixed for end in ends))
 
     def first(self) -> Cells:
-        """Cells that cover every curve."""
+        """Cells that together cover all curves."""
         curve, parameter, half = list[int](), list[float](), list[float]()
         for k, each in enumerate(self.curves):
             for lower, upper in [(0.0, 0.0)] if isinstance(each, np.ndarray) else each.arcs:
@@ -84,7 +84,7 @@ class EndCurves:
         return Cells(np.array(curve, dtype=np.intp), np.array(parameter), np.array(half))
 
     def boxes(self, cells: Cells) -> tuple[Array, Array]:
-        """Boxes that hold the configurations of cells.
+        """Boxes around the configurations of cells.
 
         Returns:
             Middles and half sides, shape (n, nq) [rad].
@@ -115,9 +115,9 @@ class EndCurves:
 
     @cached_property
     def _groups(self) -> list[tuple[list[int], BoxesOfCells]]:
-        """Groups of curves, by index, whose boxes are computed at once, and the computation.
+        """Groups of curves, by index, with one computation of boxes per group.
 
-        Curves of one type around one pose are a group, and all isolated configurations.
+        All curves of one type and one pose form a group. All isolated configurations form a group.
         """
         groups: dict[tuple[type, object], list[int]] = {}
         for k, curve in enumerate(self.curves):

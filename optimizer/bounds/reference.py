@@ -1,4 +1,4 @@
-"""The path and multipliers around which a dual bound is built, and boxes that hold all motions."""
+"""The reference path and multipliers of a dual bound, and boxes around all motions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LEAST_HALF_SIDE = 1e-6
 
 @dataclass(frozen=True)
 class Reference:
-    """A path from start to goal with multipliers, linear on each of S equal steps of time."""
+    """A path from start to goal with multipliers, linear on S equal steps of time."""
 
     x: Array
     """Positions at the nodes, shape (S + 1, nq) [rad]."""
@@ -42,10 +42,10 @@ def greatest_speed(limits: Limits, t: Array) -> Array:
 
 
 def half_sides(reference: Reference, limits: Limits, longest: float) -> Array:
-    """Half sides of boxes around a path that hold every motion, shape (S, nq) [rad].
+    """Half sides of boxes around a path that contain every motion, shape (S, nq) [rad].
 
-    In a given time from the start or to the goal, no joint moves farther than `greatest_speed`
-    allows. The position limits hold.
+    The boxes follow from the distance travelled at `greatest_speed` from the start or to the goal,
+    and from the position limits.
 
     Args:
         reference: path.

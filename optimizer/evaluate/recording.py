@@ -53,7 +53,7 @@ MOTION_LIMITS = GivenMotionLimits()
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Joint positions q (n, nq) [rad] that a motion passes in order, with times of the segments.
+    """Joint positions q (n, nq) [rad] on a motion, in order, with the times of its segments.
 
     `first_row` is the number of the first row in error messages.
 
@@ -63,7 +63,7 @@ class Waypoints:
 
     q: Array
     times: Array
-    """Duration of each segment (n - 1,), or one number for all segments [s]."""
+    """Durations of the segments (n - 1,), or one number for all segments [s]."""
     interpolation: Interpolation = "quintic"
     """Interpolation within segments, see `piecewise_motion`."""
     first_row: int = 0
@@ -129,9 +129,10 @@ class Recording:
     """A recorded motion as a stream of blocks of rows, which is read once.
 
     `Recording.of(t, q)` creates a recording from arrays. All blocks have the same channels.
-    `first_row` is the number of the first row in error messages. `edges` are the increasing times
-    [s], after the first row, at which a new segment begins. `cycles` are the numbers of the
-    segments with which the cycles of a repeated motion begin, and the number behind the last one.
+    `first_row` is the number of the first row in error messages. `edges` are the increasing start
+    times [s] of all segments but the first, after the first row. `cycles` are the numbers of the
+    first segments of the cycles of a repeated motion, and the number behind the last segment of the
+    last cycle.
     """
 
     blocks: Iterable[RecordedRows]
@@ -162,8 +163,9 @@ class Recording:
             q: joint positions, shape (n, nq) [rad].
             v: joint velocities if they were recorded, shape (n, nq) [rad/s].
             a: joint accelerations if they were recorded, shape (n, nq) [rad/s²].
-            edges: times at which a new segment begins, after the first row [s].
-            cycles: numbers of the segments with which a cycle begins, and that behind the last one.
+            edges: start times of all segments but the first, after the first row [s].
+            cycles: numbers of the first segments of the cycles, and the number behind the last
+                segment of the last cycle.
 
         Raises:
             InvalidProblem: the arrays have different numbers of rows.

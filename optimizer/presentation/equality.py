@@ -1,4 +1,4 @@
-"""Equality of values that contain arrays."""
+"""Equality of values with arrays."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ class Comparable:
 
 
 def same(first: Any, second: Any) -> bool:
-    """Whether two values have the same type and content, arrays included; a list may equal a
-    tuple, and what is not a number in one is not a number in the other."""
+    """Whether two values have the same type and content, arrays included.
+
+    A list may equal a tuple, and NaN equals NaN.
+    """
     if first is second:
         return True
     if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):

@@ -92,26 +92,26 @@ def replay(
     tell: TellSteps = no_listener,
     progress: bool = True,
 ) -> Replay | list[Replay]:
-    """Simulate a motion in MuJoCo under controllers, and on arms that differ from the planned arm.
+    """Simulate a motion in MuJoCo under controllers, and on arms with perturbed figures.
 
-    MuJoCo shares the figures of the robot with the optimiser, and nothing else.
+    MuJoCo and the optimiser have only the figures of the robot in common.
 
     Args:
         motion: solution of a problem or of a cycle, or a planned motion.
         controls: controllers: torques known in advance with a PD loop, or the loop alone.
         step: step of the simulation and of its controller [s].
-        perturb: fraction by which a quantity of the arm is raised and lowered, one at a time, under
-            the first controller, which does not know of it.
-        deadline: wall time after which the replay is given up [s].
+        perturb: relative changes of quantities of the arm. The first controller, without knowledge
+            of the change, runs with one quantity at a time raised and lowered.
+        deadline: limit of the wall time [s].
         clock: function for the current time [s].
-        problem: problem of a `Solution`, which contains its arm; other motions contain theirs.
+        problem: problem of a `Solution`, with its arm; other motions contain their arm.
         tell: gets the progress, in simulated motions; of a cycle, in its moves.
         progress: whether a bar may show the progress, on a terminal or in a notebook, unless
             `tell` is given.
 
     Returns:
-        Deviations, torques, contacts and energy under each controller and of each change, and the
-        remaining savings; for a cycle, one replay for each of its moves.
+        Deviations, torques, contacts and energy by controller and by change, and the remaining
+        savings; for a cycle, one replay per move.
 
     Raises:
         InvalidProblem: the motion takes too many steps, or `problem` is missing.
@@ -291,10 +291,10 @@ def planned_motion(solution: Solution, arm: Arm, objective: Objective) -> Planne
     Args:
         solution: solution of a problem.
         arm: arm of the problem.
-        objective: objective of the problem, to which the savings refer.
+        objective: objective of the problem and of the savings.
 
     Returns:
-        The motion, with the baselines whose motions are known.
+        The motion, with all baselines of known motion.
 
     Raises:
         NotCertified: the solution does not belong to the arm.

@@ -62,7 +62,7 @@ class Fastest:
 
     @property
     def too_slow(self) -> DurationTooShort:
-        """The error for a problem that allows no motion of this duration."""
+        """The error for a problem with a shorter allowed duration than this motion."""
         return DurationTooShort(self.bound, self.duration, self.proven, self.cut_short)
 
 
@@ -105,13 +105,13 @@ def fastest(
 ) -> Fastest | None:
     """The fastest motion over all candidates; None if none is found.
 
-    The durations that the problem allows do not count. The motion is no slower than the known
-    motions that the certificate confirms.
+    The search disregards the allowed durations of the problem. The motion is at least as fast as
+    all known motions with a valid certificate.
 
     Args:
         state: state of the search.
         known: known motions between ends of candidates.
-        wanted: duration that suffices [s]; None for the fastest motion.
+        wanted: sufficient duration [s]; None for the fastest motion.
     """
     settings = FastestSettings()
     open_candidates = _tried(state)
@@ -150,10 +150,10 @@ def fastest(
 
 
 def _tried(state: SearchState) -> list[Candidate]:
-    """Candidates of which the fastest may be one.
+    """Candidates for the fastest motion.
 
-    They are all candidates but samples, the samples of least duration, and others of the same
-    targets that are quicker still.
+    The result has all candidates except samples, the samples of least duration, and further
+    configurations of the same targets with even shorter durations.
     """
     candidates, prepared = state.candidates, state.prepared
     tried = [
@@ -192,13 +192,13 @@ def explore_or_find_fastest(
 ) -> None:
     """Solve candidates; if none has a motion of an allowed duration, take the fastest motion.
 
-    While several candidates are tried in vain, time is left for the search of the fastest motion.
+    The solves of several candidates leave time for the search of the fastest motion.
 
     Args:
         state: state of the search.
         explore: solves candidates.
         known: known motions between ends of candidates.
-        other: a motion of another search, which counts as well.
+        other: a motion of another search, considered as well.
 
     Raises:
         DurationTooShort: the fastest motion takes longer than allowed.
@@ -267,11 +267,11 @@ def find_fastest(state: SearchState, known: Sequence[Spline] = (), improve: bool
         solve_from(state, candidate, sampled(spline), fine=True)
     if found.duration > longest and state.best() is None:
         raise found.too_slow
-    # a motion that is only the fastest one is no optimum
+    # the fastest motion alone is no optimum
     state.cut_short |= candidate.attempt is not None and candidate.attempt.spline is spline
 
 
 def _are_stopped_by_obstacles(state: SearchState) -> bool:
-    """Whether all candidates that failed did so because of a collision."""
+    """Whether all failed candidates failed because of a collision."""
     failed = [each.attempt for each in state.candidates if each.attempt is not None]
     return bool(failed) and all(result.collision is not None for result in failed)

@@ -50,20 +50,21 @@ REFINEMENT = RefinementSettings()
 class FastestStartSettings:
     """Settings of the solves from the time-optimal motion of a candidate.
 
-    Each takes as long as a refinement, and most find nothing better. The conditions choose four of
-    the six of 80 random requests in which they saved 0.05 % or more.
+    Such a solve takes as long as a refinement, and most solves find nothing better. In six of 80
+    random requests, the solves saved 0.05 % or more; the conditions select four of these six.
     """
 
     held_back: float = 1.5
-    """Ratio of the duration to the shortest duration of the joints above which path constraints
-    that are active hold the motion back. Its jerk then switches elsewhere than in the first solve,
-    and the local optima differ by up to 1.7 %. Below, these solves gained nothing."""
+    """Ratio of the duration to the shortest duration of the joints above which active path
+    constraints hold the motion back. The jerk then switches at other instants than in the first
+    solve, and the local optima differ by up to 1.7 %. Below this ratio, the solves gained
+    nothing."""
     active: float = 0.98
     """Ratio of a path constraint to its limit above which the constraint is active."""
     broken_promise: float = 1.25e-3
-    """Excess of the cost of a nearly fastest motion over its cost in the NLP, as a share, above
-    which other knots are tried, those at the jumps of the time-optimal motion's jerk. Three of 36
-    random requests without path constraints are above; two of them then needed 0.06 % less."""
+    """Relative excess of the cost of a nearly fastest motion over its cost in the NLP, above which
+    a solve with knots at the jumps of the time-optimal motion's jerk is tried. Three of 36 random
+    requests without path constraints had a larger excess; two of these then needed 0.06 % less."""
 
 
 FASTEST_START = FastestStartSettings()
@@ -113,13 +114,13 @@ def _start_otherwise(state: SearchState, candidate: Candidate) -> None:
     is_faster = spline.duration < longest * (1 - DURATION_TOLERANCE)
     if problem.objective == "mechanical" and is_faster and not deadline.passed:
         # the smoothed |tau v| is positive at rest, the work is not: a free duration is too short.
-        # `lasting` rounds otherwise, which leads the objective to other local optima
+        # `lasting` rounds differently and would lead the objective to other local optima
         slower = retimed(spline, longest / spline.duration)
         solve_from(state, candidate, sampled(slower), fine=False, duration=longest)
 
 
 def _stores_energy(state: SearchState, candidate: Candidate) -> bool:
-    """Whether the storage takes energy in a candidate's motion, so that its value matters."""
+    """Whether the storage takes energy in a candidate's motion: only then its value matters."""
     energy = state.prepared.energy(candidate.spline)
     least = REFINEMENT.least_charged * abs(energy.electrical.total)
     return energy.storage is not None and energy.storage.charged > least
@@ -128,8 +129,8 @@ def _stores_energy(state: SearchState, candidate: Candidate) -> bool:
 def _value_surplus_otherwise(state: SearchState, candidate: Candidate) -> None:
     """Improve a candidate by solves with other values of the surplus.
 
-    With a free duration, the candidate is also solved anew at durations around that of the best of
-    them, at the highest value.
+    With a free duration, the candidate is also solved anew at durations around the duration of the
+    best solution, with the highest value of the surplus.
     """
     problem, deadline = state.problem, state.deadline
     supply, most = problem.arm.regeneration, problem.arm.bus.efficiency
@@ -149,11 +150,11 @@ def _value_surplus_otherwise(state: SearchState, candidate: Candidate) -> None:
 def start_from_fastest(
     state: SearchState, candidate: Candidate, settings: FastestStartSettings = FASTEST_START
 ) -> None:
-    """Improve a candidate by solves from its time-optimal motion, where these may find less.
+    """Improve a candidate by solves from its time-optimal motion, if these may find less energy.
 
     The first solve starts from a smoothed time-optimal motion on few control points, and the
-    refinement stays near the optimum that it leads to. Ends that slide have been solved with knots
-    at several switches already: of 75 such motions, two needed less after another start, by 0.2 %.
+    refinement stays near the resulting optimum. Sliding ends have already been solved with knots at
+    several switches: of 75 such motions, two needed less after another start, by 0.2 %.
 
     Args:
         state: state of the search.
@@ -231,16 +232,16 @@ def refine_rivals(
     saved: float | None,
     settings: RivalSettings = RIVALS,
 ) -> None:
-    """Refine other candidates that may come below the best one.
+    """Refine other candidates with a chance of less energy than the best candidate.
 
-    Samples that slid to the ends of a refined motion are left out, because they are at its optimum.
-    Where powers have corners, `sharpen` has followed other candidates already.
+    A sample with ends that slid to the ends of a refined motion is left out, because it is at the
+    same optimum. For powers with corners, `sharpen` has already followed other candidates.
 
     Args:
         state: state of the search.
         best: the best candidate, refined.
         coarse: its energy before it was refined [J].
-        saved: energy that the finest space saved in it [J]; None if it was not tried.
+        saved: energy saved by its finest space [J]; None if the finest space was not tried.
         settings: settings of the choice.
     """
     problem = state.problem
@@ -261,7 +262,7 @@ def refine_rivals(
 
 
 def _is_elsewhere(state: SearchState, rival: Candidate, settings: RivalSettings) -> bool:
-    """Whether a candidate may be at another optimum than the refined ones."""
+    """Whether a candidate may be at another optimum than the refined candidates."""
     if not (rival.start.sampled or rival.goal.sampled):
         return True
     ends = np.concatenate([rival.q_start, rival.q_goal])
@@ -303,9 +304,9 @@ def follow_switches(state: SearchState, candidate: Candidate) -> None:
     """Solve a candidate with sliding ends with knots at the switches of jerk, until the posture
     settles.
 
-    The instants at which jerk switches depend on the posture at the ends. The first solve with
-    knots at the switches ends early, because the posture has moved by then. Further solves start
-    from its motion, with knots at the switches of the motion to the new posture.
+    The switching instants of jerk depend on the posture at the ends. The first solve with knots at
+    the switches ends early, because its posture moves away from these instants. Further solves
+    start from its motion, with knots at the switches of the motion to the new posture.
     """
     coarse = candidate.spline
     _solve_at_switches(state, candidate, coarse)

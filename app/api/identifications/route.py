@@ -101,7 +101,7 @@ async def add(
 async def list_identifications(
     page: Annotated[IdentificationPage, Query()], store: ServiceStore
 ) -> IdentificationList:
-    """All identifications, newest first, page by page, or those that are searched for."""
+    """Identifications, newest first, page by page, with an optional search."""
     read = partial(_page, limit=page.limit, after=page.after, search=page.search)
     found, following = await store.read(read)
     return IdentificationList(identifications=found, next=following)
@@ -141,8 +141,8 @@ async def rename(
 async def delete(
     id: IdentificationId, jobs: ServiceJobs, store: ServiceStore, client: ServiceClient
 ) -> None:
-    """Deletes an identification with its residuals, and stops it if it runs. The figures that were
-    found stay."""
+    """Deletes an identification with its residuals, and stops it if it runs. The identified figures
+    remain."""
     await store.read(partial(_found, job_id=id))
     await jobs.delete(id, client)
 
@@ -176,7 +176,7 @@ def _content(session: Session, job_id: str) -> dict[str, Any]:
 
 
 def completed(result: dict[str, Any]) -> dict[str, Any]:
-    """The result with empty lists for what an earlier version did not store."""
+    """The result, with empty lists for fields missing in results of earlier versions."""
     validation = result["validation"]
     if validation is not None:
         validation = {"energies": [], "cycles": []} | validation

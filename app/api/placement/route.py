@@ -37,9 +37,9 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     },
 )
 async def placement(body: PlacementRequest, tasks: ServiceTasks, later: ServiceLater) -> Response:
-    """Finds the place of the robot, or of stops and obstacles around it, at which cycles need the
-    least energy. The answer has the best and the nominal place with their complete cycles, and a
-    map of the region with the energy at each place, or the reason why there is none.
+    """Finds the place of the robot, or of stops and obstacles around it, with the least energy of
+    given cycles. The answer has the best and the nominal place with their complete cycles, and a
+    map of the region with the energy of every place, or the reason why the cycles fail there.
     `Accept: text/event-stream` returns events while the search runs, and then the answer."""
     if later.wanted:
         return await later.respond("placement", body)

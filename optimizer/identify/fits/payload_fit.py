@@ -1,8 +1,8 @@
 """Mass and centre of mass of a payload, from a log with it and at least one log without it.
 
-The torques of the log with the payload have one more term: that of a body at the flange. Friction,
-rotors, offsets of the sensors and errors of the links are the same in all logs and are fitted
-together with it, so the payload explains the difference between the logs.
+The torques of the log with the payload have one more term, a body at the flange. Friction, rotors,
+offsets of the sensors and errors of the links are the same in all logs. They are fitted together
+with the payload, so the payload explains the difference between the logs.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def with_payload(rows: Rows, payload: IdentifiedPayload) -> Rows:
 
 
 def joints_without_gravity(robot: Robot, rows: Rows, logs: Sequence[Log]) -> list[int]:
-    """Joints with a nearly constant gravity torque, which determines no torque constant."""
+    """Joints with a nearly constant gravity torque, and thus without a torque constant."""
     every = max(1, len(rows.q) // PAYLOAD_FIT.max_poses)
     parts = list[Array]()
     for number, log in enumerate(logs):
@@ -145,13 +145,13 @@ def fit_payload(
 
     Args:
         robot: the robot with its own figures.
-        rows: rows with regressors, whose rigid-body torques are without the payload.
+        rows: rows with regressors; the rigid-body torques exclude the payload.
         torque: motor torques (n, nq) [N·m], NaN if not logged.
         log: number of the log with the payload.
         threshold: smallest speed of a moving joint [rad/s].
 
     Raises:
-        InvalidProblem: the log carries less than the others.
+        InvalidProblem: the payload has less mass than in the other logs.
     """
     clusters, prior = clusters_of(rows), np.diag(_prior_precision(robot))
     body, variance = np.zeros(PARAMETERS_PER_BODY), np.ones(robot.nq)
@@ -180,17 +180,17 @@ def _disagreement(
     parts: Sequence[tuple[list[int], Array, Array, IntArray]],
     variance: Array,
 ) -> float:
-    """Factor, at least 1, by which the joints disagree more about the mass than their rows say.
+    """Variance ratio, at least 1, of the joints' estimates of the mass (Birge ratio).
 
-    Errors of single joints, such as those of their torque constants or of the centres of their
-    links, make them disagree. Each joint is left out once: the square of the change of the mass
-    over its variance is 1 in the mean if the rows say the truth (Birge 1932). Joints that tell
-    nearly nothing of the mass, or nearly all, are not compared.
+    Errors of single joints, such as errors of torque constants or of the centres of links, make the
+    joints disagree about the mass. Every joint is left out once. The squared change of the mass
+    over its variance has the mean 1 if the variances of the rows are right (Birge 1932). A joint
+    that contributes nearly nothing to the mass, or nearly everything, is not compared.
 
     Args:
         gram: normal matrix (p, p) of all joints and the prior.
         moment: right-hand side (p,).
-        parts: positions of the terms of each joint, its columns, torques and clusters.
+        parts: per joint, the positions of its terms, its columns, torques and clusters.
         variance: variance (nq,) of the rows of each joint.
     """
     mass, found = PARAMETERS_PER_BODY * len(parts), np.linalg.solve(gram, moment)
@@ -226,12 +226,12 @@ def _equations(
         clusters: partition of the rows.
         log: number of the log with the payload.
         threshold: smallest speed of a moving joint [rad/s].
-        body: parameters (10,) of the payload whose load friction is assumed.
+        body: parameters (10,) of the payload assumed for the load friction.
         variance: variance (nq,) of the rows of each joint.
 
     Returns:
-        The equations; and of each joint the positions of its terms, its columns, its torques and
-        the clusters of its rows.
+        The equations; and per joint the positions of its terms, its columns, its torques and the
+        clusters of its rows.
     """
     assert rows.regressor is not None
     nq = robot.nq

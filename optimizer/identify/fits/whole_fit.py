@@ -103,7 +103,7 @@ def _fit(
         arm = whole_arm_regression(robot, now, torque, clusters, options, bodies, change, speeds)
         held |= undetermined(robot, arm.block)
         equations = _weighted(robot, arm, clusters, options, held)
-        # the columns are large, and those of the next pass need the memory
+        # the columns are large, and the next pass needs the memory
         block = replace(arm.block, columns=np.zeros((0, len(arm.block.names))))
         del arm, now
         solution = _determined(robot, block, equations, options, held)
@@ -148,17 +148,17 @@ def _determined(
     options: IdentificationOptions,
     held: dict[Name, str],
 ) -> _Solution:
-    """The solution whose undetermined terms are held at the robot's own values.
+    """The solution with undetermined terms held at the robot's own values.
 
-    The least determined term of each joint is held until all others are determined. A term is not
-    held if the logs reject its own value, or know it better.
+    The least determined term of every joint is held until all other terms are determined. A term is
+    not held if the logs reject its own value, or determine it better than the own value is known.
 
     Args:
         robot: the robot with its own figures.
         block: names and bounds of the terms beside the links.
         equations: weighted normal equations.
         options: weight of the prior.
-        held: reasons of the held terms, to which further ones are added.
+        held: reasons of the held terms; the function adds further terms.
     """
     bodies = PARAMETERS_PER_BODY * robot.nq
     lower, (mean, precision) = _lower(block, bodies), _prior(robot, block, options)
@@ -186,15 +186,17 @@ def _determined(
             )
             held[worst] = doubts[worst].reason
     moved = inverse @ gram[:, ~free] * held_deviations(block, block.names, held)[~free[bodies:]]
-    # as squares, which are positive whatever the rounding errors of a log without noise are
+    # squares are positive in spite of the rounding errors of a log without noise
     root = np.hstack([inverse @ np.linalg.cholesky(precision), moved])
     by_prior = root @ root.T
     return _Solution(value, solution.replicates, by_prior, remarks)
 
 
 def _inverse(gram: Array, free: Mask) -> Array:
-    """Inverse (p, p) of the equations of the `free` unknowns, which have different units; 0 for the
-    others."""
+    """Inverse (p, p) of the equations of the `free` unknowns; 0 for all other unknowns.
+
+    The equations are scaled first, because the unknowns have different units.
+    """
     inverse, unit = np.zeros_like(gram), 1 / np.sqrt(np.diag(gram)[free])
     scale, of_free = np.outer(unit, unit), np.ix_(free, free)
     inverse[of_free] = scale * np.linalg.inv(gram[of_free] * scale)
@@ -230,7 +232,7 @@ def _lower(block: JointBlock, bodies: int) -> Array:
 
 
 def _free(block: JointBlock, bodies: int, held: Mapping[Name, str]) -> Mask:
-    """Unknowns (p,) that are not held."""
+    """Unknowns (p,) without held terms."""
     terms = [name not in held for name in block.names]
     return np.concatenate([np.ones(bodies, dtype=bool), np.array(terms, dtype=bool)])
 
@@ -238,7 +240,7 @@ def _free(block: JointBlock, bodies: int, held: Mapping[Name, str]) -> Mask:
 def _solution_of(
     gram: Array, moment: Array, mean: Array, free: Mask, links: int, lower: Array
 ) -> Array:
-    """Solution (p,) of the normal equations, in which only the `free` unknowns leave the `mean`."""
+    """Solution (p,) of the normal equations for the `free` unknowns, with the rest at `mean`."""
     value = mean.copy()
     rest = moment[free] - gram[np.ix_(free, ~free)] @ mean[~free]
     value[free] = solve_consistent(gram[np.ix_(free, free)], rest, links, lower[free])

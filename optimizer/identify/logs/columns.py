@@ -92,7 +92,7 @@ class Columns:
 
 
 def _logged(indices: Sequence[int]) -> list[int]:
-    """The columns of the joints that were logged."""
+    """The columns of the logged joints."""
     return [k for k in indices if k != NOT_LOGGED]
 
 
@@ -148,8 +148,7 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
 
 
 def other_positions(names: Sequence[str], columns: Columns) -> str | None:
-    """Name of a column with positions in another format, which is not read; None if there is
-    none."""
+    """Name of an unread column with positions in another format; None without such a column."""
     for log_format in FORMATS:
         for name in names:
             if (
@@ -240,7 +239,7 @@ def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
 def _columns_without_joint(
     log_format: LogFormat, names: Sequence[str]
 ) -> Iterator[tuple[ChannelName, tuple[int, ...]]]:
-    """Columns of channels that belong to no joint."""
+    """Columns of channels without a joint: power, wrench and payload."""
     if log_format.power and all(name in names for name in log_format.power):
         yield "power", tuple(names.index(name) for name in log_format.power)
     if log_format.wrench and all(name in names for name in log_format.wrench):
@@ -256,9 +255,9 @@ def mapped(names: Sequence[str], columns: ColumnMap, nq: int) -> Columns:
 
     Args:
         names: names of the columns.
-        columns: names or numbers of the columns of each channel: one for `time`, `nanoseconds` and
-            `power`, six for `wrench`, and one per joint for all others, or None for an effort that
-            was not logged.
+        columns: names or numbers of the columns by channel: one column for `time`, `nanoseconds`
+            and `power`, six columns for `wrench`, and one column per joint for all other channels;
+            None for an effort that was not logged.
         nq: number of joints.
 
     Raises:

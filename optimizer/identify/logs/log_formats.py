@@ -1,4 +1,4 @@
-"""Formats of logs: names of the columns of each channel."""
+"""Formats of logs: names of the columns by channel."""
 
 from __future__ import annotations
 

@@ -18,12 +18,12 @@ OTHER_CAUSES = (
     "order than the robot's, from base to flange (name the columns in `columns`), or `units`, "
     "`current_units`, `payload` or `gravity` are not as given."
 )
-"""Other causes of efforts that do not fit the arm."""
+"""Other causes of efforts in contradiction to the arm."""
 _NAMED: dict[ChannelName, EffortMeaning] = {"current": "current", "torque": "torque"}
 
 
 def check_measured(effort: Array) -> None:
-    """Check that some of the efforts (n, joints) change.
+    """Check the efforts (n, joints) for changes.
 
     Raises:
         EffortNotUsable: no effort ever changes.
@@ -77,7 +77,7 @@ def choose_meaning(
                 f"The columns of {group} have slopes of {found.meaning}, and are taken as such."
             )
         return found
-    # where the slopes contradict each other or every meaning, the name is no help
+    # if the slopes contradict each other or every meaning, the name is no help
     if group in _NAMED and all(slope is None for slope in found.slope.values()):
         remarks.append(
             f"The motion does not tell what the efforts are: they are taken as {group}, by their "

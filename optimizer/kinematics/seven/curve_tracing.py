@@ -3,8 +3,8 @@
 A step follows the tangent with the bend of the previous step; Newton's method then returns to the
 curve, in the plane across the step (E. Allgower and K. Georg, "Introduction to numerical
 continuation methods", 2003, chapters 2 and 6). A curve without a singularity is closed up to full
-turns, and is traced once around. All starts advance together. A start that another path passes is
-on the same curve, and its own path ends there.
+turns, and is traced once around. All starts advance together. If a path passes another start, both
+starts are on the same curve, and the path ends at the other start.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class _OpenPath:
         self.tangents = [-each for each in reversed(self.tangents)]
 
     def extend(self, other: _OpenPath) -> None:
-        """Appends a path whose start is the next point."""
+        """Appends a path; its start is the next point."""
         shift = nearest_turn(other.q[0], self.q[-1]) - other.q[0]
         if np.abs(other.q[0] + shift - self.q[-1]).max() < TRACING.same_point:
             self.q.pop()
@@ -115,15 +115,15 @@ def trace(chain: Chain, starts: Array, T: Array) -> list[TracedPath]:
 class _Tracing:
     """Paths of all starts, and their current states: position, tangent, bend and step.
 
-    `follows` (n,) is the start that a path has reached, -1 if none.
+    `follows` (n,) has the index of the start reached by a path, -1 for a path without one.
     """
 
     def __init__(self, chain: Chain, starts: Array, T: Array) -> None:
         self.chain, self.T, self.starts = chain, T, starts
         jacobian = chain.flange_and_jacobian(starts)[1]
         null = np.linalg.svd(jacobian)[2][:, -1]
-        # The sign of this determinant is constant along a curve, so that all starts on it go the
-        # same path.
+        # The sign of this determinant is constant along a curve, so all starts on a curve go in the
+        # same direction.
         side = np.linalg.slogdet(np.concatenate([jacobian, null[:, None]], axis=1))[0]
         self.first = null * side[:, None]
         self.cosines_and_sines = np.hstack([np.cos(starts), np.sin(starts)])
@@ -185,8 +185,8 @@ class _Tracing:
         """Tries a step of the paths in `rows`.
 
         Returns:
-            The new positions (n, nq) [rad], the tangents (n, nq) there, and a mask (n,) of the
-            steps that stay near the curve.
+            The new positions (n, nq) [rad] with their tangents (n, nq), and a mask (n,) of the
+            steps near the curve.
         """
         before, step = self.tangent[rows], self.step[rows]
         q = self.q[rows] + step[:, None] * (before + step[:, None] / 2 * self.bend[rows])
@@ -203,7 +203,7 @@ class _Tracing:
         )
 
     def advance(self, rows: Rows, q: Array, tangent: Array, cosine: Array) -> None:
-        """Takes the steps of the rows (n,) that are still active."""
+        """Takes the steps of the active rows among the rows (n,)."""
         active = self.alive[rows]
         rows, q, tangent, cosine = rows[active], q[active], tangent[active], cosine[active]
         length = np.linalg.norm(q - self.q[rows], axis=1)[:, None]
@@ -219,7 +219,7 @@ class _Tracing:
             self.paths[row].tangents.append(along)
 
     def passed(self, rows: Rows, q: Array, tangent: Array) -> NDArray[np.intp]:
-        """First start (n,) that each of rows (n,) passes on its step to q (n, nq), -1 if none."""
+        """First starts (n,) that rows (n,) pass on their steps to q (n, nq); -1 for no start."""
         here, chord = self.q[rows], q - self.q[rows]
         squares = (chord * chord).sum(axis=1)
         # The sum of the cosines of all joint distances selects the few starts within a step.
@@ -250,8 +250,8 @@ class _Tracing:
 
 
 def cycles(follows: list[int]) -> tuple[list[list[int]], list[list[int]]]:
-    """Cycles of a graph with edges from each node to follows[node], and the longest path to each
-    end (-1).
+    """Cycles of a graph with edges from nodes to follows[node], and the longest path to every end
+    (-1).
     """
     seen, loops = [-1] * len(follows), list[list[int]]()
     for start in range(len(follows)):

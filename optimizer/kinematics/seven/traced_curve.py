@@ -1,9 +1,9 @@
-"""Self-motion known by points along it: cubics between the points, which Newton's method projects
-onto the curve.
+"""Self-motion represented by points along the curve, with cubics between the points.
 
-A member is the configuration of the curve across from a point of a cubic: in the plane through this
-point perpendicular to a direction that changes linearly from one tangent to the next. So the
-parameter of a member follows from the cubic alone, without kinematics.
+Newton's method projects a point of a cubic onto the curve. It moves in the plane through this point
+perpendicular to a direction; the direction changes linearly from one tangent to the next. The
+result is a member of the curve. Its parameter is the parameter of the point on the cubic, without
+kinematics.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class TracedCurve:
         return self.clipped(self._nearest(q)[0])
 
     def passes(self, q: Array) -> bool:
-        """Whether a configuration (nq,) [rad] that holds the pose is a member."""
+        """Whether a configuration (nq,) [rad] of the pose is a member."""
         parameter, away = self._nearest(q)
         if away > SETTINGS.beside:
             return False
@@ -112,10 +112,11 @@ class TracedCurve:
         return float(min(found)[1])
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """Boxes that cover the curve, see `SelfMotion.boxes`; from the largest rate of each joint
-        between nodes.
+        """Boxes around the curve, see `SelfMotion.boxes`, from the largest joint rates between
+        nodes.
 
-        No bound rests on them alone: where curves may be missed, bounds cover all configurations.
+        No bound depends on these boxes alone: if curves may be missed, bounds cover all
+        configurations.
         """
         centre = self.at(np.asarray(parameter, dtype=float))
         if len(self.nodes) == 1:
@@ -160,7 +161,7 @@ class TracedCurve:
 
 
 def members(curves: Sequence[TracedCurve], parameters: Sequence[Array]) -> list[Array]:
-    """Configurations (n, nq) [rad] of each curve of one pose at its parameters (n,)."""
+    """Configurations (n, nq) [rad] of curves of one pose, at parameters (n,) per curve."""
     one, counts = curves[0], [len(at) for at in parameters]
     rows = np.repeat([curve.row for curve in curves], counts)
     k, share = one.stack.locate(np.concatenate(parameters), rows)
@@ -168,7 +169,7 @@ def members(curves: Sequence[TracedCurve], parameters: Sequence[Array]) -> list[
 
 
 def on_curve(one: TracedCurve, k: Rows, share: Array) -> Array:
-    """Members (n, nq) [rad] at shares (n,) of the segments that begin at the points k (n,).
+    """Members (n, nq) [rad] at shares (n,) of the segments after the points k (n,).
 
     `one` is any curve of the pose.
     """
