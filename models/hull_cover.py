@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from joulepath.models.robot import Array
 from joulepath.models.uploads.limits import Checkpoint, unwatched
@@ -96,12 +96,14 @@ def hull_around(
         radius: radius by which the hull is grown [m].
 
     Returns:
-        Chosen points, rounded, shape (n, 3) [m]. With n > `most`, the hull is too small.
+        Chosen points, rounded, shape (n, 3) [m]. With n > `most`, the hull is too small. Their hull
+        has a volume, even if the given points lie in a plane or on a line.
 
     Raises:
-        QhullError: the points lie in a plane.
+        ValueError: there are no points.
     """
-    points = points[ConvexHull(points).vertices]
+    points, hull = _with_volume(points)
+    points = points[hull.vertices]
     # Rounding moves a point, and with it the hull, by at most half of a cell's diagonal.
     reach = radius - np.sqrt(3) / 2 * HULL_FIT.digit
     chosen = _spanning(points)
@@ -113,8 +115,22 @@ def hull_around(
         if distance.max() <= reach:
             distance = from_hull(points, points[chosen])
         if distance.max() <= reach or len(chosen) > most:
-            return np.round(points[chosen] / HULL_FIT.digit) * HULL_FIT.digit + 0.0
+            rounded = np.round(points[chosen] / HULL_FIT.digit) * HULL_FIT.digit + 0.0
+            return _with_volume(rounded)[0]
         chosen.append(int(distance.argmax()))
+
+
+def _with_volume(points: Array) -> tuple[Array, ConvexHull]:
+    """Points (k, 3) [m] whose hull has a volume, and this hull. Flat points are moved by one digit
+    to both sides, along as few axes as necessary.
+    """
+    for axis in np.eye(3)[np.ptp(points, axis=0).argsort()]:
+        try:
+            return points, ConvexHull(points)
+        except QhullError:
+            shift = HULL_FIT.digit * axis
+            points = np.concatenate([points - shift, points + shift])
+    return points, ConvexHull(points)
 
 
 def _spanning(points: Array) -> list[int]:

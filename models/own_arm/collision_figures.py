@@ -52,12 +52,12 @@ def shape_figures(
     radius = _radius(description, upright)
     covers, guessed, figures = list[Cover](), list[bool](), {}
     for k, name in enumerate([BASE, *links]):
-        cover = shapes.cover(k)
+        cover = shapes.cover(k, name)
         guessed.append(not cover.capsules)
         if guessed[-1]:
             cover = Cover(_between_joints(upright, k, radius), [])
+            check_near(name, cover.capsules)
         rows = cover.capsules
-        check_near(name, rows)
         covers.append(cover)
         of_user = stated(description, rows, "m", _FRAME)
         note = f"From joint to joint. {_FRAME}"

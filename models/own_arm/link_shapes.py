@@ -123,9 +123,9 @@ class LinkShapes:
             )
         return cls(chain, upright, given, description.meshes or {}, checkpoint)
 
-    def cover(self, k: int) -> Cover:
-        """The capsules and hulls of all URDF links fixed to link k, 0 for the base. Raises
-        InvalidArm.
+    def cover(self, k: int, name: str) -> Cover:
+        """The capsules and hulls of all URDF links fixed to link k, called `name`; 0 for the base.
+        Raises InvalidArm.
         """
         links = self.chain.rigid[k]
         given = [row for link in links for row in self._given(k, link)]
@@ -133,6 +133,7 @@ class LinkShapes:
             each for link in links if link not in self.capsules for each in self._of_urdf(k, link)
         ]
         rows = given + [_row(T, solid.around) for T, solid in placed]
+        check_near(name, rows)
         is_given = any(link in self.capsules for link in links)
         return Cover(rows, [] if is_given else self._hulls(placed))
 
@@ -144,13 +145,10 @@ class LinkShapes:
         for T, solid in placed:
             parts = solid.parts(self.checkpoint) if len(placed) == 1 else [solid.corners]
             for part in parts:
-                try:
-                    points = hull_around(
-                        part @ T.rotation.T + T.translation, HULLS.points, self.checkpoint
-                    )
-                except (QhullError, ValueError):
-                    return []  # flat, or round and thus without corners
-                found.append(points.tolist())
+                if not len(part):
+                    return []  # round
+                corners = part @ T.rotation.T + T.translation
+                found.append(hull_around(corners, HULLS.points, self.checkpoint).tolist())
         fits = len(found) <= HULLS.count and all(len(each) <= HULLS.points for each in found)
         return found if fits else []
 

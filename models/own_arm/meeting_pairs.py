@@ -11,6 +11,7 @@ from itertools import combinations
 import coal
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull
 
 from joulepath.models.hull_cover import HULL_FIT
 from joulepath.models.own_arm.link_shapes import Cover
@@ -118,9 +119,11 @@ def _shapes(cover: Cover) -> list[tuple[coal.ShapeBase, pin.SE3]]:
         return [(coal.Capsule(row[6], _length(row)), _middle(row)) for row in cover.capsules]
     found = []
     for points in cover.hulls:
-        corners = coal.StdVec_Vec3s()
+        # SciPy's hull, because Coal's ends the process for points that it considers flat
+        corners, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
         corners.extend(np.array(points))
-        hull = coal.Convex.convexHull(corners, False, "")
+        faces.extend(coal.Triangle(*face) for face in ConvexHull(points).simplices.tolist())
+        hull = coal.Convex(corners, faces)
         hull.setSweptSphereRadius(HULL_FIT.radius)
         found.append((hull, pin.SE3.Identity()))
     return found

@@ -9,7 +9,8 @@ from collections import Counter
 import coal
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull, QhullError
+from pinocchio.rpy import rpyToMatrix
+from scipy.spatial import ConvexHull
 
 from joulepath.models.capsule_cover import not_held
 from joulepath.models.fit_hulls import fitted_hulls
@@ -90,9 +91,20 @@ def test_a_fit_ends_where_too_many_points_are_needed() -> None:
     assert len(hull_around(ball, most=40)) == 41
 
 
-def test_flat_points_have_no_hull() -> None:
-    with pytest.raises(QhullError):
-        hull_around(np.random.default_rng(0).normal(size=(20, 3)) * [1, 1, 0])
+@pytest.mark.parametrize("extent", [(1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 1, 1e-5), (1, 1e-5, 1e-5)])
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, 0.9, -0.3)])
+def test_flat_points_have_a_hull_with_a_volume(
+    extent: tuple[float, ...], turn: tuple[float, float, float]
+) -> None:
+    """As parts of a sheet, a wire and the like, also if only their rounding makes them flat."""
+    points = np.random.default_rng(0).uniform(-0.1, 0.1, (20, 3)) * extent @ rpyToMatrix(*turn).T
+    chosen = hull_around(points)
+    assert ConvexHull(chosen).volume > 0
+    assert from_hull(points, chosen).max() <= HULL_FIT.radius
+    # both sides of the rounded points
+    reach = np.sqrt(3) * 1.5 * HULL_FIT.digit
+    near = [np.linalg.norm(points - each, axis=1).min() for each in chosen]
+    assert max(near) <= reach
 
 
 LINKS = [(name, link) for name in FOUND for link in range(1, 7)]

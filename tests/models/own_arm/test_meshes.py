@@ -201,6 +201,19 @@ def test_hulls_hold_bodies_of_any_form(seed: int) -> None:
     assert hulls and not len(not_held(triangles, hulls))
 
 
+@pytest.mark.parametrize("thickness", [0.0, 0.04])
+def test_a_sheet_has_a_hull_and_is_compared(thickness: float) -> None:
+    """A sheet [mm] thinner than the last digit of its hull's points."""
+    sheet = trimesh.creation.box((180.0, 60.0, 40.0))
+    sheet.vertices[:, 2] *= thickness / 40.0
+    text = meshed('scale="0.001 0.001 0.001"').replace("link.obj", "link.stl")
+    made = robot(changed(urdf=text, meshes={"link.stl": stl(sheet)}))
+    hulls = [each for each in made.hulls if each.link == 1]
+    triangles = in_upper_arm(sheet.triangles.reshape(-1, 3) / 1000).reshape(-1, 3, 3)
+    assert len(hulls) == 1 and not len(not_held(triangles, hulls))
+    assert not made.never_in_collision
+
+
 def test_links_whose_hulls_are_apart_are_compared() -> None:
     """The capsule around a wide plate beneath the arm meets the forearm everywhere."""
     plate = '<collision><geometry><box size="1.5 1.5 0.02"/></geometry></collision>'
