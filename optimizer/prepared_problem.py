@@ -62,9 +62,9 @@ class ArmModels(Plant):
 
 
 class ModelsOfArms:
-    """Models of several arms, such as those of a cycle with and without its payload.
+    """Models of several arms, such as the arms of a cycle with and without its payload.
 
-    Arms are told apart by identity.
+    Arms are distinguished by identity.
     """
 
     def __init__(self) -> None:

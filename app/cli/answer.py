@@ -123,7 +123,7 @@ def compile_kernel_of(robot_name: str) -> None:
         with terminal.progress("Equations of motion (compiled once per robot)"):
             compile_kernel(robot_named(robot_name), settings=settings)
     except (UnknownRobot, StoreUnavailable):
-        return  # the answer says so
+        return  # the answer reports this error
     except CompilerHangs as error:
         click.echo(
             f"Without a compiled kernel, the computation takes longer: {error}. Name another one "

@@ -166,13 +166,13 @@ class TooManyRobots(ServiceError):
 
 
 class NoMeshes(ServiceError):
-    """The meshes of this robot are not installed, as `has_meshes` of `GET /robots/{name}` says."""
+    """The meshes of this robot are not installed: `has_meshes` of `GET /robots/{name}` is false."""
 
     status = 404
     title = "No meshes"
     remedy = (
-        "Those of ur3e and ur5e come with `pip install 'joulepath[meshes]'`. The capsules of `GET "
-        "/robots/{name}` show every robot."
+        "The meshes of ur3e and ur5e come with `pip install 'joulepath[meshes]'`. The capsules of "
+        "`GET /robots/{name}` show every robot."
     )
     detail = "No meshes of this robot are installed: the extra `meshes` has those of ur3e and ur5e."
 

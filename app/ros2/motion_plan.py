@@ -28,7 +28,7 @@ REQUEST = "motion_plan_request"
 SUCCESS = 1
 """Code of a plan in moveit_msgs/msg/MoveItErrorCodes."""
 PLANNING_FAILED = -1
-"""Code of all other errors than those in `ERROR_CODES`."""
+"""Code of all errors outside of `ERROR_CODES`."""
 ERROR_CODES: dict[type[BaseException], int] = {
     Stopped: -7,
     DeadlineExceeded: -6,

@@ -124,7 +124,7 @@ def by_field(
             if (name in value if isinstance(value, dict) else hasattr(value, name))
         ]
         if not present and isinstance(value, dict):
-            # a name that is nearly one of them: the member that has the right name says so
+            # a misspelt name selects the member with the most similar name, for its error
             meant = (
                 nearest(str(given), names, TYPOS.nearly_same)
                 for given in islice(value, TYPOS.compared)

@@ -112,7 +112,7 @@ def family_bound(
         starts: start configurations, shape (s, nq) [rad].
         limits: limits on the effort; less effort gives a weaker bound.
         half: half sides of boxes around the starts, shape (s, nq) [rad]; None for points.
-        given: whether the starts have no other full turns than those they are given with.
+        given: whether the full turns of the starts are fixed.
     """
     return _GoalBoxes(PoseFamily(prepared, pose, given), starts, half, limits).least_bound()
 
@@ -204,12 +204,12 @@ class _GoalBoxes(BoxSubdivision[_StartBoxes]):
 
 @dataclass(frozen=True)
 class PoseFamily:
-    """The configurations that reach a pose in any orientation that it allows."""
+    """The configurations of a pose in all of its allowed orientations."""
 
     prepared: PreparedProblem
     pose: ConeOrientedPose
     given: bool
-    """Whether the starts have no other full turns than those they are given with."""
+    """Whether the full turns of the starts are fixed."""
 
     @cached_property
     def _boxes(self) -> PoseBoxes:

@@ -84,7 +84,7 @@ def solve_from_stopping(search: CycleSearch, stopping: CycleSolution) -> Stoppin
 def moves_from_stopping(
     search: CycleSearch, rested: StoppingCycle, better: bool = True
 ) -> tuple[list[Solution], dict[int, Wait]]:
-    """Solutions and waits of the stopping cycle, as those of the passing cycle.
+    """Solutions and waits of the stopping cycle, as solutions and waits of the passing cycle.
 
     Args:
         search: search of the passing cycle.

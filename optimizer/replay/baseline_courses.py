@@ -111,10 +111,10 @@ def planned_baselines(
 ) -> list[PlannedBaseline]:
     """The baselines of an answer.
 
-    An answer does not contain the goal configuration of its baselines. It is found as the
-    configuration that reproduces the reported durations and energies. Baselines that cannot be
-    found, such as those along a tool path, are left out, and so are baselines without a saving or
-    of another duration than the answer without a wait.
+    An answer does not contain the goal configuration of its baselines. The function finds the
+    configuration that reproduces the reported durations and energies. It leaves out baselines
+    without such a configuration, such as baselines along a tool path, baselines without a saving,
+    and baselines of another duration than the answer without a wait.
 
     Args:
         arm: the arm.

@@ -61,16 +61,16 @@ class SharpeningSettings:
     dense_points: int = 40
     """Number of control points of the last motion."""
     duration_ratios: tuple[float, ...] = (0.93, 0.95, 0.97, 0.99, 1.0, 1.02)
-    """Fixed durations, in multiples of the one found, for which a motion on an isolated bus is
-    solved in the middle space too.
+    """Fixed durations, in multiples of the duration found, for which a motion on an isolated bus is
+    solved in the middle space, too.
 
-    The optimum of a free duration may be in another basin than those of near durations, up to 1.7 %
-    better.
+    Solves with near durations may find another basin than the solve with a free duration, up to
+    1.7 % better.
     """
     progress: float = 1e-3
-    """Relative decrease of the cost promised by a further step at least."""
+    """Smallest predicted relative decrease of the cost for a further step."""
     last_progress: float = 2e-4
-    """Relative decrease of the cost promised by a further step of the last solves at least."""
+    """Smallest predicted relative decrease of the cost for a further step of the last solves."""
     coarse_ratio: float = 1.35
     """Largest ratio of a first motion's energy to the least if it is solved in the middle space."""
     most_coarse: int = 6

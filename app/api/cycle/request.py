@@ -92,8 +92,8 @@ class StopRequest(Request):
         default=None,
     )
     limits: MoveLimits = described(
-        "Limits of the moves into this stop, its line and its path included, where they are "
-        "tighter than those of the request.",
+        "Limits of the moves into this stop, its line and its path included. A limit has an effect "
+        "if it is tighter than the limit of the request.",
         None,
         {"acceleration": 5.0, "tcp_speed": 0.5},
         default=MoveLimits(),

@@ -88,9 +88,10 @@ class IdentifyRequest(Request):
         le=1e4,
     )
     inertials: Literal["automatic", "keep", "refit"] = described(
-        "`keep`: the robot's own. `refit`: they are found, too, as those of real bodies near the "
-        "robot's own. `automatic`: they are refitted to torques that were measured behind the "
-        "gears, which identify nothing else, and kept otherwise.",
+        "`keep`: the robot's own inertials. `refit`: the inertials are identified, too, as "
+        "physically possible inertials near the robot's own. `automatic`: they are refitted to "
+        "torques measured behind the gears, because such torques identify only the links, and "
+        "kept otherwise.",
         None,
         "automatic",
         default="automatic",

@@ -57,8 +57,8 @@ def assumptions(
         request: a request with figures and tool.
         costs: the numbers for costs; None if nothing is priced.
         robot: the robot.
-        masses: what the flange carries in the motions [kg].
-        payload_from: who says so.
+        masses: masses of the payloads in the motions [kg].
+        payload_from: source of the masses.
         period: time from one start to the next [s]; None: one directly after the other.
     """
     priced = () if costs is None else _of_costs(costs, period)

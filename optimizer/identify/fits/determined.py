@@ -44,7 +44,7 @@ class DeterminedSettings:
 DETERMINED = DeterminedSettings()
 NOT_MOVING = "The joint hardly moves in these logs."
 UNCERTAIN = "Its standard deviation is {:.0%} of its value."
-NOT_TOLD = "The logs do not tell it from other figures."
+NOT_TOLD = "The logs do not separate it from other figures."
 IMPOSSIBLE = "The fit puts it at {:.3g}, which no drive has."
 LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
 AT_BOUND = "The fit puts it at its bound, {:g}."

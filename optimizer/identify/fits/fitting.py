@@ -40,7 +40,7 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 LINK_MASS_SCALE = "link_mass_scale"
 """Name of the factor on the masses of all links."""
-HARDLY_KNOWN = "The logs hardly tell it from the robot's own."
+HARDLY_KNOWN = "The logs hardly determine it better than the range of the robot's own value."
 
 
 @dataclass(frozen=True)

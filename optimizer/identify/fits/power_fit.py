@@ -1,13 +1,13 @@
 """Idle power, copper loss and inverter loss from the power of the arm's bus.
 
 Idle power, copper, inverters and friction have similar effects on the power of slow moves, so a
-short log does not tell them apart. Each figure therefore has a Gaussian prior around the robot's
-own value, as wide as the range of the figure before any log. With longer logs, the data outweigh
-the prior (maximum a posteriori).
+short log does not separate these figures. Every figure therefore has a Gaussian prior around the
+robot's own value, as wide as the range of the figure before any log. With longer logs, the data
+outweigh the prior (maximum a posteriori).
 
 Without torques, the power also determines Coulomb, viscous and load friction, offsets, rotors, and
-one factor on the masses of all links. The power that lifts the links is regained when they sink, so
-wrong masses would make the predictions of all lifting moves too high, or too low.
+one factor on the masses of all links. Lifting the links costs power, and lowering them returns it,
+so wrong masses would make the predictions of all lifting moves too high, or too low.
 """
 
 from __future__ import annotations

@@ -31,23 +31,24 @@ class LogTooLarge(JoulepathError):
 
 @dataclass(eq=False)
 class EffortNotUsable(JoulepathError):
-    """The efforts of a log say nothing of the arm, because they are without gravity (`meaning` is
-    `external`), or it is not clear what they are (null)."""
+    """The efforts of a log identify no figures of the arm, because they exclude gravity (`meaning`
+    is `external`), or because their meaning is unknown (null)."""
 
     title = "Logged efforts not usable"
     remedy = (
         "Log motor currents: the ROS 2 driver of Universal Robots has the option "
-        "`actual_current_as_torque`, which must be off. If you know what they are, say so with "
-        "`effort`."
+        "`actual_current_as_torque`, which must be off. If you know the meaning of the efforts, "
+        "state it in `effort`."
     )
 
     message: Annotated[str, Internal]
-    """What is wrong with the efforts, and what to log instead."""
+    """The fault of the efforts, and the channels to log instead."""
     meaning: Literal["external"] | None
-    """`external`: torques from outside, without gravity. Null: it is not clear."""
+    """`external`: torques from outside, without gravity. Null: unknown."""
     slope: Annotated[dict[str, float | None], Unit("1/A or 1")]
-    """Slope of the effort against the torque of the rigid model, by the name of a joint. About 1 /
-    torque constant: current; 1: torque; 0: without gravity. Null: the motion does not tell."""
+    """Slope of the effort over the torque of the rigid model, by the name of a joint. About 1 /
+    torque constant: current; 1: torque; 0: torque without gravity. Null: the motion does not
+    determine the slope."""
 
     def __str__(self) -> str:
         return self.message

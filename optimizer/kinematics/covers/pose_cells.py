@@ -1,17 +1,19 @@
-"""Boxes of joint positions that hold all configurations of the flange poses in a cell.
+"""Boxes of joint positions around all configurations of the flange poses in a cell.
 
 A cell is a set of poses around its middle: a point of the flange is anywhere in a cylinder about
-the first axis, and every direction of the tool within an angle. The point is the one that the
-first joints alone place: the last axis' origin of an arm of Universal Robots' form
-(`turned_pose_boxes`), or the meeting point of the wrist's axes.
+the first axis, and every direction of the tool is within an angle `h` of its direction in the
+middle pose. The first joints alone determine the position of this point: it is the last axis'
+origin of an arm of Universal Robots' form (`turned_pose_boxes`), or the meeting point of the
+wrist's axes.
 
-**Spherical wrist.** Of a wrist in a cylinder of radius `across` and half height `above`, the first
-three joints follow as those of `turned_pose_boxes`: the first axis sees the wrist, and two links
-reach it in the arm's plane. The forearm then turns by no more than the first joint and the second
-link together, and the flange by `h`. Seen from either of them, the axis of the other one is within
-e of its direction for the middles, e being the sum. So the angle between both axes, which is that
-of the fifth joint, is within e; and each of them, at an angle γ from the other, changes its azimuth
-about it by at most asin(sin e / sin γ): these are the fourth joint and the sixth.
+**Spherical wrist.** Let the wrist be in a cylinder of radius `across` and half height `above`. The
+boxes of the first three joints follow as in `turned_pose_boxes`: the first axis sees the wrist,
+and two links reach it in the arm's plane. The forearm then turns by no more than the first joint
+and the second link together, and the flange by `h`; let e be the sum of both angles. In the frame
+of the forearm, the axis of the flange is within e of its direction in the middle pose, and vice
+versa. The angle γ between the axes of forearm and flange, the fifth joint, therefore changes by at
+most e. The azimuth of one axis about the other axis changes by at most asin(sin e / sin γ); these
+azimuths are the fourth and the sixth joint.
 """
 
 from __future__ import annotations

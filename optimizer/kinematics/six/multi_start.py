@@ -112,7 +112,7 @@ class MultiStart:
         return q, [NumberedBranch(number) for number in range(1, len(q) + 1)]
 
     def configurations(self, T: Array) -> Array:
-        """Configurations (n, 6) [rad] of the flange pose T (4, 4), as those of `solve`."""
+        """Configurations (n, 6) [rad] of the flange pose T (4, 4), as returned by `solve`."""
         return self._found(np.ascontiguousarray(T, dtype=float).tobytes())
 
     def closed_form(self, T: Array) -> Array | None:
