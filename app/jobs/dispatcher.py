@@ -222,7 +222,7 @@ class Dispatcher:
             + self._more_known
             - len(self._held)
         )
-        if want <= 0 or self._draining:
+        if want <= 0 or not self._executor.slots or self._draining:
             return
         now = self._now()
         if self._more or await self._store.read(partial(leases.is_due, now=now)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from functools import partial
 from typing import Any
 
@@ -22,6 +23,9 @@ from joulepath.app.tasks.job_request import JobRequestTask, JobResult
 from joulepath.app.tasks.request_key import VERSION
 from joulepath.optimizer.exceptions import OutsideLimits
 from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, until
+
+TURN = 0.3
+"""Longer than a dispatcher takes to look for a new request [s]."""
 
 
 def computed(task: JobRequestTask, status: str = "optimal") -> TaskResult:
@@ -98,6 +102,19 @@ async def test_one_is_computed_and_the_others_get_its_answer(
     await done(service, asks(), owner="somebody")
     await done(service, asks(version="another"), NewRequest("optimize", BODY, 10.0))
     assert len(service.work.begun) == 5
+
+
+async def test_a_service_without_workers_takes_nothing(store: Store, service: Service) -> None:
+    """As one whose cluster is lost just after a request with a known answer."""
+    service.work.free.set()
+    service.dispatcher.start()
+    await done(service, asks())
+    await done(service, asks())
+    service.work.slots = 0
+    job_id = await send(service, asks("b"))
+    await asyncio.sleep(TURN)
+    assert [each.state for each in await requests(store, job_id)] == ["waiting"]
+    assert service.work.begun == [0]
 
 
 async def test_more_time_may_find_a_better_answer(service: Service) -> None:
