@@ -184,6 +184,7 @@ def test_the_table_of_the_front(server: Server) -> None:
     assert [(goal, status) for _, _, goal, status in rows] == [
         (p["goal"], p["status"]) for p in answer["points"]
     ]
-    assert [float(energy) for _, energy, _, _ in rows] == pytest.approx(
-        [p["energy"] for p in answer["points"]], rel=ENERGY
-    )
+    for column, field in enumerate(("duration", "energy")):
+        assert [float(row[column]) for row in rows] == pytest.approx(
+            [p[field] for p in answer["points"]], rel=ENERGY
+        )
