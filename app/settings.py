@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib.util import find_spec
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
@@ -24,6 +25,7 @@ _NAMES = {
     ),
 }
 """Settings with lists of names: the form of a name, and the end of the error message."""
+_PASSWORD = re.compile(r"(?<=//).*(?=@)")
 _SCHEDULER = re.compile(r"(tcp|tls)://[A-Za-z0-9._:\[\]-]+:[0-9]{1,5}")
 LONGEST_DEADLINE = 3600.0
 """Longest deadline [s] of all settings."""
@@ -273,6 +275,22 @@ class Settings(BaseSettings):
                 raise ValueError("a cluster needs Dask: install `joulepath[cluster]`")
         return address
 
+    @field_validator("database_url")
+    @classmethod
+    def _database(cls, given: str) -> str:
+        from sqlalchemy import make_url  # the default needs no check
+        from sqlalchemy.exc import ArgumentError
+
+        with suppress(ArgumentError, ValueError):
+            url = make_url(given)
+            is_file = url.drivername == "sqlite" and not url.host
+            if url.database and (is_file or url.get_backend_name() == "postgresql"):
+                return given
+        raise ValueError(
+            "this is no database of the service: give `sqlite:////folder/file` (of an absolute "
+            "path) or `postgresql://user:password@host/name`"
+        )
+
     @field_validator("robots")
     @classmethod
     def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -302,7 +320,6 @@ def read_settings(given: Mapping[str, Any] | None = None) -> Settings:
         for each in error.errors():
             name = str(each["loc"][0])
             variable = name if name.startswith(prefix) else f"{prefix}{name.upper()}"
-            lines.append(
-                f"{variable}={each['input']!r}: {each['msg'].removeprefix('Value error, ')}"
-            )
+            value = _PASSWORD.sub("***", repr(each["input"]))
+            lines.append(f"{variable}={value}: {each['msg'].removeprefix('Value error, ')}")
         raise WrongSettings("\n".join(lines)) from error

@@ -205,8 +205,8 @@ def _table() -> str:
         found |= {
             each.name: each.figures for each in in_store(lambda store: store.read(stored.all_of))
         }
-    except StoreUnavailable:
-        click.echo("The database does not answer: robots that were added are not listed.", err=True)
+    except StoreUnavailable as error:
+        click.echo(f"Robots that were added are not listed. {error}", err=True)
     rows = [head]
     for name, figures in found.items():
         letters = (" ".join(sorted(trust_letters(figures[part]))) for part in ENERGY_SECTIONS)

@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import click
+
 if TYPE_CHECKING:
     from joulepath.app.engine.result import TaskResult
     from joulepath.app.engine.task import Task
@@ -47,12 +49,17 @@ def robot_named(name: str) -> Robot:
 
 
 def in_store(work: Callable[[Store], Any]) -> Any:
-    """The result of a coroutine on the database, or its error."""
-    from joulepath.app.settings import Settings
+    """The result of a coroutine on the database, or its error; UsageError for wrong settings."""
+    from joulepath.app.settings import WrongSettings, read_settings
     from joulepath.app.store.store import Store
 
+    try:
+        url = read_settings().database_url
+    except WrongSettings as error:
+        raise click.UsageError(str(error)) from None
+
     async def run() -> Any:
-        store = Store(Settings().database_url)
+        store = Store(url)
         try:
             return await work(store)
         finally:

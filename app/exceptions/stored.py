@@ -26,8 +26,8 @@ _FAULTS: dict[StoreFault, str] = {
     "damaged": "The database cannot be read: its file is damaged or no database, or its tables are "
     "not those of the service. The operator must restore a backup, or move the database away, "
     "after which the service begins an empty one.",
-    "unreachable": "The database does not answer: try again later, or ask the operator of the "
-    "service.",
+    "unreachable": "The database does not answer, or its file cannot be opened: try again later, "
+    "or ask the operator of the service, whose log says why.",
 }
 
 
@@ -46,7 +46,8 @@ class StoreUnavailable(ServiceError):
     """`full`: no space is left. `read-only`: it takes no changes. `locked`: another process locks
     it. `deleted`: its file was deleted or replaced while the service ran. `other-version`: another
     version of the service made its tables. `damaged`: its file is damaged or no database, or its
-    tables are not those of the service. `unreachable`: it does not answer."""
+    tables are not those of the service. `unreachable`: it does not answer, or its file cannot be
+    opened."""
 
     def __str__(self) -> str:
         return _FAULTS[self.cause]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ _SQLITE: dict[int, StoreFault] = {
     26: "damaged",
 }
 _SQLITE_IO_ERROR = 10
+_FILES: dict[int, StoreFault] = {errno.ENOSPC: "full", errno.EROFS: "read-only"}
 # https://www.postgresql.org/docs/current/errcodes-appendix.html
 _POSTGRESQL: dict[str, StoreFault] = {
     "25006": "read-only",
@@ -73,6 +75,8 @@ def fault_of(error: Exception, file: Path | None) -> StoreFault:
         return "other-version"
     if isinstance(error, OtherTables):
         return "damaged"
+    if isinstance(error, OSError) and error.errno in _FILES:
+        return _FILES[error.errno]
     if not isinstance(error, DBAPIError):
         return "unreachable"
     code = getattr(error.orig, "sqlite_errorcode", None)

@@ -40,3 +40,40 @@ def test_every_wrong_variable_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         "JOULEPATH_WORKERS='0': "
     )
     assert robots.endswith(f"'r2d2': use some of {', '.join(robot_names())}")
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "mysql://cell:secret@host/name",
+        "postgres://cell:secret@host/name",
+        "postgresql://cell:secret@host:port/name",
+        "postgresql://cell:secret@host",
+        "sqlite://joulepath.db",
+        "sqlite://",
+        "/var/lib/joulepath.db",
+    ],
+)
+def test_an_unusable_database_stops_the_start_and_no_password_is_told(
+    monkeypatch: pytest.MonkeyPatch, url: str
+) -> None:
+    monkeypatch.setenv("JOULEPATH_DATABASE_URL", url)
+    with pytest.raises(WrongSettings, match="give `sqlite:////folder/file`") as found:
+        read_settings()
+    assert str(found.value).startswith("JOULEPATH_DATABASE_URL=")
+    assert "secret" not in str(found.value)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "sqlite:////var/lib/joulepath.db",
+        "sqlite:///joulepath.db",
+        "sqlite:///file:/var/lib/joulepath.db?mode=ro&uri=true",
+        "postgresql://cell:secret@host:5433/name",
+        "postgresql+pg8000://cell@[::1]/name",
+    ],
+)
+def test_databases_of_the_service(monkeypatch: pytest.MonkeyPatch, url: str) -> None:
+    monkeypatch.setenv("JOULEPATH_DATABASE_URL", url)
+    assert read_settings().database_url == url

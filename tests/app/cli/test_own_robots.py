@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from joulepath.app.schemas.examples.own_arm import URDF
 from tests.app.cli.console import Here, run
 from tests.app.requests import PATIENT
@@ -64,3 +66,16 @@ def test_what_makes_no_robot(here: Here, tmp_path: Path) -> None:
         [],
         "There is no robot of that name: none has been added.",
     )
+
+
+def test_what_is_wrong_with_the_database_is_told(
+    here: Here, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("JOULEPATH_DATABASE_URL", "mysql://cell:secret@host/name")
+    code, _, error = here.run("robots", "remove", "mine")
+    assert code == 2 and b"sqlite:////folder/file" in error and b"secret" not in error
+    (tmp_path / "joulepath.db").write_bytes(b"something else" * 100)
+    monkeypatch.setenv("JOULEPATH_DATABASE_URL", f"sqlite:///{tmp_path}/joulepath.db")
+    code, listed, error = here.run("robots")
+    assert code == 0 and b"ur5e" in listed
+    assert b"not listed" in error and b"damaged" in error

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import hashlib
 import json
 import os
@@ -186,6 +187,11 @@ def test_a_file_that_is_no_database_is_told_as_damage(tmp_path: Path) -> None:
     with pytest.raises(DBAPIError) as caught:
         migrate(create_database_engine(f"sqlite:///{tmp_path}/joulepath.db"))
     assert fault_of(caught.value, None) == "damaged"
+
+
+@pytest.mark.parametrize(("number", "told"), [(errno.ENOSPC, "full"), (errno.EROFS, "read-only")])
+def test_a_folder_that_cannot_be_made_has_a_cause(number: int, told: str) -> None:
+    assert fault_of(OSError(number, "of the folder"), None) == told
 
 
 def test_several_processes_may_migrate_at_once(url: str) -> None:
