@@ -246,7 +246,8 @@ def is_coarse(joint: Element) -> bool:
 def _exact_angle(text: str) -> float:
     """The multiple of 15° that a rounded figure stands for, or its value [rad]."""
     value = float(text)
-    multiple = round(value / (math.pi / 12)) * (math.pi / 12)
+    # of the largest floats, the quotient is infinite
+    multiple = float(np.rint(value / (math.pi / 12))) * (math.pi / 12)
     exponent = Decimal(text).as_tuple().exponent
     decimals = -exponent if isinstance(exponent, int) else 0
     unit = 10.0**-decimals if decimals >= CHAIN.least_decimals else 0.0
