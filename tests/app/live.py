@@ -178,14 +178,18 @@ def free_port() -> int:
 
 
 @contextmanager
-def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Iterator[Server]:
+def serving(
+    warm: bool = True, recorded: bool = False, by_command: bool = False, **settings: Any
+) -> Iterator[Server]:
     """A server with these settings, by default waited for until it is warm and with an empty
     database of its own.
 
     With `recorded`, its searches are recorded (see `tests.app.recorded`): it has no worker
-    processes.
+    processes. With `by_command`, `joulepath serve` starts it, else `python -m joulepath.app`.
     """
-    module = "tests.app.recorded" if recorded else "joulepath.app"
+    program = ("tests.app.recorded",) if recorded else ("joulepath.app",)
+    if by_command:
+        program = ("joulepath.app.cli", "serve")
     port = free_port()
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "log")
@@ -197,7 +201,7 @@ def serving(warm: bool = True, recorded: bool = False, **settings: Any) -> Itera
         environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "PORT": str(port)}
         with log.open("ab") as appended:
-            process = Fork((module,), os.environ | environment, (0, 1, appended.fileno()))
+            process = Fork(program, os.environ | environment, (0, 1, appended.fileno()))
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:
             if warm:

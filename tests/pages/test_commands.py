@@ -29,6 +29,7 @@ from tests.app.documents import open_document
 from tests.pages.blocks import DOCS, ROOT, SERVICE, blocks_of
 
 PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md"]
+NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 SHELL = ("", "bash", "text", "console")
 """Languages of blocks that may have commands, also blocks that no test runs."""
 OPERATORS = "|;&()<>\n"
@@ -122,11 +123,20 @@ def test_the_service_has_what_curl_asks_for(page: Path) -> None:
             check_body(path, method, json.loads(given.data))
 
 
+def python_of(page: Path) -> Iterator[str]:
+    """The Python of a page or a notebook."""
+    if page.suffix == ".md":
+        yield from (block.code for block in blocks_of(page) if block.language == "python")
+    else:
+        cells = json.loads(page.read_text("utf-8"))["cells"]
+        yield from ("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+
+
 def names_of(page: Path) -> Iterator[tuple[str, str]]:
     """Module and name of all that the Python of a page takes from joulepath."""
-    for block in blocks_of(page):
-        tree = ast.parse(block.code.replace("…", "...")) if block.language == "python" else None
-        for node in ast.walk(tree) if tree else ():
+    for code in python_of(page):
+        tree = ast.parse(code.replace("…", "..."))
+        for node in ast.walk(tree):
             match node:
                 case ast.ImportFrom(module=str(module)) if module.split(".")[0] == "joulepath":
                     yield from ((module, each.name) for each in node.names)
@@ -134,7 +144,7 @@ def names_of(page: Path) -> Iterator[tuple[str, str]]:
                     yield "joulepath", name
 
 
-@by_page(argvalues=[page for page in PAGES if any(names_of(page))])
+@by_page(argvalues=[page for page in (*PAGES, *NOTEBOOKS) if any(names_of(page))])
 def test_the_library_has_the_names(page: Path) -> None:
     for module, name in names_of(page):
         assert hasattr(import_module(module), name), f"{module} has no {name}"

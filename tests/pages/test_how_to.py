@@ -25,7 +25,8 @@ LOGS = {"monday.csv": (0, 6), "friday.csv": (1, 3), "log.csv": (0, 6)}
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[str]:
-    with serving(workers=1, deadline_grace=GRACE) as server:
+    # as the pages start it
+    with serving(workers=1, deadline_grace=GRACE, by_command=True) as server:
         yield server.url
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
@@ -12,9 +14,10 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
+from joulepath.app.cli.main import main
 from joulepath.app.schemas.examples.files import body_examples
 from joulepath.app.settings import Settings
-from tests.app.cli.console import CSV, CSV_OPTIONS, Here, request, run
+from tests.app.cli.console import CSV, CSV_OPTIONS, ROOT, Here, request, run
 from tests.app.requests import HOME, NEAR, PATIENT
 
 
@@ -229,6 +232,12 @@ def test_serve_takes_host_and_port(here: Here, monkeypatch: pytest.MonkeyPatch) 
     assert here.run("serve")[0] == 0
     assert here.run("serve", "--host", "127.0.0.1", "--port", "8080")[0] == 0
     assert served == [("203.0.113.7", 1), ("127.0.0.1", 8080)]
+
+
+def test_an_installation_has_the_command() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    (command,) = project["scripts"].items()
+    assert EntryPoint(*command, group="console_scripts").load() is main
 
 
 def test_a_port_beyond_the_range_is_wrong_usage(here: Here) -> None:
