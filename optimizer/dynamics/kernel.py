@@ -11,6 +11,7 @@ library exists, or without a compiler, CasADi's virtual machine evaluates the sa
 from __future__ import annotations
 
 import logging
+import os
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -159,9 +160,9 @@ class _Loader:
             return self._compiled or self._load()
 
     def _load(self) -> Kernel:
-        if self._interpreted is not None and not any(
-            seal_path(path).exists() for path in self.paths
-        ):
+        # `Path.exists` raises an error in a folder that this user may not search.
+        is_sealed = any(os.access(seal_path(path), os.F_OK) for path in self.paths)
+        if self._interpreted is not None and not is_sealed:
             return self._interpreted
         path = next(filter(is_intact, self.paths), None)
         if path is not None:

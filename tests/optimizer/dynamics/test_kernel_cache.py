@@ -24,6 +24,7 @@ import pytest
 import joulepath
 from joulepath.models.registry import robot_names
 from joulepath.models.robot import Robot
+from joulepath.optimizer.dynamics import kernel
 from joulepath.optimizer.dynamics.kernel import Kernel, kernel_for
 from joulepath.optimizer.dynamics.kernel_cache import (
     SOURCE_MODULES,
@@ -331,3 +332,13 @@ def test_trouble_while_compiling_is_logged_and_survived(
     found = kernel_for(workshop.robot)
     assert not found.compiled
     assert_right(found)
+
+
+def test_a_folder_that_cannot_be_looked_into_is_no_failure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As another user's home; here by a name that is too long, which stops root as well."""
+    monkeypatch.setenv("JOULEPATH_CACHE_DIR", f"/{'x' * 300}")
+    loader = kernel._Loader(ROBOT)
+    loader._interpreted = kernel_for(ROBOT)
+    assert loader.get() is loader._interpreted
