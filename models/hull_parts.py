@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -26,6 +26,8 @@ def nowhere(points: Array) -> Mask:
 class PartSettings:
     """Settings of the division."""
 
+    growth: float = 1.5e-3
+    """Radius by which the hulls are grown for which the limits hold [m]."""
     most: int = 8
     """Largest number of parts of a link. Every part adds one distance computation per obstacle."""
     p99: float = 1.2e-3
@@ -56,6 +58,12 @@ class PartSettings:
     shift: float = 0.03
     """Standard deviation of the random offsets per rad of spread [m/rad]: some tenths of a link's
     width."""
+
+    def grown_by(self, radius: float) -> PartSettings:
+        """The settings with limits in proportion to the growth of the hulls `radius` [m]: hulls
+        that are grown by more fill shallow hollows anyway."""
+        ratio = radius / self.growth
+        return replace(self, growth=radius, p99=ratio * self.p99, maximum=ratio * self.maximum)
 
 
 PARTS = PartSettings()
