@@ -15,6 +15,7 @@ JOULEPATH_ROBOTS ?= ur5e
 export JOULEPATH_ROBOTS
 VENV := .venv
 PY := $(VENV)/bin/python
+MADE := $(VENV)/.made-$(notdir $(realpath $(VENV)/bin/python))
 INSTALL := $(PY) scripts/install.py
 STUDIO := app/static/studio
 STUDIO_SOURCES := $(shell find app/studio -type f -not -path '*/node_modules/*' -not -path '*/.node/*') \
@@ -36,21 +37,24 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-# Two of these at once would install into one another's environment: the second one waits.
-WAIT = flock --nonblock Makefile true || echo "Another make is setting up this folder: waiting for its end ..."
+# Two of these at once would install into one another's environment: the second one waits. The Python comes first, since
+# a new one takes the marks of all packages away.
+define SET_UP
+@flock --nonblock Makefile true || echo "Another make is setting up this folder: waiting for its end ..."
+@+flock Makefile $(MAKE) --no-print-directory --silent $(PY)
+@+flock Makefile $(MAKE) --no-print-directory $(1)
+endef
 
 .PHONY: serve service test test-long docs bench lock clean ready tools lint mypy style types kernels bytecode pytest \
 	pytest-long vitest
 
 serve:
-	@$(WAIT)
-	@flock Makefile $(MAKE) --no-print-directory service
+	$(call SET_UP,service)
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
 
 # what the tests need, side by side; bytecode, since they start many processes, even where those may write none
 ready:
-	@$(WAIT)
-	@flock Makefile $(MAKE) --no-print-directory tools
+	$(call SET_UP,tools)
 
 service: $(VENV)/.runtime $(VENV)/.package kernels
 
@@ -163,13 +167,14 @@ $(VENV)/bin/cc: requirements-compiler.lock $(PY)
 	@printf '#!/bin/sh\nexec "$${0%%/*}/python" -m ziglang cc "$$@"\n' > $@
 	@chmod +x $@
 
-# An environment whose making was cut short has a Python, too, but no pip.
-$(PY): | $(VENV)/.made
+# An environment whose making was cut short has a Python, too, but no pip. So has one of an earlier Python of the system:
+# the new one, which takes its place, does not find the packages.
+$(PY): | $(MADE)
 	@test -x $@ || $(PYTHON) scripts/bootstrap.py $(VENV)
 
-$(VENV)/.made:
+$(MADE):
 	@$(PY) -m pip --version > /dev/null 2>&1 || $(PYTHON) scripts/bootstrap.py $(VENV)
-	@touch $@
+	@touch "$(VENV)/.made-$$(basename "$$(realpath $(PY))")"
 
 LOCK = $(VENV)/bin/uv pip compile --universal --generate-hashes --no-emit-index-url --quiet \
 	--custom-compile-command "make lock" $(LOCK_ARGS)

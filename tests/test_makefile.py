@@ -6,6 +6,7 @@ The real Makefile runs in a folder where Python is a script that writes down wha
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -25,11 +26,13 @@ FOLDERS = (
 PYTHON = """#!/bin/sh
 echo "$*" >> steps
 case "$*" in
-scripts/bootstrap.py*) mkdir -p .venv/bin; cp python .venv/bin/python; touch .venv/pip ;;
-"-m pip --version") test -e .venv/pip ;;
+scripts/bootstrap.py*) rm -rf .venv; mkdir -p .venv/bin; ln -s ../../system .venv/bin/python; touch .venv/pip-of-$(basename "$(realpath system)") ;;
+"-m pip --version") test -e ".venv/pip-of-$(basename "$(realpath "$0")")" ;;
 */build.py) touch optimizer/native/libjoulepath.so.1 ;;
 esac
 """
+INSTALLS = re.compile("bootstrap|install|slim|link_libgomp")
+"""Steps that put something into the environment."""
 
 
 @pytest.fixture
@@ -39,6 +42,7 @@ def clone(tmp_path: Path) -> Path:
     shutil.copy(ROOT / "Makefile", tmp_path)
     (tmp_path / "python").write_text(PYTHON, encoding="utf-8")
     (tmp_path / "python").chmod(0o755)
+    (tmp_path / "system").symlink_to("python")
     sources = ["pyproject.toml", "zensical.toml", "CONTRIBUTING.md", "joulepath/__init__.pyi"]
     sources += ["requirements.lock", "requirements-docs.lock", "optimizer/native/build.py"]
     sources += ["examples/optimize/bin_to_shelf.json", "scripts/build_studio.py"]
@@ -78,6 +82,23 @@ def test_an_environment_that_was_cut_short_is_made_again(clone: Path) -> None:
 def test_an_environment_made_by_an_earlier_makefile_stays(clone: Path) -> None:
     (clone / ".venv/bin").mkdir(parents=True)
     shutil.copy(clone / "python", clone / ".venv/bin")
-    (clone / ".venv/pip").touch()
+    (clone / ".venv/pip-of-python").touch()
     assert make(clone, ".venv/bin/python").wait(60) == 0
     assert steps(clone) == ["-m pip --version"]
+
+
+@pytest.mark.parametrize("system", ["a newer one in its place", "none, and another by name"])
+def test_another_python_of_the_system_gets_the_packages_anew(clone: Path, system: str) -> None:
+    assert make(clone, "serve").wait(60) == 0
+    first = steps(clone)
+    (clone / "steps").unlink()
+    if system.startswith("none"):
+        (clone / ".venv/bin/python").unlink()
+        (clone / ".venv/bin/python").symlink_to("/usr/bin/python-of-an-earlier-release")
+    else:
+        (clone / "system").unlink()
+        (clone / "system").symlink_to(shutil.copy(clone / "python", clone / "python-newer"))
+    assert make(clone, "serve").wait(60) == 0
+    assert [each for each in steps(clone) if INSTALLS.search(each)] == [
+        each for each in first if INSTALLS.search(each)
+    ]
