@@ -26,7 +26,9 @@ FOLDERS = (
 PYTHON = """#!/bin/sh
 echo "$*" >> steps
 case "$*" in
-scripts/bootstrap.py*) rm -rf .venv; mkdir -p .venv/bin; ln -s ../../system .venv/bin/python; touch .venv/pip-of-$(basename "$(realpath system)") ;;
+scripts/bootstrap.py*)
+  rm -rf .venv; mkdir -p .venv/bin; ln -s ../../system .venv/bin/python
+  touch ".venv/pip-of-$(basename "$(realpath system)")" ;;
 "-m pip --version") test -e ".venv/pip-of-$(basename "$(realpath "$0")")" ;;
 */build.py) touch optimizer/native/libjoulepath.so.1 ;;
 esac
