@@ -12,6 +12,8 @@ from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 BATCH = 4096
 """Points of one batch, which needs some hundred megabytes at a hundred faces."""
+BLOCK = 256
+"""Points whose heights above a thousand faces fit into the cache of a processor."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,16 @@ class HullFitSettings:
 HULL_FIT = HullFitSettings()
 
 
+def heights(points: Array, planes: Array) -> Array:
+    """Largest heights (k,) [m] of points (k, 3) [m] above planes (f, 4), given by their normals and
+    offsets; of the faces of a hull, negative inside.
+    """
+    found, homogeneous = np.empty(len(points)), np.column_stack([points, np.ones(len(points))])
+    for k in range(0, len(points), BLOCK):
+        np.max(planes @ homogeneous[k : k + BLOCK].T, axis=0, out=found[k : k + BLOCK])
+    return found
+
+
 def from_hull(points: Array, corners: Array, within: float = np.inf) -> Array:
     """Signed distances of points from a convex hull; negative inside.
 
@@ -41,14 +53,7 @@ def from_hull(points: Array, corners: Array, within: float = np.inf) -> Array:
         Signed distances, shape (k,) [m]; inside, minus the distance from the nearest face.
     """
     hull = ConvexHull(corners)
-    planes = hull.equations
-    found = np.concatenate(
-        [
-            (points[k : k + BATCH] @ planes[:, :3].T + planes[:, 3]).max(axis=1)
-            for k in range(0, len(points), BATCH)
-        ]
-        or [np.empty(0)]
-    )
+    found = heights(points, hull.equations)
     # outside, the height above a face may be less than the distance
     is_open = (found > 0) & (found <= within)
     distinct, which = np.unique(points[is_open], axis=0, return_inverse=True)
@@ -56,7 +61,7 @@ def from_hull(points: Array, corners: Array, within: float = np.inf) -> Array:
         batches = range(0, len(distinct), BATCH)
         exact = [_from_faces(distinct[k : k + BATCH], hull) for k in batches]
         found[is_open] = np.concatenate(exact)[which.ravel()]
-    return np.asarray(found)
+    return found
 
 
 def _from_faces(points: Array, hull: ConvexHull) -> Array:
@@ -109,9 +114,8 @@ def hull_around(
     chosen = _spanning(points)
     while True:
         checkpoint()
-        planes = ConvexHull(points[chosen]).equations
         # The height above a face is never more than the distance, and found much sooner.
-        distance = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        distance = heights(points, ConvexHull(points[chosen]).equations)
         if distance.max() <= reach:
             distance = from_hull(points, points[chosen])
         if distance.max() <= reach or len(chosen) > most:

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
+from joulepath.models.hull_cover import heights
 from joulepath.models.meshes import sampled
 from joulepath.models.robot import Array, Mask
 from joulepath.models.uploads.limits import Checkpoint, unwatched
@@ -145,7 +146,7 @@ class _Part:
 
     def above(self, points: Array) -> Array:
         """Heights (k,) [m] of points above the hull."""
-        return np.asarray((points @ self.planes[:, :3].T + self.planes[:, 3]).max(axis=1))
+        return heights(points, self.planes)
 
 
 @dataclass(frozen=True, eq=False)
