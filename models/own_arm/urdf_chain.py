@@ -257,6 +257,9 @@ def _for_pinocchio(root: Element) -> tuple[Element, float]:
         # Joints and links of a URDF may share names, frames of Pinocchio may not.
         joint.set("name", f"joint {k}")
         joint[:] = [each for each in joint if each.tag in ("parent", "child", "origin", "axis")]
+        axis = joint.find("axis")
+        if axis is not None and joint.get("type") != FIXED:
+            axis.set("xyz", " ".join(map(repr, joint_axis(joint).tolist())))
         if joint.get("type") == "continuous":
             joint.set("type", "revolute")
         # read by `joint_range`; Pinocchio would refuse some, and skip incomplete ones

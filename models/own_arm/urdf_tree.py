@@ -291,8 +291,11 @@ def joint_axis(joint: Element) -> Array:
         f"Joint {name_of(joint)!r} has an <axis>",
         "1 0 0" if element is None else "",
     )
-    if not np.linalg.norm(axis) > 0:
+    largest = np.abs(axis).max()
+    if not largest > 0:
         refuse("urdf", f"Joint {name_of(joint)!r} has an <axis> of no length.")
+    # the squares of large and small numbers are infinite and zero
+    axis /= largest
     return np.asarray(axis / np.linalg.norm(axis))
 
 

@@ -94,6 +94,16 @@ def test_a_rounded_angle_is_taken_as_meant(written: str, degrees: int) -> None:
     assert flange(rounded, q) == pytest.approx(flange(exact, q), abs=1e-14)
 
 
+@pytest.mark.parametrize("length", [1e-320, 1e-200, 2.0, 1e200])
+def test_an_axis_of_any_length_is_a_direction(length: float) -> None:
+    """Even where its square is zero or infinite."""
+    drawing = drawn(UR5E, AS_GIVEN)
+    assert 'xyz="0.0 0.0 1.0"' in drawing
+    longer = robot(described(drawing.replace('xyz="0.0 0.0 1.0"', f'xyz="0 0 {length!r}"')))
+    q = np.linspace(-1, 1, 6)
+    assert flange(longer, q) == pytest.approx(flange(robot(described(drawing)), q), abs=1e-14)
+
+
 @pytest.mark.parametrize(
     "written", ["1.5709", "1.57", "0.001", "1.5702", "3.14", "0.79", "0.7851", "1e308"]
 )
