@@ -37,11 +37,9 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-# Two of these at once would install into one another's environment: the second one waits. The Python comes first, since
-# a new one takes the marks of all packages away.
+# Two of these at once would install into one another's environment: the second one waits.
 define SET_UP
 @flock --nonblock Makefile true || echo "Another make is setting up this folder: waiting for its end ..."
-@+flock Makefile $(MAKE) --no-print-directory --silent $(PY)
 @+flock Makefile $(MAKE) --no-print-directory $(1)
 endef
 
@@ -115,7 +113,7 @@ kernels: $(VENV)/.runtime $(NATIVE)
 	@$(if $(JOULEPATH_ROBOTS),$(PY) -m joulepath.optimizer.dynamics.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
 
 # The dev lockfile holds the runtime one whole, at the same versions.
-$(VENV)/.runtime: requirements.lock $(PY)
+$(VENV)/.runtime: requirements.lock $(PY) $(MADE)
 	@$(INSTALL) $<
 	@$(PY) scripts/slim.py $(VENV)
 	@$(PY) scripts/link_libgomp.py
@@ -161,7 +159,7 @@ $(VENV)/.benchmarks: requirements-benchmarks.lock $(VENV)/.runtime
 	@$(INSTALL) $<
 	@touch $@
 
-$(VENV)/bin/cc: requirements-compiler.lock $(PY)
+$(VENV)/bin/cc: requirements-compiler.lock $(PY) $(MADE)
 	@echo "No C compiler on this machine: one comes as a package."
 	@$(INSTALL) $<
 	@printf '#!/bin/sh\nexec "$${0%%/*}/python" -m ziglang cc "$$@"\n' > $@
