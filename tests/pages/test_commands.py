@@ -123,6 +123,24 @@ def test_the_service_has_what_curl_asks_for(page: Path) -> None:
             check_body(path, method, json.loads(given.data))
 
 
+def json_of(page: Path) -> list[dict[str, Any]]:
+    """The JSON that a page shows as a whole, which is in no file."""
+    shown = (block for block in blocks_of(page) if block.language == "json" and not block.title)
+    return [json.loads(block.code) for block in shown if "…" not in block.code]
+
+
+@by_page(argvalues=[page for page in PAGES if json_of(page)])
+def test_the_service_takes_or_gives_the_json(page: Path) -> None:
+    components = open_document()["components"]
+    for body in json_of(page):
+        like = [
+            schema | {"components": components}
+            for schema in components["schemas"].values()
+            if body.keys() <= schema.get("properties", {}).keys()
+        ]
+        assert any(jsonschema_rs.is_valid(schema, body) for schema in like), body.keys()
+
+
 def python_of(page: Path) -> Iterator[str]:
     """The Python of a page or a notebook."""
     if page.suffix == ".md":
