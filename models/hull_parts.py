@@ -311,9 +311,9 @@ def divided(
     while len(parts) < settings.most:
         rest = [[each for each in parts if each is not part] for part in parts]
         pairs = list(zip(parts, rest, strict=True))
-        p99, maximum = np.percentile(
-            np.concatenate([division.distances(*pair) for pair in pairs]), [99, 100]
-        )
+        excess = np.concatenate([division.distances(*pair) for pair in pairs])
+        # Every hull of a body smaller than their growth may contain all points of the others.
+        p99, maximum = np.percentile(excess, [99, 100]) if len(excess) else (0.0, 0.0)
         if p99 <= settings.p99 and maximum <= settings.maximum:
             break
         worst = int(np.argmax([division.cost(*pair) for pair in pairs]))

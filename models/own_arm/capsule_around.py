@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from joulepath.models.capsule_cover import outside
 from joulepath.models.robot import Array, LinkCapsule
+from joulepath.models.shape_sizes import SIZES
 from joulepath.models.uploads.limits import Checkpoint, unwatched
 
 
@@ -36,7 +37,8 @@ SEARCH = CapsuleSearch()
 def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[Array, float]:
     """Ends (2, 3) [m] of the axis and radius [m] of a small capsule around points (n, 3) [m].
 
-    Direct searches from the three principal axes minimise the volume. The radius is exact.
+    Direct searches from the three principal axes minimise the volume. The radius is exact, but at
+    least `SIZES.smallest`.
     """
     points = outermost(points, checkpoint)
     centre = points.mean(axis=0)
@@ -63,7 +65,8 @@ def capsule_around(points: Array, checkpoint: Checkpoint = unwatched) -> tuple[A
         * SEARCH.digit
         + 0.0
     )
-    return axis, float(np.ceil(_reach(axis, points) / SEARCH.digit) * SEARCH.digit)
+    radius = max(_reach(axis, points), SIZES.smallest)
+    return axis, float(np.ceil(radius / SEARCH.digit) * SEARCH.digit)
 
 
 def outermost(points: Array, checkpoint: Checkpoint) -> Array:

@@ -16,6 +16,8 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from joulepath.models.capsule_cover import not_held, outside
+from joulepath.models.hull_cover import HULL_FIT
+from joulepath.models.hull_parts import QUICK, divided, nowhere
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.own_arm.capsule_around import SEARCH, capsule_around
 from joulepath.models.own_arm.description import Description, InvalidArm
@@ -199,6 +201,30 @@ def test_hulls_hold_bodies_of_any_form(seed: int) -> None:
     hulls = [each for each in made.hulls if each.link == 1]
     triangles = in_upper_arm(body.triangles.reshape(-1, 3) * scale).reshape(-1, 3, 3)
     assert hulls and not len(not_held(triangles, hulls))
+
+
+@pytest.mark.parametrize("seed", long_but(range(4), range(60)))
+def test_meshes_of_any_triangles_are_held_or_refused(seed: int) -> None:
+    """Triangles of random corners, most of them without a volume, of 10 um to 1 m."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-1.0, 1.0, (rng.integers(4, 60), 3)) * 10 ** rng.uniform(-5.0, 0.0, 3)
+    faces = rng.integers(0, len(corners), (rng.integers(4, 100), 3))
+    body = trimesh.Trimesh(corners * (1.0, 1.0, seed % 3 > 0), faces, process=False)
+    text = meshed("").replace("link.obj", "link.stl")
+    try:
+        made = robot(changed(urdf=text, meshes={"link.stl": stl(body)}))
+    except InvalidArm:
+        return
+    covers = [each for each in (*made.hulls, *made.capsules) if each.link == 1]
+    triangles = np.asarray(body.triangles, np.float32).astype(float).reshape(-1, 3)
+    assert not len(not_held(in_upper_arm(triangles).reshape(-1, 3, 3), covers))
+
+
+def test_a_body_smaller_than_the_growth_of_hulls_is_divided() -> None:
+    """The hulls of its parts contain one another."""
+    rng = np.random.default_rng(41)
+    body = rng.uniform(-1.5e-3, 1.5e-3, (40, 3, 3))
+    assert 1 <= len(divided([body], HULL_FIT.radius, nowhere, QUICK)) <= QUICK.most
 
 
 @pytest.mark.parametrize("thickness", [0.0, 0.04])
