@@ -19,7 +19,11 @@ HULL_FIGURES = ("hulls", "hull_radius")
 
 @cache
 def tool_names() -> tuple[str, ...]:
-    """Names of the bundled tools for `load_tool`, in alphabetical order."""
+    """Names of the bundled tools for `load_tool`.
+
+    Returns:
+        The names in alphabetical order.
+    """
     names = (each.name for each in files("joulepath.models.tools").iterdir())
     return tuple(sorted(name.removesuffix(_ENDING) for name in names if name.endswith(_ENDING)))
 

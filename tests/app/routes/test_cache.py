@@ -33,6 +33,12 @@ from tests.app.requests import HOME, NEAR, move
 KNOWN = {"Cache-Control": "max-age=60"}
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may read the store slowly."""
+    monkeypatch.setattr(answer_cache, "PATIENCE", 60.0)
+
+
 def sent(client: TestClient, body: Any, **headers: str) -> Any:
     answer = client.post(
         "/optimize",
@@ -254,11 +260,7 @@ def test_studies_have_what_was_answered_and_answer_what_comes(recorded: TestClie
     assert is_hit(again) and without_paths(again.json()) == without_paths(fresh), "the last one"
 
 
-def test_equal_requests_at_the_same_time_are_computed_once(
-    recorded: TestClient, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # a busy machine may read the store slowly
-    monkeypatch.setattr(answer_cache, "PATIENCE", 60.0)
+def test_equal_requests_at_the_same_time_are_computed_once(recorded: TestClient) -> None:
     body = move(payload=load(0.13))
     with ThreadPoolExecutor(4) as pool:
         answers = list(pool.map(lambda _: sent(recorded, body, **KNOWN), range(4)))
