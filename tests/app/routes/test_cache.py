@@ -196,7 +196,11 @@ async def test_keys_tell_clients_kinds_and_robots_apart(store: Store) -> None:
     assert await cache_of_large.find(None, "mine") is None
 
 
-async def test_a_database_that_hangs_is_not_waited_for(tmp_path: Path) -> None:
+async def test_a_database_that_hangs_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(answer_cache, "PATIENCE", 0.1)
+
     class Hanging(Store):
         async def read(self, work: Any) -> Any:
             await asyncio.Event().wait()
