@@ -16,12 +16,13 @@ from joulepath.app.api.export.request import CONTROLLER, PREFIX, SIGNAL
 from joulepath.app.api.robots.request import NAME_PATTERN
 from joulepath.app.convert.json_text import EMPTY, PLAIN_NAME
 from joulepath.app.exceptions.base import FieldError
-from joulepath.app.schemas.common import ID_PATTERN, KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD
+from joulepath.app.schemas.common import ID_PATTERN, KEY_HEADER, NO_CONTROLS
 from joulepath.app.schemas.common import Request as RequestModel
 from joulepath.app.schemas.names import nearest
 from joulepath.app.schemas.queries import PAGE_PATTERN
 from joulepath.app.schemas.shapes import BASE64
 from joulepath.app.schemas.studies import KEY_PATTERN
+from joulepath.app.schemas.unknown_fields import UNKNOWN_FIELD
 
 _OBJECT = "Give a JSON object: names and values in braces"
 _MESSAGES = {

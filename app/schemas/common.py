@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from itertools import islice
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -14,6 +14,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
     Tag,
     model_validator,
 )
@@ -23,14 +24,11 @@ from joulepath.app.answers.declared import with_unit
 from joulepath.app.schemas.examples.values import ANSWER_ID, REQUEST_ID, TURNED
 from joulepath.app.schemas.lengths import LENGTHS
 from joulepath.app.schemas.names import TYPOS, nearest
+from joulepath.app.schemas.unknown_fields import without_unknown_fields
 from joulepath.optimizer.problem.names import is_plain
 from joulepath.optimizer.problem.pose import QUATERNION_TOLERANCE
 
 KEY_HEADER = "Idempotency-Key"
-UNKNOWN_FIELD = "unknown_field"
-"""Type of the error about fields that a model does not have; its context has the names of those
-that it has, `known`, and the first that it has not, `unknown`."""
-MOST_UNKNOWN = 20
 
 
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:
@@ -60,20 +58,11 @@ class Request(BaseModel):
         extra="forbid", strict=True, allow_inf_nan=False, frozen=True, serialize_by_alias=True
     )
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _refuse_unknown_fields(cls, data: Any) -> Any:
-        # before `extra="forbid"`: its error would echo the unknown name from the caller's input
+    def _refuse_unknown_fields(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         fields = [field.alias or name for name, field in cls.model_fields.items()]
-        if isinstance(data, dict) and not data.keys() <= set(fields):
-            # a body can have thousands, each of which would take time
-            unknown = list(islice((str(name) for name in data if name not in fields), MOST_UNKNOWN))
-            raise PydanticCustomError(
-                UNKNOWN_FIELD,
-                "Unknown field",
-                {"known": fields, "unknown": unknown},
-            )
-        return data
+        return without_unknown_fields(data, fields, handler)
 
 
 class Response(BaseModel):

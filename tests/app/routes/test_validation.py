@@ -271,6 +271,19 @@ def test_every_unknown_field_is_named(client: TestClient) -> None:
     assert [error["loc"] for error in errors] == [["body", "colour"], ["body", "veloicty"]]
 
 
+def test_other_errors_are_named_beside_unknown_fields(client: TestClient) -> None:
+    """All at once, at every level; but of a misspelt field, not that it is missing."""
+    body = move(colour="red", deadline=-3.0, start={"q": [0.0, 0.0, "a"], "speed": 1})
+    body["gaol"] = body.pop("goal")
+    found = {tuple(error["loc"][1:]) for error in refused(client, body)}
+    assert found == {("colour",), ("gaol",), ("deadline",), ("start", "speed"), ("start", "q", 2)}
+
+
+def test_very_many_other_errors_are_not_listed_beside_unknown_fields(client: TestClient) -> None:
+    body = move(colour="red", start={"any_of": [{"q": ["a"] * 6}] * 20})
+    assert [error["loc"] for error in refused(client, body)] == [["body", "colour"]]
+
+
 def test_thousands_of_unknown_fields_take_no_time(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
