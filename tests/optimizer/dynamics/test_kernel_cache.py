@@ -31,6 +31,7 @@ from joulepath.optimizer.dynamics.kernel_cache import (
     compile_kernel,
     digest,
     library_path,
+    library_paths,
 )
 from joulepath.optimizer.dynamics.kernel_expressions import build
 from joulepath.optimizer.dynamics.kernel_source import AVX2, PORTABLE, source
@@ -267,7 +268,7 @@ def test_several_processes_make_one_library_of_each_robot(
 
 @pytest.mark.long
 def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
-    target = library_path(workshop.robot, PORTABLE)
+    target = library_paths(workshop.robot)[0]
     target.parent.mkdir()
     with work_folder(target) as folder:
         (folder / "kernel.c").write_text("half")
