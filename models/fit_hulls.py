@@ -18,7 +18,7 @@ import numpy as np
 
 from joulepath.models.capsule_cover import within_neighbours
 from joulepath.models.hull_cover import hull_around
-from joulepath.models.hull_parts import PARTS, Rim, divided
+from joulepath.models.hull_parts import Rim, divided
 from joulepath.models.meshes import link_surfaces
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import LinkHull, Robot
@@ -34,10 +34,7 @@ def fitted_hulls(folder: Path, robot: Robot, link: int) -> list[LinkHull]:
     surfaces = list(link_surfaces(folder, robot.name, link).values())
     inside = partial(within_neighbours, robot, link, robot.hulls)
     rim = RIMS.get((robot.name, robot.link_names[link]))
-    settings = PARTS.grown_by(radius)
-    parts = (
-        rim.parts(np.concatenate(surfaces)) if rim else divided(surfaces, radius, inside, settings)
-    )
+    parts = rim.parts(np.concatenate(surfaces)) if rim else divided(surfaces, radius, inside)
     return [
         LinkHull(link, hull_around(part.reshape(-1, 3), radius=radius), radius) for part in parts
     ]

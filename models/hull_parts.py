@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -27,16 +27,15 @@ def nowhere(points: Array) -> Mask:
 class PartSettings:
     """Settings of the division."""
 
-    growth: float = 1.5e-3
-    """Radius by which the hulls are grown for which the limits hold [m]."""
     most: int = 8
     """Largest number of parts of a link. Every part adds one distance computation per obstacle."""
-    p99: float = 1.2e-3
-    """Limit on the 99th percentile of the excess [m]. The excess of a point on the hull of a part,
-    before the hull is grown, is its distance from the surface of the link. The division ends when
-    this limit and `maximum` hold."""
-    maximum: float = 4.5e-3
-    """Limit on the largest excess [m]."""
+    p99: float = 0.8
+    """Limit on the 99th percentile of the excess, relative to the radius by which the hulls are
+    grown [1]: larger hulls fill shallow hollows anyway. The excess of a point on the hull of a
+    part, before the hull is grown, is its distance from the surface of the link. The division ends
+    when this limit and `maximum` hold."""
+    maximum: float = 3.0
+    """Limit on the largest excess, relative to the same radius [1]."""
     free: float = 0.5e-3
     """Excess [m] without cost: about the distance between neighbouring points of the surface."""
     overlap: float = 1e-4
@@ -60,18 +59,12 @@ class PartSettings:
     """Standard deviation of the random offsets per rad of spread [m/rad]: some tenths of a link's
     width."""
 
-    def grown_by(self, radius: float) -> PartSettings:
-        """The settings with limits in proportion to the growth of the hulls `radius` [m]: hulls
-        that are grown by more fill shallow hollows anyway."""
-        ratio = radius / self.growth
-        return replace(self, growth=radius, p99=ratio * self.p99, maximum=ratio * self.maximum)
-
 
 PARTS = PartSettings()
 QUICK = PartSettings(
     most=4,
-    p99=0.010,
-    maximum=0.015,
+    p99=3.7,
+    maximum=5.6,
     free=0.003,
     gain=0.3,
     surface=10_000,
@@ -314,7 +307,7 @@ def divided(
         excess = np.concatenate([division.distances(*pair) for pair in pairs])
         # Every hull of a body smaller than their growth may contain all points of the others.
         p99, maximum = np.percentile(excess, [99, 100]) if len(excess) else (0.0, 0.0)
-        if p99 <= settings.p99 and maximum <= settings.maximum:
+        if p99 <= settings.p99 * radius and maximum <= settings.maximum * radius:
             break
         worst = int(np.argmax([division.cost(*pair) for pair in pairs]))
         halves = division.halves(*pairs[worst])

@@ -83,10 +83,9 @@ def shape_figures(
         )
     if shapes.unknown:
         warnings.append(f"Shapes that are not read count as nothing: {_listed(shapes.unknown)}.")
-    hulls = zip([BASE, *links], (cover.hulls for cover in covers), strict=True)
-    return {"collision": figures} | _hull_figures(
-        description, {k: each for k, each in hulls if each}
-    )
+    named = zip([BASE, *links], covers, strict=True)
+    hulls = {name: cover.hulls for name, cover in named if cover.hulls}
+    return {"collision": figures} | _hull_figures(description, hulls)
 
 
 def _hull_figures(

@@ -324,7 +324,7 @@ def _compared_between_links(robot: Robot, bodies: Sequence[Body]) -> list[int]:
     capsules = [k for k, capsule in enumerate(robot.capsules) if capsule.link not in by_hulls]
     # the hulls of links precede those of a tool
     hulls = [k for k, body in enumerate(bodies) if body.is_hull][: len(robot.hulls)]
-    return capsules + [k for k in hulls if by_hulls]
+    return capsules + [k for k in hulls if bodies[k].link in by_hulls]
 
 
 def collision_model(arm: Arm) -> CollisionModel:

@@ -1,8 +1,8 @@
 """Motions along planned paths, where solves from these paths end in collisions.
 
 The nonlinear program may find no way back from a collision in a narrow space. A smooth path has a
-proven clearance, and only its time law remains to be found. There is one whenever the durations are
-not limited and the robot can hold every configuration of the path.
+proven clearance, and only its time law remains to be found. Usually there is one, unless the
+durations are limited, or the motors cannot hold the arm on its way.
 """
 
 from __future__ import annotations

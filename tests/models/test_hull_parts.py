@@ -72,7 +72,7 @@ def test_two_hulls_hold_a_bent_link_closely() -> None:
     hulls = hulls_of(parts)
     assert len(hulls) == 2
     assert not len(not_held(BENT, hulls))
-    assert excess(hulls, BENT).max() < PARTS.maximum + SAMPLED
+    assert excess(hulls, BENT).max() < PARTS.maximum * RADIUS + SAMPLED
     assert excess(hulls_of([BENT]), BENT).max() > 0.016
 
 
