@@ -279,6 +279,12 @@ def test_other_errors_are_named_beside_unknown_fields(client: TestClient) -> Non
     assert found == {("colour",), ("gaol",), ("deadline",), ("start", "speed"), ("start", "q", 2)}
 
 
+def test_a_missing_field_of_a_part_is_named_beside_a_similar_name(client: TestClient) -> None:
+    """The part is there under its right name, too."""
+    found = {tuple(error["loc"][1:]) for error in refused(client, move(payload={}, paylod=1))}
+    assert ("paylod",) in found and any(loc[0] == "payload" for loc in found)
+
+
 def test_very_many_other_errors_are_not_listed_beside_unknown_fields(client: TestClient) -> None:
     body = move(colour="red", start={"any_of": [{"q": ["a"] * 6}] * 20})
     assert [error["loc"] for error in refused(client, body)] == [["body", "colour"]]
