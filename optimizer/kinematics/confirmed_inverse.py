@@ -35,7 +35,7 @@ class InverseSettings:
     """Accuracy of solutions, and the numbers of members that represent self-motions."""
 
     accuracy: float = 1e-9
-    """Largest pose error of a solution by forward kinematics [m, rad]."""
+    """Largest pose error of a solution within reach, by forward kinematics [m, rad]."""
     members: int = 8
     """Default number of members of a self-motion."""
     most_members: int = 4

