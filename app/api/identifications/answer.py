@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated, Any
@@ -64,9 +65,10 @@ class IdentificationResult:
     parameters: tuple[IdentifiedParameter, ...]
     """All figures that were sought."""
     warnings: list[str]
-    """Figures at a bound or with a large standard deviation, which are used because the logs reject
-    the robot's own values, or know them better. Rejected values mean that the robot's links, torque
-    constants or payload do not fit the logs."""
+    """Warnings of the reading of each log, see `POST /logs`. Then figures at a bound or with a
+    large standard deviation, which are used because the logs reject the robot's own values, or know
+    them better. Rejected values mean that the robot's links, torque constants or payload do not fit
+    the logs."""
     structure: Structure
     """Base parameters of the links and rotors."""
     physical: Physical | None
@@ -92,13 +94,16 @@ class IdentificationResult:
     version."""
 
     @classmethod
-    def of(cls, found: Identification, validation: Validation | None) -> IdentificationResult:
-        """The result of an identification, with its errors on other moves, if any move."""
+    def of(
+        cls, found: Identification, validation: Validation | None, of_logs: Sequence[str]
+    ) -> IdentificationResult:
+        """The result of an identification, with its errors on other moves, if any move, and the
+        warnings of its logs."""
         return cls(
             found.robot.name,
             found.document(datetime.now(UTC).date().isoformat()),
             found.parameters,
-            list(found.warnings),
+            [*of_logs, *found.warnings],
             found.structure,
             found.physical,
             validation,

@@ -23,6 +23,7 @@ from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.identify import Identification, identify
+from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import Curves, Validation
 
@@ -51,16 +52,33 @@ class IdentifyTask:
         logs = [each.reading.log for each in self.logs]
         count, robot = len(self.request.logs), robot_named(logs[0].robot)
         try:
+            _check_unseen(logs[count:], logs[:count])
             options = _to_options(self.request)
             found = identify(robot, logs[:count], options, tell=listener(), progress=False)
             others = found.validate(logs[count:]) if logs[count:] else found.validation
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None
+        warnings = [
+            f"Log {each.settings['name'] or each.id}: {text}"
+            for each in self.logs
+            for text in each.reading.report.warnings
+        ]
         moves = _residual_fields(found, others, self.request.all_logs)
         curves = StoredAnswer(
             str(uuid.uuid4()), json_document({"moves": moves}), AnswerFigures(robot.name)
         )
-        return TaskResult.of_json(IdentificationResult.of(found, others), (curves,))
+        return TaskResult.of_json(IdentificationResult.of(found, others, warnings), (curves,))
+
+
+def _check_unseen(others: Sequence[Log], fitted: Sequence[Log]) -> None:
+    """Raises InvalidProblem if a log that validates the figures is one of the fit, by whatever id:
+    its errors would be those of the fit itself."""
+    if any(np.array_equal(other.q, each.q) for other in others for each in fitted):
+        raise InvalidProblem(
+            "validate",
+            "A log that validates the figures is one of `logs`, too: name another log, or leave "
+            "`validate` out, and whole motions are held out of the fit.",
+        )
 
 
 def _to_options(request: IdentifyRequest) -> IdentificationOptions:

@@ -35,14 +35,22 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> None:
     output = tmp_path / "figures.json"
-    code, _, told = here.run(
-        "identify", logs[0], "--validate", logs[1], "--payload", "0", "-o", str(output)
-    )
+    code, _, told = here.run("identify", logs[0], "--validate", logs[1], "-o", str(output))
     assert code == 0
     result = RESULT.model_validate_json(output.read_bytes())
+    # a command shows the warnings of its logs nowhere else
+    assert [each.partition(":")[0] for each in result.warnings] == ["Log log0", "Log log1"]
+    assert all("No payload is given" in each for each in result.warnings)
     assert result.validation.moves == 3
     assert "log0" in result.document["friction_laws"]["identified"]["coulomb"]["source"]
     assert b"log1" not in told
+
+
+def test_a_log_of_the_fit_does_not_validate_it(here: Here, logs: list[str], tmp_path: Path) -> None:
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(Path(logs[1]).read_bytes())
+    code, content = here.problem("identify", *logs, "--validate", str(copy))
+    assert code == 2 and content["errors"][0]["loc"] == ["body", "validate"]
 
 
 def test_measured_and_predicted_energies_are_a_table(here: Here, tmp_path: Path) -> None:
