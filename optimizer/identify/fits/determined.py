@@ -49,8 +49,8 @@ IMPOSSIBLE = "The fit puts it at {:.3g}, which no drive has."
 LAW_KEPT = "The joint's Coulomb friction is kept, and so is the rest of its law."
 AT_BOUND = "The fit puts it at its bound, {:g}."
 REJECTED = (
-    "{} The robot's own value, {:.3g}, is {:.0f} standard deviations away, so that it is not kept: "
-    "check the links, the torque constants and the payload."
+    "{} The robot's own value is {:.0f} standard deviations away, so that it is not kept: check "
+    "the links, the torque constants and the payload."
 )
 
 LESS_KNOWN = (
@@ -166,7 +166,7 @@ def remarks_of(
     remarks = [""] * len(reasons)
     for k, reason in enumerate(reasons):
         if reason and rejected[k]:
-            remarks[k] = REJECTED.format(reason, own[k], rejected[k])
+            remarks[k] = REJECTED.format(reason, rejected[k])
         elif reason and better[k]:
             remarks[k] = LESS_KNOWN.format(reason, own[k], own_sd[k])
     return remarks

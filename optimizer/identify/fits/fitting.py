@@ -29,6 +29,7 @@ from joulepath.optimizer.identify.fits.power_fit import (
     PowerFit,
     PowerPrior,
     fit_power,
+    idle_remark,
     power_prior,
 )
 from joulepath.optimizer.identify.fits.torque_fit import fit_torques
@@ -233,6 +234,7 @@ def _with_power(
             by_rows @ matrix.T + constant,
             (),
             matrix @ (fit.prior_covariance + shifts.T @ shifts) @ matrix.T,
+            (idle_remark(robot, float(fit.value[0]), prior), *[""] * (len(names) - 1)),
         ),
         matrix @ np.linalg.inv(prior.precision) @ matrix.T,
     )

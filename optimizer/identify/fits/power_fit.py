@@ -60,6 +60,9 @@ class PowerFitSettings:
     least_link_scale: float = 0.5
     """Smallest factor on the masses of the links [1], five standard deviations below the robot's
     own: links without a mass are no bodies, and no document of figures may have them."""
+    max_idle_sds: float = 3.0
+    """Distance of the idle power from the robot's own, over its standard deviation before the logs,
+    above which the logged power is doubtful [1]."""
     max_iterations: int = 30
     """Largest number of Gauss-Newton steps."""
     step_tolerance: float = 1e-9
@@ -69,6 +72,10 @@ class PowerFitSettings:
 
 
 POWER_FIT = PowerFitSettings()
+FAR_IDLE = (
+    "It is far from the robot's own value, {:.3g} W: check that the logged power is that of the "
+    "arm's bus in W, and not that of the control box."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +148,13 @@ def power_prior(robot: Robot, friction_known: bool, links_known: bool) -> PowerP
     )
     known = np.diag(variance) <= known_sd**2
     return PowerPrior(mean, np.asarray(np.linalg.inv(variance)), known)
+
+
+def idle_remark(robot: Robot, found: float, prior: PowerPrior) -> str:
+    """Remark on an idle power [W] far outside of the range of the robot's own; empty within it."""
+    own, sd = robot.electronics.idle_power, float(np.sqrt(np.linalg.inv(prior.precision)[0, 0]))
+    far = own > 0 and abs(found - prior.mean[0]) > POWER_FIT.max_idle_sds * sd
+    return FAR_IDLE.format(own) if far else ""
 
 
 def _lognormal_around(own: float, low: float, high: float) -> tuple[float, float]:

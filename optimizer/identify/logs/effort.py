@@ -49,6 +49,7 @@ def effort_report(motion: LoggedMotion, effort: Array) -> EffortReport:
     logged."""
     rows = thinned(len(effort), EFFORT.max_rows)
     part, effort, robot = motion.at(rows), effort[rows].astype(float), motion.robot
+    limit = robot.limits.tau_max
     rigid, zero = part.rigid_torques(), np.zeros_like(part.q)
     gravity = replace(part, v=zero, a=zero).rigid_torques()
     # only joints next to the base: at a wrist, cables and friction exceed the weight
@@ -56,7 +57,9 @@ def effort_report(motion: LoggedMotion, effort: Array) -> EffortReport:
     heaviest = np.sort(np.argsort(-carried[: (robot.nq + 1) // 2])[:2])
     heaviest = heaviest[carried[heaviest] > 0]
     slopes = {
-        int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], robot.limits.tau_max[j])
+        int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], limit[j])
+        if carried[j] > EFFORT.min_torque_spread * limit[j]
+        else None
         for j in heaviest
     }
     judged = [

@@ -21,6 +21,7 @@ from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.log_warnings import named_joints
 from joulepath.optimizer.identify.logs.possible import (
+    TWO_PI,
     check_coarse,
     check_leaps,
     check_radians,
@@ -97,6 +98,7 @@ def read_channels(
         rows = FileRows(file, head_of(file))
         columns = columns_of_rows(rows, robot, options, scales, remarks)
         times, lines, values = _read_rows(rows, columns, robot, scales)
+    _check_degrees(values["q"], options, remarks)
     grid = grid_of(times, lines, columns.names[columns.time[0]])
     _check_positions(values, grid, lines, robot, columns, remarks)
     return FileChannels(
@@ -163,6 +165,14 @@ def _check_positions(
         )
     q = channels["q"][grid.kept] if grid.repeated else channels["q"]
     check_leaps(q, grid, lines, robot, [columns.names[k] for k in columns.groups["q"]])
+
+
+def _check_degrees(q: Array, options: LogOptions, remarks: list[str]) -> None:
+    """Remark on positions (n, joints) [rad] so small that they were not given in degrees."""
+    if options.units == "deg" and np.abs(q).max() <= TWO_PI * pi / 180 and np.ptp(q, axis=0).any():
+        remarks.append(
+            "No position is above 6.3 degrees: they look like radians; then leave units=deg out."
+        )
 
 
 def _reduced(group: ChannelName, values: Array, before: array[float]) -> Array:

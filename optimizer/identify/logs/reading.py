@@ -33,7 +33,7 @@ from joulepath.optimizer.identify.logs.log_warnings import held_warning, log_war
 from joulepath.optimizer.identify.logs.motion import LoggedMotion
 from joulepath.optimizer.identify.logs.moves import cut_into_moves, rests_by_command, rests_by_speed
 from joulepath.optimizer.identify.logs.speeds import speeds_of
-from joulepath.optimizer.identify.logs.usable_effort import check_measured, choose_meaning
+from joulepath.optimizer.identify.logs.usable_effort import choose_meaning, unmeasured
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.arrays import frozen
 
@@ -155,7 +155,11 @@ def _efforts(
         return None
     effort = channels.take(group)
     assert effort is not None
-    check_measured(effort)
+    not_logged = {j for j, k in enumerate(channels.columns.groups[group]) if k == NOT_LOGGED}
+    missing = sorted(not_logged | unmeasured(effort, motion.v))
+    if missing:
+        effort = effort.copy()
+        effort[:, missing] = 0.0
     remarks += held_warning("effort", effort, motion.v, motion.rate)
     lag = effort_lag(motion, effort)
     effort = _without_lag("effort comes", effort, lag, channels.grid.time, remarks)
@@ -167,12 +171,11 @@ def _efforts(
     if report.meaning == "torque":
         report = replace(report, torque_side=options.torque_side or motion.robot.torque_side)
     remarks += effort_warnings(motion.robot, regressions, effort, report.meaning)
-    missing = [j for j, k in enumerate(channels.columns.groups[group]) if k == NOT_LOGGED]
     if missing:
-        effort = effort.copy()
         effort[:, missing] = np.nan
         remarks.append(
-            f"The efforts of {named_joints(missing)} are not logged, and their figures are kept."
+            f"The efforts of {named_joints(missing)} are not logged, or never change in motion: "
+            "their figures are kept."
         )
     return _Efforts(group, effort, report)
 
@@ -267,7 +270,7 @@ def _channels(log: Log, columns: Columns, effort: ChannelName | None) -> Iterato
             continue
         indices = columns.groups.get(group) if group is not None else None
         for j, size in enumerate(noise(values, log.rate)):
-            if indices is not None and indices[j] == NOT_LOGGED:
+            if np.isnan(values[0, j]):
                 continue
             column = None if indices is None else columns.names[indices[j]]
             yield Channel(f"{name}{j + 1}", column, units[name], *_range(values[:, j]), float(size))

@@ -102,13 +102,21 @@ def _inconsistent_speeds(
 
     Raises:
         InvalidTable: all speeds are wrong by a common factor, as in another unit or of opposite
-            sign.
+            sign, or a joint has speeds without a change of its position.
     """
     wrong, factors, moved = list[int](), list[float](), list[int]()
     for joint in range(q.shape[1]):
         logged = low_passed(v[:, [joint]], rate)[:, 0]
         derived = derivative(q[:, [joint]], rate)[:, 0]
         size, real = float(logged.std()), float(derived.std())
+        if np.ptp(q[:, joint]) == 0 and size > SPEEDS.min_speed:
+            name, speed = (columns.names[columns.groups[each][joint]] for each in ("q", "v"))
+            raise InvalidTable(
+                f"{name} never changes, though the joint moves by its speeds in {speed}: log its "
+                "position, or write 0 into its speeds if the joint stood still.",
+                None,
+                name,
+            )
         largest, error = max(size, real), float((logged - derived).std())
         if largest > SPEEDS.min_speed and error > SPEEDS.max_speed_error * largest:
             wrong.append(joint)

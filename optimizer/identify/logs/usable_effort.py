@@ -12,29 +12,38 @@ from joulepath.optimizer.identify.logs.effort import EffortReport
 from joulepath.optimizer.identify.logs.log import EffortMeaning
 from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log_formats import ChannelName
+from joulepath.optimizer.identify.logs.log_warnings import WARNINGS
 
 OTHER_CAUSES = (
-    "Otherwise the log is of another robot, a column never changes, the joints are in another "
-    "order than the robot's, from base to flange (name the columns in `columns`), or `units`, "
-    "`current_units`, `payload` or `gravity` are not as given."
+    "Otherwise the log is of another robot, its positions have other zeros or signs, the joints "
+    "are in another order than the robot's, from base to flange (name the columns in `columns`), "
+    "or `units`, `current_units`, `payload` or `gravity` are not as given."
 )
 """Other causes of efforts in contradiction to the arm."""
 _NAMED: dict[ChannelName, EffortMeaning] = {"current": "current", "torque": "torque"}
 
 
-def check_measured(effort: Array) -> None:
-    """Check the efforts (n, joints) for changes.
+def unmeasured(effort: Array, v: Array) -> set[int]:
+    """Joints that move, but have an effort that never changes, as a driver writes it that does not
+    measure it.
+
+    Args:
+        effort: efforts (n, joints).
+        v: velocities (n, joints) [rad/s].
 
     Raises:
         EffortNotUsable: no effort ever changes.
     """
-    if (np.ptp(effort, axis=0) == 0).all():
+    constant = np.ptp(effort, axis=0) == 0
+    if constant.all():
         raise EffortNotUsable(
             "The logged efforts never change, so they were not measured: log motor currents, or "
             "leave their columns out to keep motion and power.",
             None,
             {},
         )
+    moved = [bool((np.abs(speed) > WARNINGS.moving_speed).any()) for speed in v.T]
+    return {*np.flatnonzero(constant & moved).tolist()}
 
 
 def choose_meaning(

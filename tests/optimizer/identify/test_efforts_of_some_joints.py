@@ -17,7 +17,7 @@ from joulepath.optimizer.identify.logs.reading import LogReading, read_log
 from joulepath.optimizer.identify.logs.recorded import measured
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Arm, Payload
-from tests.identification_logs import csv_of, recorded, truth_of
+from tests.identification_logs import csv_of, recorded, truth_of, with_current
 
 ROBOT = load_robot("ur10e")
 TRUTH = truth_of(ROBOT)
@@ -71,6 +71,13 @@ def by_name() -> LogReading:
     return read_log(body_of(rows), ROBOT, NOTHING)
 
 
+def by_constants() -> LogReading:
+    """As of a driver that writes the same number for what it does not measure."""
+    current = np.tile(RECORDING.current[:1], (len(RECORDING.time), 1))
+    current[:, ELBOW] = RECORDING.current[:, ELBOW]
+    return read_log(csv_of(with_current(RECORDING, current), without="aP"), ROBOT, NOTHING)
+
+
 def by_map() -> LogReading:
     rows = without(table(), "i")
     head = [f"c{k}" for k in range(len(rows[0]))]
@@ -81,7 +88,7 @@ def by_map() -> LogReading:
     return read_log(body_of([head, *rows[1:]]), ROBOT, options)
 
 
-@pytest.mark.parametrize("reader", [by_number, by_empty_cells, by_name, by_map])
+@pytest.mark.parametrize("reader", [by_number, by_empty_cells, by_constants, by_name, by_map])
 def test_the_friction_of_one_joint_is_told_by_its_effort(reader: object) -> None:
     reading = reader()  # type: ignore[operator]
     log: Log = reading.log

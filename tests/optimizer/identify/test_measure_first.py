@@ -76,6 +76,15 @@ def test_ten_seconds_at_rest_tell_the_idle_power(seed: int) -> None:
     assert figures["electronics"]["idle_power"]["trust"] == "B"
 
 
+def test_the_power_of_the_control_box_is_not_that_of_the_bus() -> None:
+    log = resting(TRUTH, UPRIGHT_POSE)
+    assert log.power is not None
+    found = identify(ROBOT, [replace(log, power=log.power + 60.0)])
+    (warning,) = found.warnings
+    assert warning.startswith("idle_power") and "control box" in warning
+    assert not identify(ROBOT, [log]).warnings
+
+
 def test_a_pose_that_takes_power_to_hold_tells_it_less() -> None:
     sd = []
     for pose in (UPRIGHT_POSE, STRETCHED):

@@ -110,6 +110,27 @@ def test_speeds_in_another_unit_or_sign_are_named(
     assert caught.value.column == "v1"
 
 
+def test_a_position_that_never_changes_contradicts_its_speeds(recording: Recording) -> None:
+    q = recording.q.copy()
+    q[:, 2] = q[0, 2]
+    with pytest.raises(InvalidTable, match="q3 never changes") as caught:
+        read_log(csv_of(replace(recording, q=q), without="a"), ROBOT)
+    assert caught.value.column == "q3"
+    # a joint that stands still has no speed
+    v = recording.v.copy()
+    v[:, 2] = 0.0
+    still = read_log(csv_of(replace(recording, q=q, v=v), without="ai"), ROBOT)
+    assert "The position of joint 3 never changes." in still.report.warnings
+
+
+def test_radians_that_are_said_to_be_degrees_are_warned_of(recording: Recording) -> None:
+    options = LogOptions(units="deg", effort=None)
+    small = read_log(csv_of(recording, without="a"), ROBOT, options).report.warnings
+    assert any("look like radians" in each for each in small)
+    right = read_log(csv_of(recording, without="a", units="deg"), ROBOT, options).report.warnings
+    assert not any("radians" in each for each in right)
+
+
 def test_causes_of_efforts_that_tell_nothing(recording: Recording) -> None:
     cases = {
         "never change": np.zeros_like(recording.current),
