@@ -21,7 +21,7 @@ from joulepath.app.schemas.orientation import TargetPose
 from joulepath.app.schemas.path import Path
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
-from joulepath.optimizer.problem.problem import DURATIONS, BoundEffort, MethodName
+from joulepath.optimizer.problem.problem import DURATIONS, MethodName, RequestedBound
 from joulepath.optimizer.result.energy import Objective
 
 Seconds = Annotated[float, Field(ge=1e-3, le=DURATIONS.longest)]
@@ -284,7 +284,7 @@ class OptimizeRequest(MotionRequest):
         {"tolerance": {"position": 1e-4}},
         default=None,
     )
-    bound: BoundEffort = described(
+    bound: RequestedBound = described(
         "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the "
         "answer get a second, greater one, which takes the copper loss of holding against gravity "
         "into account. It takes about a second per candidate, lowest bound first, and ends before "

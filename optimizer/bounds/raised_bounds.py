@@ -127,6 +127,8 @@ def raised_bounds(
         A bound for each pair, never below the bound so far.
     """
     bounds = [each.lower_bound for each in candidates]
+    if prepared.problem.bound == "plain":
+        return bounds
     below = [
         k for k, each in enumerate(candidates) if bounds[k] < energy and each.goal.tolerance is None
     ]

@@ -42,6 +42,7 @@ def problem_of(
         duration_max=None if cycle.objective == "electrical" else cycle.longest_move,
         tool_path=move.tool_path,
         windings=False,
+        bound=cycle.bound,
         sample_period=cycle.sample_period,
         deadline=max(time, MOVE.least_time),
     )

@@ -196,6 +196,7 @@ class Rounds:
                 deadline=min(cycle.deadline, share),
                 with_baselines=compared,
                 unsolved_excess=0.0 if compared else ROUNDS.unsolved_excess,
+                bound="normal" if compared else "plain",
             )
             try:
                 with knowing(known):

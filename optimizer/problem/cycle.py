@@ -17,7 +17,7 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.dwell import Dwell, Hold
 from joulepath.optimizer.problem.free_order import FreeOrder, check_order
 from joulepath.optimizer.problem.names import check_name, first_repeated
-from joulepath.optimizer.problem.problem import DURATIONS, MethodName
+from joulepath.optimizer.problem.problem import DURATIONS, BoundEffort, MethodName
 from joulepath.optimizer.problem.stop_path import StopPath, at_stop
 from joulepath.optimizer.problem.stops import (
     APPROACH,
@@ -80,6 +80,8 @@ class Cycle:
         with_baselines: whether to search for baselines.
         unsolved_excess: share of the bound by which unsolved electrical moves weigh more than it.
             Above 0, fewer of them are solved, and the answer is only likely the best.
+        bound: effort on the lower bounds of single moves, as in `Problem`; that of the cycle does
+            not depend on them.
         sample_period: period of the samples [s].
         deadline: limit of the wall time [s].
 
@@ -106,6 +108,7 @@ class Cycle:
     rests_at_passes: bool = False
     with_baselines: bool = True
     unsolved_excess: float = 0.0
+    bound: BoundEffort = "normal"
     sample_period: float = 0.008
     deadline: float = 60.0
 

@@ -21,8 +21,9 @@ from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.result.energy import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
-# effort for the lower bound
-BoundEffort = Literal["normal", "tight"]
+# effort for the lower bound, in requests and inside a search
+RequestedBound = Literal["normal", "tight"]
+BoundEffort = Literal["plain", RequestedBound]
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class Problem:
         windings: whether the goal may be a full turn of a joint away; ignored with a tool path.
         bound: "tight" for more effort on the lower bounds of candidates that could beat the answer;
             for mechanical work, on candidates that differ by full turns of the outer joints.
+            "plain" for no effort beyond the bounds that the search needs.
         sample_period: period of the returned samples [s].
         deadline: wall time after which the best verified result is returned [s].
 

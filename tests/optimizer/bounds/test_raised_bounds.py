@@ -112,6 +112,7 @@ def test_nothing_changes_where_it_does_not_apply() -> None:
         ({"objective": "mechanical", "duration_max": 3.0}, NEVER, ENOUGH),
         ({}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
         ({"bound": "tight"}, Deadline.after(RAISING.quick.effort.time / 2), ENOUGH),
+        ({"bound": "plain"}, NEVER, ENOUGH),
         ({}, NEVER, -1.0),
     ):
         made, found = bounded(problem(START, tcp_pose(GOAL), **given))
