@@ -24,6 +24,7 @@ from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.problem.tool_cone import ToolCone
 from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.search.answer import may_be_optimal
 from joulepath.optimizer.solve.methods import METHODS
 from joulepath.optimizer.what_if import what_if
 from tests.by_pinocchio import torques_of
@@ -92,8 +93,10 @@ def test_joints_to_joints(robot: Robot, objective: str) -> None:
     """Certified, above its bound, no worse than any baseline, and worth as much by Pinocchio."""
     asked = problem(robot, objective)
     solution = optimize(asked)
-    assert solution.certificate.valid and solution.status == "optimal"
+    assert solution.certificate.valid
     energy, peaks = replayed(asked, solution)
+    proven = may_be_optimal(asked.objective, energy, solution.lower_bound)
+    assert solution.status == ("optimal" if proven else "feasible")
     assert solution.energy.of(asked.objective) == pytest.approx(energy, rel=SUMMED)
     assert 0 <= solution.lower_bound <= energy
     for name, peak in peaks.items():
