@@ -1,15 +1,14 @@
 """All benchmarks in one run of about twenty minutes on two cores; prints a report.
 
     make bench                                all sections
-    make bench BENCH_ARGS=--write             the same, and writes benchmarks/RESULTS.md with a plot
+    make bench BENCH_ARGS=--write             also writes benchmarks/RESULTS.md with its plot
     make bench BENCH_ARGS="--fraction 0.1"    a tenth of the tasks, to test the benchmarks
-    make bench BENCH_ARGS="--only quality"    some sections; the others keep their last results
-    make bench BENCH_ARGS=--list              what there is, also apart from the sections
-    make bench BENCH_ARGS="--foreign FILE"    planning problems of others too, see
+    make bench BENCH_ARGS="--only quality"    some sections, with the last results of the others
+    make bench BENCH_ARGS=--list              lists all commands, also those without a section
+    make bench BENCH_ARGS="--foreign FILE"    also planning problems from other sources, see
     docs/explained/foreign_scenes.md
 
-Each section is a module with a command of its own. The sections run one after another, in a process
-each.
+Every section is the command of a module. The sections run one after another, in separate processes.
 """
 
 from __future__ import annotations
@@ -32,9 +31,9 @@ from benchmarks.service import ROOT
 
 FOLDER = ROOT / "build" / "bench"
 PLANNER_TASKS = 20
-# problems of each family of a file from elsewhere, if not all of them are asked
 FOREIGN_COUNT = 40
-# name: module, arguments, count of tasks (0: not by count)
+"""Problems per family of a foreign file that a fraction refers to."""
+# name: module, arguments, number of tasks (0 if the module has no number of tasks)
 SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "solver": ("solver_times", (), 200),
     "http": ("requests", ("--kind", "joint to pose", "--line-every", "0", "--seed", "2"), 200),
@@ -53,7 +52,7 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
 
 
 def run(name: str, fraction: float) -> dict[str, Any] | None:
-    """Runs one section and returns its results; None if it wrote none."""
+    """Runs one section and returns its results; None if it has none."""
     module, given, count = SECTIONS[name]
     arguments = list(given)
     if count:
@@ -64,20 +63,20 @@ def run(name: str, fraction: float) -> dict[str, Any] | None:
 
 
 def _run(name: str, module: str, arguments: list[str]) -> dict[str, Any] | None:
-    """Runs the command of a section and returns its results; None if it wrote none."""
+    """Runs the command of a section and returns its results; None if it has none."""
     path = FOLDER / f"{name}.json"
     path.unlink(missing_ok=True)
     command = [sys.executable, "-m", f"benchmarks.{module}", *arguments, "--json", str(path)]
     print(f"== {name}", flush=True)
     began = time.perf_counter()
-    # the exit code reports failed requirements, which the report shows
+    # the exit code is ignored, because the report shows failed requirements
     subprocess.run(command, cwd=ROOT, env=os.environ | dict.fromkeys(THREADS, "1"), check=False)
     print(f"   {time.perf_counter() - began:.0f} s", flush=True)
     return stored(name)
 
 
 def commands() -> list[tuple[str, str]]:
-    """All commands of this folder, each with the first line of what it says of itself."""
+    """Names of all commands of this folder, with the first lines of their docstrings."""
     found = {
         path.stem: path for path in Path(__file__).parent.glob("*.py") if path.stem != "__main__"
     }
@@ -91,7 +90,7 @@ def commands() -> list[tuple[str, str]]:
 
 
 def foreign(file: Path, fraction: float) -> dict[str, Any] | None:
-    """Runs the section of the planning problems in a file and returns its results; None if it wrote
+    """Runs the section of the planning problems in a file and returns its results; None if it has
     none.
     """
     count = 0 if fraction >= 1 else max(round(FOREIGN_COUNT * fraction), 1)
@@ -118,11 +117,9 @@ def main() -> int:
     parser.add_argument(
         "--write", action="store_true", help="write the report with its plot into benchmarks/"
     )
+    parser.add_argument("--foreign", type=Path, help="also run the planning problems in this file")
     parser.add_argument(
-        "--foreign", type=Path, help="file of planning problems of others; without it, none are run"
-    )
-    parser.add_argument(
-        "--list", action="store_true", help="what there is, also apart from the sections"
+        "--list", action="store_true", help="list all commands, also those without a section"
     )
     given = parser.parse_args()
     if given.list:
@@ -138,13 +135,13 @@ def main() -> int:
         if given.foreign is None
         else foreign(given.foreign.resolve(), given.fraction)
     )
-    took = time.perf_counter() - began
+    duration = time.perf_counter() - began
     path = report.RESULTS if given.write else FOLDER / report.RESULTS.name
-    report.write(path, machine, results, took, whole=len(given.only) == len(SECTIONS))
+    report.write(path, machine, results, duration, whole=len(given.only) == len(SECTIONS))
     broken = [name for name in given.only if results[name] is None]
     print(path.read_text(encoding="utf-8"))
     print(
-        f"{path} written after {took:.0f} s"
+        f"{path} written after {duration:.0f} s"
         + (f"; without results: {', '.join(broken)}" if broken else "")
     )
     return 1 if broken else 0

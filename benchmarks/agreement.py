@@ -1,13 +1,13 @@
-"""How well the endpoints agree on the least energy of one motion.
+"""Agreement of the endpoints on the least energy of one motion.
 
     python -m benchmarks.agreement --count 100
     python -m benchmarks.agreement --count 10 --kind "isolated bus"
 
-Every random request is answered by `/optimize` with a free duration, with the duration of that
-answer and with durations around it, by `/pareto`, by `/compare`, and by `/cycle` as an open cycle
-of one stop. All are the same problem, or a more constrained one. Reported are the relative
-differences of the energies from that of the free answer; of durations around it, what they need
-less.
+Every random request is sent to `/optimize` with a free duration, with the duration of this free
+answer, and with durations around it; to `/pareto`; to `/compare`; and to `/cycle`, as an open cycle
+of one stop. All are the same problem, or a more constrained one. The table has the relative
+differences of their energies from the energy of the free answer. For the durations around it, only
+an energy below the free answer counts.
 """
 
 from __future__ import annotations
@@ -36,26 +36,29 @@ from joulepath.optimizer.exceptions import JoulepathError
 Json = dict[str, Any]
 
 KINDS = ("plain", "payload", "tight limits", "TCP speed", "isolated bus")
-# every second request is of the first robot
 ROBOTS = ("ur5e", "panda", "kr10_r1100", "fr3", "ur10e", "iiwa14")
-# greatest displacement of a joint [rad] in a short move: half of the moves are short
+"""Robots of the requests; half of the requests are for the first robot."""
 SHORT = 1.5
-# durations around that of the free answer, in multiples of it
+"""Largest displacement of a joint in a short move [rad]; half of the moves are short."""
 AROUND = (0.93, 0.97, 1.03, 1.07)
-# points of a front
+"""Durations around the duration of the free answer, relative to it [1]."""
 POINTS = 4
+"""Number of points of a front."""
+DEADLINE = 60.0
+"""Deadline of a request [s]."""
 P95 = 1e-3
 """Largest admissible 95th percentile of the relative differences."""
 MOST = 3e-3
 """Largest admissible relative difference."""
-# relative difference that is rounding: energies in JSON are exact
 ROUNDING = 1e-12
+"""Relative rounding error of an energy [1]; energies in JSON are exact."""
 
 
 @dataclass
 class Outcome:
-    """What the endpoints answered to a request: the free energy [J], and the relative differences
-    from it.
+    """Answers of the endpoints to a request: the `energy` of the free answer [J], the relative
+    `differences` from it, the messages of refusals by endpoint, whether the front ends above the
+    free answer, and the processor time [s].
     """
 
     index: int
@@ -69,7 +72,8 @@ class Outcome:
 
 
 def request(seed: int, index: int, kind: str | None = None) -> tuple[str, Json]:
-    """Request `index` of a seed, and its kind: between joint positions and to a pose in turn."""
+    """Kind and body of request `index` of a seed; the goals alternate between joint positions and
+    a pose."""
     rng = np.random.default_rng([seed, index])
     kind = KINDS[(index // 2) % len(KINDS)] if kind is None else kind
     name = ROBOTS[0] if rng.random() < 0.5 else str(rng.choice(ROBOTS[1:]))
@@ -120,67 +124,60 @@ def _variation(rng: np.random.Generator, robot: Robot, kind: str) -> Json:
     return {}
 
 
-def examine(index: int, kind: str, body: Json, deadline: float) -> Outcome:
-    """Asks every endpoint for the motion of a request."""
+def examine(index: int, kind: str, body: Json) -> Outcome:
+    """Sends a request to every endpoint."""
     outcome, began = Outcome(index, kind, body), time.process_time()
-    free = _answer(
-        outcome, "free", OptimizeTask(OptimizeRequest.model_validate(body), ""), deadline
-    )
+    free = _answer(outcome, "free", OptimizeTask(OptimizeRequest.model_validate(body), ""))
     if free is not None:
-        energy, duration = _energy(free), float(free["duration"])
-        outcome.energy = energy
-        _fixed(outcome, energy, duration, deadline)
-        _others(outcome, energy, free, deadline)
+        outcome.energy = _energy(free)
+        _compare_durations(outcome, float(free["duration"]))
+        _compare_endpoints(outcome)
     outcome.cpu = time.process_time() - began
     return outcome
 
 
-def _fixed(outcome: Outcome, energy: float, duration: float, deadline: float) -> None:
-    """The fixed duration, that of the free answer and those around it."""
-    least, name = energy, "fixed around"
+def _compare_durations(outcome: Outcome, duration: float) -> None:
+    """Fixes the duration of the free answer [s], and durations around it."""
+    energy = least = outcome.energy
     for scale in (1.0, *AROUND):
-        own = "fixed" if scale == 1.0 else name
+        name = "fixed" if scale == 1.0 else "fixed around"
         asked = OptimizeRequest.model_validate(outcome.request | {"duration": scale * duration})
-        # what is faster may be impossible
-        into = outcome if scale >= 1.0 else Outcome(0, "", {})
-        fixed = _answer(into, own, OptimizeTask(asked, ""), deadline)
+        # a refusal of a shorter duration is no difference, because the motion may not exist
+        recorded = outcome if scale >= 1.0 else Outcome(0, "", {})
+        fixed = _answer(recorded, name, OptimizeTask(asked, ""))
         if fixed is None:
             continue
         if scale == 1.0:
-            outcome.differences[own] = _energy(fixed) / energy - 1
+            outcome.differences[name] = _energy(fixed) / energy - 1
         least = min(least, _energy(fixed))
-    outcome.differences[name] = least / energy - 1
+    outcome.differences["fixed around"] = least / energy - 1
 
 
-def _others(outcome: Outcome, energy: float, free: Json, deadline: float) -> None:
-    """The last point of a front, the row of a comparison, and the cycle of one stop."""
-    body = outcome.request
-    front = _answer(
-        outcome,
-        "front",
-        ParetoTask(ParetoRequest.model_validate(body | {"points": POINTS}), "", "json"),
-        deadline,
-    )
+def _compare_endpoints(outcome: Outcome) -> None:
+    """Compares the last point of a front, the row of a comparison, and the cycle of one stop."""
+    body, energy = outcome.request, outcome.energy
+    fronts = ParetoRequest.model_validate(body | {"points": POINTS})
+    front = _answer(outcome, "front", ParetoTask(fronts, "", "json"))
     if front is not None:
         last = front["points"][-1]["energy"]
         outcome.differences["front"] = last / energy - 1
         outcome.is_dearer = last > energy * (1 + ROUNDING)
     methods = CompareRequest.model_validate(body | {"methods": ["bspline", "time_scaling"]})
-    table = _answer(outcome, "compare", CompareTask(methods, ""), deadline)
+    table = _answer(outcome, "compare", CompareTask(methods, ""))
     if table is not None:
         outcome.differences["compare"] = table["methods"][0]["electrical"] / energy - 1
     fields = {key: value for key, value in body.items() if key != "goal"}
     stops = [{"name": "goal", "target": body["goal"]}]
     asked = CycleRequest.model_validate(fields | {"stops": stops, "closed": False})
-    found = _answer(outcome, "cycle", CycleTask(asked, ""), deadline)
+    found = _answer(outcome, "cycle", CycleTask(asked, ""))
     if found is not None:
         outcome.differences["cycle"] = _energy(found) / energy - 1
 
 
-def _answer(outcome: Outcome, name: str, task: Any, deadline: float) -> Json | None:
-    """The answer of a task as JSON; None for a refusal, which is noted."""
+def _answer(outcome: Outcome, name: str, task: Any) -> Json | None:
+    """The answer of a task as JSON; None after a refusal, which is recorded in the outcome."""
     try:
-        content: Json = orjson.loads(task.run(deadline).document)
+        content: Json = orjson.loads(task.run(DEADLINE).document)
     except JoulepathError as error:
         outcome.refused[name] = f"{type(error).__name__}: {error}"
         return None
@@ -192,9 +189,7 @@ def _energy(answer: Json) -> float:
 
 
 def summary(outcomes: list[Outcome]) -> Json:
-    """The spread of the differences by endpoint, with the request of the worst; and what was
-    refused.
-    """
+    """The distribution of the differences by endpoint, and the refusals."""
     answered = [each for each in outcomes if np.isfinite(each.energy)]
     names = ("fixed", "fixed around", "front", "compare", "cycle")
     rows = {name: [each for each in answered if name in each.differences] for name in names}
@@ -205,14 +200,14 @@ def summary(outcomes: list[Outcome]) -> Json:
             name: Spread.of([abs(each.differences[name]) for each in rows[name]]) for name in names
         },
         "dearer": [each.index for each in answered if each.is_dearer],
-        # the free answer is refused as well where no motion exists
+        # a request without a motion is refused by all endpoints, and is not listed
         "refused_by_some": {each.index: each.refused for each in answered if each.refused},
         "cpu": sum(each.cpu for each in outcomes),
     }
 
 
 def failed_requirements(results: Json) -> list[str]:
-    """A message for every requirement that a run fails."""
+    """A message for every failed requirement of a run."""
     found = []
     for name, spread in results["differences"].items():
         if spread.p95 > P95 or spread.maximum > MOST:
@@ -228,18 +223,15 @@ def failed_requirements(results: Json) -> list[str]:
 
 
 def main() -> int:
-    """Asks the endpoints, prints the differences, and checks the requirements."""
+    """Sends the requests, prints the differences, and checks the requirements."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=100, help="requests (%(default)s)")
     arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
-    arguments.add_argument(
-        "--deadline", type=float, default=60.0, help="of each request [s] (%(default)s)"
-    )
     given = arguments.parse_args()
     on_one_core()
     outcomes: list[Outcome] = []
     for index in range(given.count):
-        outcomes.append(examine(index, *request(given.seed, index, given.kind), given.deadline))
+        outcomes.append(examine(index, *request(given.seed, index, given.kind)))
         shown = {name: f"{value:+.1e}" for name, value in outcomes[-1].differences.items()}
         print(
             index,

@@ -1,9 +1,9 @@
-"""Arms from URDF files: what is read, and the first certified motion of each.
+"""Arms from URDF files, and the first certified motion of each arm.
 
 `python -m benchmarks.arms FILES` prints one line per file. The arm is the chain from the root to
-the link whose name ends as usual, such as `tool0`, or else the longest chain of turning joints.
-Figures that a file lacks are assumed, because only the way from the file to a certified motion is
-tested.
+the link with a usual name of a tip, such as `tool0`, or else the longest chain of revolute joints.
+Missing figures of a file are assumed, because the benchmark tests only the steps from the file to a
+certified motion.
 """
 
 from __future__ import annotations
@@ -44,11 +44,12 @@ TIPS = (
     "link_eef",
 )
 FULL_POSE = 6
+"""Number of joints from which an arm reaches full poses."""
 
 
 @dataclass(frozen=True)
 class Assumed:
-    """Figures for files that lack them."""
+    """Figures in place of missing figures of a file, and settings of the motion."""
 
     acceleration: float = 5.0
     """Acceleration limit [rad/s²]."""
@@ -57,16 +58,16 @@ class Assumed:
     velocity: float = 2.0
     """Speed limit [rad/s]."""
     torque: float = 1e4
-    """Torque limit [N·m] for a file without efforts: a placeholder for all arms but the largest, so
-    that friction and rotors are ruled from the torques that the arm needs."""
+    """Torque limit [N·m] for a file without efforts. It is too large for all but the largest arms,
+    so that friction and rotor inertia are estimated from the torques that the arm needs."""
     placeholder: float = 1.0
-    """Effort up to which that of a joint is a placeholder [N·m]."""
+    """Largest effort of a joint in a file that counts as a placeholder [N·m]."""
     deadline: float = 30.0
-    """Time for the motion [s]."""
+    """Deadline of the motion [s]."""
     draws: int = 400
-    """Number of random configurations among which both ends of the motion are chosen."""
+    """Number of random configurations from which start and goal of the motion are chosen."""
     held: float = 0.7
-    """Largest share of a torque limit that an end needs to be held."""
+    """Largest holding torque at the start and goal over the torque limit [1]."""
 
 
 ASSUMED = Assumed()
@@ -74,24 +75,24 @@ ASSUMED = Assumed()
 
 @dataclass(frozen=True)
 class ArmOutcome:
-    """What became of one file."""
+    """The outcome of one file."""
 
     file: str
     joints: int = 0
     inverse: str = ""
     """Kind of inverse kinematics."""
     status: str = ""
-    """Status of the answer; empty if there is none."""
+    """Status of the answer; empty without an answer."""
     energy: float = 0.0
     bound: float = 0.0
     wall: float = 0.0
     """Time [s] from the file to the motion."""
     message: str = ""
-    """Why the file is refused, or why there is no motion."""
+    """Reason of the refusal of the file, or of the motion."""
 
     @property
     def is_read(self) -> bool:
-        """Whether the file made a robot."""
+        """Whether the file describes a robot."""
         return self.joints > 0
 
     def __str__(self) -> str:
@@ -112,13 +113,13 @@ def first_motion(
     arguments: Mapping[str, str],
     seed: int,
 ) -> ArmOutcome:
-    """The outcome of a file, from its text to a written motion.
+    """The outcome of a file, from its text to a motion exported for ROS 2.
 
     Args:
         file: a URDF, or a file with xacro macros.
         packages: folders with ROS packages.
         arguments: values of the arguments of a file with macros.
-        seed: seed of the ends of the motion.
+        seed: seed of start and goal of the motion.
     """
     began, read = time.perf_counter(), ArmOutcome(file.name)
     try:
@@ -151,7 +152,7 @@ def figures_of(
     packages: Sequence[Path],
     arguments: Mapping[str, str],
 ) -> dict[str, object]:
-    """Figures of the arm in a file. Raises InvalidArm with every problem that remains."""
+    """Figures of the arm in a file. Raises InvalidArm with the remaining problems."""
     folders = [*packages, *package_folders(file)]
     if file.suffix == SUFFIX:
         urdf = expanded(file, arguments, folders)
@@ -185,42 +186,42 @@ def figures_of(
     except InvalidArm as error:
         if not any(field in ("urdf", "masses") for field, _ in error.problems):
             raise
-        # perhaps a file without masses
+        # the file may lack masses
         with suppress(InvalidArm):
             return own_figures(file.stem, replace(description, density=RULES.density))[0]
         raise
 
 
 def tip_of(tree: UrdfTree) -> str:
-    """The link of a usual name on which most turning joints act, or else the link at the end of
-    the longest chain. Raises InvalidArm for a file in which nothing turns.
+    """The link with a usual name of a tip and the most revolute joints below it, or else the link
+    at the end of the longest chain. Raises InvalidArm for a file without revolute joints.
     """
     usual = [link for link in tree.links if link.endswith(TIPS) and len(_turning(tree, link)) > 1]
     tip = max(usual or tree.links, key=lambda link: len(_turning(tree, link)))
     chain = _turning(tree, tip)
     if not chain:
         raise InvalidArm("urdf", "No joint of the file turns.")
-    # what hangs on the last turning joint, such as a finger, is no tip
+    # links beyond the last revolute joint, such as fingers, are no tips
     return tip if usual else joint_end(chain[-1], "child")
 
 
 def base_of(tree: UrdfTree, tip: str) -> str:
-    """The link beyond the last sliding joint on the way to the tip, as of a lifting column; the
-    root without one.
+    """The link beyond the last sliding joint on the way to the tip, for example of a lifting
+    column; the root without such a joint.
     """
-    others = [j for j in tree.path(tree.root, tip) if j.get("type") not in (*TURNING, "fixed")]
-    return joint_end(others[-1], "child") if others else tree.root
+    sliding = [j for j in tree.path(tree.root, tip) if j.get("type") not in (*TURNING, "fixed")]
+    return joint_end(sliding[-1], "child") if sliding else tree.root
 
 
 def _turning(tree: UrdfTree, link: str) -> list[Element]:
-    """Turning joints from the base to a link."""
+    """Revolute joints from the base to a link."""
     path = tree.path(base_of(tree, link), link)
     return [joint for joint in path if joint.get("type") in TURNING]
 
 
 def _targets(robot: Robot, q_start: Array, q_goal: Array) -> tuple[Target, Target]:
-    """The poses of two configurations (nq,) [rad]. With fewer than six joints: from the first
-    configuration to the position of the other one.
+    """The poses of two configurations (nq,) [rad]; for an arm with fewer than six joints, the first
+    configuration and the position of the second one.
     """
     start, goal = (Pose(tcp_pose(Arm(robot=robot), q)) for q in (q_start, q_goal))
     if robot.nq >= FULL_POSE:
@@ -229,7 +230,7 @@ def _targets(robot: Robot, q_start: Array, q_goal: Array) -> tuple[Target, Targe
 
 
 def _ends(robot: Robot, seed: int) -> Iterator[Array]:
-    """Two random configurations that the arm can hold, free of collisions if there are any such."""
+    """Two random configurations that the arm can hold, free of collisions if possible."""
     limits, rng = robot.limits, np.random.default_rng(seed)
     low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
     q = low + rng.uniform(0.1, 0.9, (ASSUMED.draws, robot.nq)) * (high - low)

@@ -1,19 +1,19 @@
-"""Every robot: random requests from joint positions to a pose. Each gets a certified motion, or a
-reason that is true.
+"""Random requests from joint positions to a pose, for every robot: certified motions, or refusals
+with a true reason.
 
     python -m benchmarks.arms --count 10
     python -m benchmarks.arms --count 200 --robots panda gen3
     python -m benchmarks.arms ~/ros/src/*_description/urdf/*.urdf --packages ~/ros/src
 
-Without files, it starts the service with its default settings and sends the same number of requests
-for each robot. Answers are checked as in `benchmarks.requests`. Both ends of a request are drawn
-free of collisions, so that there is one true reason to refuse it: that the motors cannot hold the
-arm there. The exit code is 1 if an answer or a refusal is wrong.
+Without files, the command starts the service with its default settings and sends the same number of
+requests for every robot. Answers are checked as in `benchmarks.requests`. Start and goal of a
+request are free of collisions, so that the only true reason for a refusal is that the motors cannot
+hold the arm there. The exit code is 1 if an answer or a refusal is wrong.
 
-With URDF files, or files with xacro macros, it prints one line per file: why it is refused, or its
-inverse kinematics and one certified motion from pose to pose, written for ROS 2; see `arm_files`.
-The exit code is then 1 if reading or
-solving ends in an error that no class declares.
+With URDF files, or files with xacro macros, the command prints one line per file: the reason of a
+refusal, or the inverse kinematics of the arm and one certified motion from pose to pose, exported
+for ROS 2 (see `arm_files`). `--arguments` has values for the arguments of macros. The exit code is
+1 if reading or solving raises an undeclared error.
 """
 
 from __future__ import annotations
@@ -59,16 +59,9 @@ def row(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-def of_robot(
-    service: Service, name: str, seed: int, count: int, deadline: float | None
-) -> dict[str, Any]:
-    """Sends the requests of one robot, the first of them twice, so that a worker has loaded what
-    they need.
-    """
+def of_robot(service: Service, name: str, seed: int, count: int) -> dict[str, Any]:
+    """Sends the requests for one robot, after a first request that makes the worker load it."""
     tasks = list(request_tasks(seed, count, KIND, robot=name))
-    if deadline is not None:
-        for task in tasks:
-            task.body["deadline"] = deadline
     send_all(service, tasks[:1])
     return row(name, send_all(service, tasks))
 
@@ -100,13 +93,12 @@ def main() -> int:
         "--packages", nargs="+", type=Path, default=[], help="folders with ROS packages"
     )
     arguments.add_argument(
-        "--arguments", nargs="+", default=[], metavar="NAME=VALUE", help="of files with macros"
+        "--arguments", nargs="+", default=[], metavar="NAME=VALUE", help="arguments of macros"
     )
     arguments.add_argument("--count", type=int, default=10, help="requests per robot (%(default)s)")
     arguments.add_argument(
-        "--robots", nargs="+", choices=robot_names(), default=robot_names(), help="(all)"
+        "--robots", nargs="+", choices=robot_names(), default=robot_names(), help="robots (all)"
     )
-    arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
     given = arguments.parse_args()
     if given.files:
         return of_files(given)
@@ -115,7 +107,7 @@ def main() -> int:
     rows = []
     with running(JOULEPATH_WORKERS="1") as service:
         for name in given.robots:
-            one = of_robot(service, name, given.seed, given.count, given.deadline)
+            one = of_robot(service, name, given.seed, given.count)
             rows.append(one)
             print(
                 f"{name:11s} {one['answered']:3d} of {one['count']} answered, {len(one['errors'])} "

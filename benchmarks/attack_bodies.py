@@ -12,12 +12,12 @@ NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
 
 
 def move() -> dict[str, Any]:
-    """A short motion, as honest clients ask for."""
+    """A short motion, as honest clients request it."""
     return {"start": {"q": HOME}, "goal": {"q": NEAR}}
 
 
 def sampled(period: float) -> dict[str, Any]:
-    """A motion of nearly 10 s with samples at this period [s]."""
+    """A motion of nearly 10 s with samples at a period [s]."""
     return move() | {
         "duration": 9.9,
         "sample_period": period,
@@ -27,7 +27,7 @@ def sampled(period: float) -> dict[str, Any]:
 
 
 def long_search(deadline: float) -> dict[str, Any]:
-    """A search over thousands of candidates, which takes as long as it may [s]."""
+    """A search over thousands of candidates, which lasts until its deadline [s]."""
     start, goal = (
         {"pose": {"position": position, "quaternion": [0.0, 1.0, 0.0, 0.0]}}
         for position in ([0.4, 0.2, 0.35], [0.3, -0.4, 0.2])
@@ -55,8 +55,8 @@ def _stl(triangles: Any) -> bytes:
 
 
 def meshes(count: int, seed: int) -> dict[str, Any]:
-    """A request for inverse kinematics among so many different mesh files of 1280 triangles."""
-    import trimesh  # slow to import, and only this attack needs it
+    """A request for inverse kinematics among `count` different mesh files of 1280 triangles."""
+    import trimesh  # imported here because it is slow and only this attack needs it
 
     rng = np.random.default_rng(seed)
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)

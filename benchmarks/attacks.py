@@ -1,8 +1,13 @@
-"""Attacks on a service of its own, over loopback, bounded in count and time: what happens to memory
-and to others.
+"""Attacks on a service over loopback, limited in number and time: memory of the service, and
+answers to other clients.
 
-Beside each attack, one client asks for `/healthz` forty times a second, and an honest one optimises
-short motions. Both have other addresses than the attacker.
+    python -m benchmarks.attacks --only headers meshes
+    python -m benchmarks.attacks --soak 1200
+    python -m benchmarks.attacks --only mixed --minutes 8 --kill-every 30
+
+During every attack, one client requests `/healthz` forty times a second, and an honest client
+optimises short motions. The attacker has another address than these two clients. Crowds of clients
+follow the attacks: see `benchmarks.crowds`.
 """
 
 from __future__ import annotations
@@ -28,7 +33,8 @@ from benchmarks.observed_attack import Attack, Outcome, observed
 from benchmarks.service import Client, Service, running
 
 ATTACKER = "127.0.0.66"
-LONGEST_END = 30.0  # longest wait for the end of the process [s]
+END_TIMEOUT = 30.0
+"""Longest time until the process of the service has ended [s]."""
 
 Streams = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
@@ -39,7 +45,7 @@ async def connect(port: int) -> Streams:
 
 
 def post(path: str, body: bytes, declared: int | None = None) -> bytes:
-    """A request, whose declared size may be larger."""
+    """A POST request; `declared` is its Content-Length if it differs from the size of the body."""
     head = (
         f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
         "application/json\r\nCache-Control: no-cache\r\n"
@@ -47,13 +53,13 @@ def post(path: str, body: bytes, declared: int | None = None) -> bytes:
     return f"{head}Content-Length: {declared or len(body)}\r\n\r\n".encode() + body
 
 
-async def each(count: int, one: Callable[[int], Awaitable[Any]]) -> list[Any]:
-    """Results of `one` for so many at a time; an exception where one fails."""
-    return await asyncio.gather(*(one(index) for index in range(count)), return_exceptions=True)
+async def concurrently(count: int, run: Callable[[int], Awaitable[Any]]) -> list[Any]:
+    """Results of `count` concurrent calls of `run`, with the exceptions of failed calls."""
+    return await asyncio.gather(*(run(index) for index in range(count)), return_exceptions=True)
 
 
 async def status_of(reader: asyncio.StreamReader) -> int:
-    """Status of the next response; 0 if the connection ends before."""
+    """Status of the next response; 0 if the connection ends first."""
     try:
         return int((await reader.readline()).split()[1])
     except (OSError, IndexError):
@@ -61,7 +67,7 @@ async def status_of(reader: asyncio.StreamReader) -> int:
 
 
 def counted(values: list[Any]) -> str:
-    """How often each value is there."""
+    """The number of occurrences of every value, as text."""
     names = [
         "lost" if isinstance(value, BaseException) or value == 0 else str(value) for value in values
     ]
@@ -69,34 +75,40 @@ def counted(values: list[Any]) -> str:
 
 
 async def endless_headers(port: int) -> str:
-    """Four connections send headers for as long as they are taken, at most 192 MiB each."""
+    """Four connections send headers until the service closes them, at most 192 MiB per
+    connection."""
     line = b"".join(b"X-%d: " % k + b"a" * 4000 + b"\r\n" for k in range(16))
 
     async def one(index: int) -> float:
         reader, writer = await connect(port)
         writer.write(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n")
-        taken = 0
+        sent = 0
         with contextlib.suppress(OSError):
-            while taken < 192 << 20 and not reader.at_eof():
+            while sent < 192 << 20 and not reader.at_eof():
                 writer.write(line)
                 await asyncio.wait_for(writer.drain(), 5)
-                taken += len(line)
+                sent += len(line)
                 await asyncio.sleep(0)
         writer.close()
-        return taken / 2**20
+        return sent / 2**20
 
-    return "MiB taken: " + ", ".join(f"{taken:.1f}" for taken in await each(4, one))
+    return "MiB accepted: " + ", ".join(f"{sent:.1f}" for sent in await concurrently(4, one))
 
 
 async def half_requests(port: int) -> str:
-    """300 connections send half a head, and 100 half a body; counted after 15 s."""
+    """300 connections send half a head and 100 half a body; the open ones are counted after
+    15 s."""
 
     async def one(index: int) -> Streams:
         streams = await connect(port)
         streams[1].write(b"POST /opt" if index < 300 else post("/optimize", b"{", 1000))
         return streams
 
-    opened = [streams for streams in await each(400, one) if not isinstance(streams, BaseException)]
+    opened = [
+        streams
+        for streams in await concurrently(400, one)
+        if not isinstance(streams, BaseException)
+    ]
     await asyncio.sleep(15)
     still = sum(not reader.at_eof() and not reader._buffer for reader, _ in opened)
     for _, writer in opened:
@@ -105,7 +117,7 @@ async def half_requests(port: int) -> str:
 
 
 async def unread_answers(port: int) -> str:
-    """Twelve clients ask for the largest answer that there is, and read nothing for 30 s."""
+    """Twelve clients request the largest possible answer, and read nothing for 30 s."""
 
     async def one(index: int) -> int:
         for period in (1e-4, 5e-4):
@@ -123,7 +135,7 @@ async def unread_answers(port: int) -> str:
         return 422
 
     kept: list[asyncio.StreamWriter] = []
-    statuses = await each(12, one)
+    statuses = await concurrently(12, one)
     await asyncio.sleep(30)
     for writer in kept:
         writer.transport.abort()
@@ -131,7 +143,7 @@ async def unread_answers(port: int) -> str:
 
 
 async def large_bodies(port: int) -> str:
-    """300 bodies of 4 MiB at a time, full of numbers."""
+    """300 concurrent bodies of 4 MiB with lists of numbers."""
     body = post("/optimize", numbers(4 << 20))
 
     async def one(index: int) -> int:
@@ -141,11 +153,11 @@ async def large_bodies(port: int) -> str:
         writer.close()
         return status
 
-    return counted(await each(300, one))
+    return counted(await concurrently(300, one))
 
 
 async def many_meshes(port: int) -> str:
-    """Four clients ask again and again for inverse kinematics among 64 mesh files, for 10 s."""
+    """Four clients request inverse kinematics among 64 mesh files repeatedly for 10 s."""
     bodies = [post("/ik", orjson.dumps(meshes(64, seed))) for seed in range(8)]
     end = time.perf_counter() + 10
 
@@ -158,18 +170,20 @@ async def many_meshes(port: int) -> str:
             writer.close()
         return statuses
 
-    return counted([status for statuses in await each(4, one) for status in statuses])
+    return counted([status for statuses in await concurrently(4, one) for status in statuses])
 
 
 async def long_deadlines(port: int) -> str:
-    """40 searches of 100 s, for 25 s."""
+    """40 searches with a deadline of 100 s; the clients disconnect after 25 s."""
 
     async def one(index: int) -> Streams:
         streams = await connect(port)
         streams[1].write(post("/optimize", orjson.dumps(long_search(100.0))))
         return streams
 
-    opened = [streams for streams in await each(40, one) if not isinstance(streams, BaseException)]
+    opened = [
+        streams for streams in await concurrently(40, one) if not isinstance(streams, BaseException)
+    ]
     await asyncio.sleep(25)
     refused = [reader for reader, _ in opened if reader._buffer]
     for _, writer in opened:
@@ -191,12 +205,13 @@ async def requests_ahead(port: int) -> str:
         writer.transport.abort()
         return 0.0
 
-    await each(8, one)
+    await concurrently(8, one)
     return ""
 
 
 async def left_uploads(port: int) -> str:
-    """200 clients leave in the middle of an upload to `/evaluate`, 200 of a body to `/optimize`."""
+    """200 clients disconnect during an upload to `/evaluate`, and 200 during a body to
+    `/optimize`."""
 
     async def one(index: int) -> None:
         _, writer = await connect(port)
@@ -205,7 +220,7 @@ async def left_uploads(port: int) -> str:
         await asyncio.sleep(1)
         writer.transport.abort()
 
-    await each(400, one)
+    await concurrently(400, one)
     await asyncio.sleep(1)
     return ""
 
@@ -223,7 +238,7 @@ ATTACKS: dict[str, Attack] = {
 
 
 def open_everything(service: Service) -> list[Any]:
-    """An open upload, half a head, and an answer that is not read."""
+    """Three clients: with an incomplete upload, with half a head, and with an unread answer."""
     opened = [Client(service.port, ATTACKER) for _ in range(3)]
     for client, content in zip(
         opened,
@@ -241,20 +256,20 @@ def open_everything(service: Service) -> list[Any]:
 
 def time_to_end(service: Service) -> float:
     """Time [s] from SIGTERM to the end of the process."""
-    opened = open_everything(service)
+    clients = open_everything(service)
     began = time.perf_counter()
     service.process.send_signal(signal.SIGTERM)
-    service.process.wait(LONGEST_END)
-    del opened
+    service.process.wait(END_TIMEOUT)
+    del clients
     return time.perf_counter() - began
 
 
 def left_files(service: Service, folder: Path) -> list[str]:
-    """Files in the temporary folder after `kill -9` of a service with open uploads."""
-    opened = open_everything(service)
+    """Files in the temporary folder after `kill -9` of a service with an incomplete upload."""
+    clients = open_everything(service)
     service.process.kill()
-    service.process.wait(LONGEST_END)
-    del opened
+    service.process.wait(END_TIMEOUT)
+    del clients
     return sorted(path.name for path in folder.iterdir() if path.name.startswith("joulepath-"))
 
 
@@ -268,19 +283,19 @@ def line(outcome: Outcome) -> str:
 
 
 def main() -> None:
-    """Runs the attacks, each on a new service; with `--soak` one after another on the same."""
+    """Runs every attack on a new service, or with `--soak` all attacks on one service."""
     arguments = parser(__doc__)
     arguments.add_argument(
-        "--only", nargs="+", choices=[*ATTACKS, "end", *CROWDS], help="these attacks only"
+        "--only", nargs="+", choices=[*ATTACKS, "end", *CROWDS], help="attacks and crowds (all)"
     )
     arguments.add_argument(
-        "--minutes", type=float, default=8.0, help="time of the mixed crowd [min]"
+        "--minutes", type=float, default=8.0, help="duration of the mixed crowd [min] (%(default)s)"
     )
     arguments.add_argument(
-        "--kill-every", type=float, default=0.0, help="kill a worker of a crowd after each such [s]"
+        "--kill-every", type=float, default=0.0, help="period at which a worker is killed [s]"
     )
     arguments.add_argument(
-        "--soak", type=float, default=0.0, help="repeat them for so long on one service [s]"
+        "--soak", type=float, default=0.0, help="time of repeated attacks on one service [s]"
     )
     given = arguments.parse_args()
     chosen = given.only or [*ATTACKS, "end", *CROWDS]

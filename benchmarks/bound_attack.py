@@ -1,15 +1,13 @@
-"""Attacks the proven lower bound: motions that the service did not find, none of which may spend
-less than the bound.
+"""Attacks on the proven lower bound: no motion from random starts may need less energy than it.
 
     python -m benchmarks.bound_attack --count 1000 --starts 20
     python -m benchmarks.bound_attack --robot panda --load 0.2 --bound tight
 
-Every request is solved, and its lower bound kept. Then motions are optimised from random starts on
-POINTS control points, each to a random configuration that reaches the goal, from one that reaches
-the start: any branch, any full turn, any member of a self-motion, any allowed orientation. The
-kinds of targets take turns, and half of the requests has other conditions: payload, mounting, bus,
-dwell, a fixed duration, the mechanical objective. With `--load` friction grows with the torque that
-a joint carries.
+Every request is solved for its lower bound. Then motions with POINTS control points are optimised
+from random initial guesses, between random configurations at the start and at the goal: any branch,
+full turn, member of a self-motion and allowed orientation. The requests alternate between the kinds
+of targets. Half of them have further conditions: payload, mounting, bus, dwell, a fixed duration,
+the mechanical objective. With `--load`, friction grows with the torque in the gear of a joint.
 """
 
 from __future__ import annotations
@@ -49,18 +47,19 @@ from joulepath.optimizer.solve.methods.guess import Guess
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
 POINTS = 40
+"""Control points of a motion of the attack."""
 MEMBERS = 64
-"""Samples of a self-motion from which the attack draws."""
+"""Number of samples of a self-motion, from which the attack draws."""
 ORIENTATIONS = 64
-"""Samples of the orientation of a partly free goal from which the attack draws."""
-# share of the starts that take the nearest goal, of the rest that take the next, and so on
-ODDS = 0.4
+"""Number of samples of the orientation of a partly free goal, from which the attack draws."""
+NEAREST_SHARE = 0.4
+"""Probability of the nearest goal configuration; the ranks have a geometric distribution [1]."""
 DEADLINE = 60.0
 """Deadline of a request [s]."""
-PATIENCE = 20.0
-"""Longest time for the solve from one start [s]."""
-# relative rounding of an energy and of a bound
+SOLVE_TIME = 20.0
+"""Longest time of the solve from one initial guess [s]."""
 ROUNDING = 1e-9
+"""Relative rounding error of an energy and of a bound [1]."""
 
 
 def _general(robot: Robot, rng: np.random.Generator) -> Array:
@@ -70,13 +69,13 @@ def _general(robot: Robot, rng: np.random.Generator) -> Array:
 
 
 def _at(*joints: tuple[int, float]) -> Callable[[Robot, np.random.Generator], Array]:
-    """Configurations with some joints at, or next to, given angles."""
+    """Draws configurations with some joints at given angles [rad], or close to them."""
 
     def draw(robot: Robot, rng: np.random.Generator) -> Array:
         q = _general(robot, rng)
-        beside = 0.0 if rng.random() < 0.5 else 10 ** rng.uniform(-9, -2)
+        offset = 0.0 if rng.random() < 0.5 else 10 ** rng.uniform(-9, -2)
         for joint, angle in joints:
-            q[joint] = angle + beside
+            q[joint] = angle + offset
         return q
 
     return draw
@@ -94,17 +93,15 @@ TARGETS = ("pose", "start and goal", "free about", "cone", "free", "several")
 
 
 def request(robot: Robot, seed: int, index: int, **fixed: Any) -> tuple[str, Problem]:
-    """Request `index` of a seed, with fields that all of them have, and the name of its kind."""
+    """Kind and problem of request `index` of a seed; `fixed` are fields of all problems."""
     rng = np.random.default_rng([seed, index])
-    where, what = (
-        list(CONFIGURATIONS)[index % len(CONFIGURATIONS)],
-        TARGETS[index // len(CONFIGURATIONS) % len(TARGETS)],
-    )
+    place = list(CONFIGURATIONS)[index % len(CONFIGURATIONS)]
+    target = TARGETS[index // len(CONFIGURATIONS) % len(TARGETS)]
     arm, fields = (
         _conditions(robot, rng) if rng.random() < 0.5 else (Arm(robot=robot, collisions=False), {})
     )
     start = _general(robot, rng)
-    q_goal = CONFIGURATIONS[where](robot, rng)
+    q_goal = CONFIGURATIONS[place](robot, rng)
     T = tcp_pose(arm, q_goal)
     axis = np.array([0.0, 0.0, 1.0])
     targets: dict[str, Any] = {
@@ -116,17 +113,17 @@ def request(robot: Robot, seed: int, index: int, **fixed: Any) -> tuple[str, Pro
         "several": AnyOf((Pose(T), Pose(tcp_pose(arm, _general(robot, rng))))),
     }
     begin: Any = (
-        Pose(tcp_pose(arm, CONFIGURATIONS[where](robot, rng)))
-        if what == "start and goal"
+        Pose(tcp_pose(arm, CONFIGURATIONS[place](robot, rng)))
+        if target == "start and goal"
         else start
     )
-    return f"{what}, {where}", Problem(
-        arm=arm, start=begin, goal=targets[what], deadline=DEADLINE, **fields, **fixed
+    return f"{target}, {place}", Problem(
+        arm=arm, start=begin, goal=targets[target], deadline=DEADLINE, **fields, **fixed
     )
 
 
 def _conditions(robot: Robot, rng: np.random.Generator) -> tuple[Arm, dict[str, Any]]:
-    """Random conditions: the arm, and fields of the problem."""
+    """An arm with random payload, mounting and bus, and random fields of the problem."""
     mass = float(rng.uniform(0.0, robot.rated_payload))
     com = rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.1])
     buses = [
@@ -154,7 +151,7 @@ def _conditions(robot: Robot, rng: np.random.Generator) -> tuple[Arm, dict[str, 
 
 
 def configurations(problem: Problem, target: Any, rng: np.random.Generator) -> Array:
-    """Configurations (n, nq) [rad] that reach a target: every branch, every full turn, members of
+    """Configurations (n, nq) [rad] at a target: all branches and full turns, and samples of
     self-motions.
     """
     if isinstance(target, np.ndarray):
@@ -174,19 +171,18 @@ def configurations(problem: Problem, target: Any, rng: np.random.Generator) -> A
 
 
 def attack(problem: Problem, starts: int, rng: np.random.Generator) -> tuple[float, str]:
-    """The least energy [J] of motions from random starts, and the label of the goal configuration
-    that has it.
-    """
+    """The least energy [J] of motions from random starts, and the label of its goal
+    configuration."""
     prepared, least, label = PreparedProblem.of(problem), np.inf, ""
     arm, space = problem.arm, bspline.uniform(POINTS)
     for _ in range(starts):
-        begins, ends = (
-            configurations(problem, getattr(problem, name), rng) for name in ("start", "goal")
+        starts_q, goals_q = (
+            configurations(problem, target, rng) for target in (problem.start, problem.goal)
         )
-        if not len(begins) or not len(ends):
+        if not len(starts_q) or not len(goals_q):
             continue
-        q_start = begins[int(rng.integers(len(begins)))]
-        q_goal = _near(ends, q_start, arm.friction_law.coulomb, rng)
+        q_start = starts_q[int(rng.integers(len(starts_q)))]
+        q_goal = _near(goals_q, q_start, arm.friction_law.coulomb, rng)
         points = q_start + np.outer(space.quintic, q_goal - q_start)
         if rng.random() < 0.7:
             points[space.free] += perturbation(rng, space, len(q_start))
@@ -196,7 +192,7 @@ def attack(problem: Problem, starts: int, rng: np.random.Generator) -> tuple[flo
         )
         direct = replace(problem, start=q_start, goal=q_goal)
         context = SolveContext.of(
-            replace(prepared, problem=direct), q_start, q_goal, Deadline.after(PATIENCE)
+            replace(prepared, problem=direct), q_start, q_goal, Deadline.after(SOLVE_TIME)
         )
         spline = FreeSpline(context).improve(guess).spline
         if spline is None:
@@ -208,15 +204,14 @@ def attack(problem: Problem, starts: int, rng: np.random.Generator) -> tuple[flo
 
 
 def _near(choices: Array, q: Array, coulomb: Array, rng: np.random.Generator) -> Array:
-    """One of the choices (n, nq), with odds that fall with the friction of the way to it."""
+    """A random one of the configurations (n, nq), preferably with little friction on the way to
+    it."""
     order = np.argsort(np.abs(choices - q) @ coulomb)
-    return np.asarray(choices[order[min(int(rng.geometric(ODDS)) - 1, len(order) - 1)]])
+    return np.asarray(choices[order[min(int(rng.geometric(NEAREST_SHARE)) - 1, len(order) - 1)]])
 
 
 def _loaded(robot: Robot, share: float) -> Robot:
-    """The robot with friction that grows with the load, if the share of it that is lost is not
-    zero.
-    """
+    """The robot with friction that is a share of the load of a joint; unchanged if it is zero."""
     if not share:
         return robot
     load = np.full(robot.nq, share)
@@ -226,15 +221,16 @@ def _loaded(robot: Robot, share: float) -> Robot:
 
 
 def main() -> int:
-    """Prints every broken bound, and how near the attack came; returns 1 if one is broken."""
+    """Prints every broken bound, and the excess of the answers over the attack; returns 1 if a
+    bound is broken."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=60, help="requests (%(default)s)")
     arguments.add_argument(
-        "--starts", type=int, default=20, help="motions for each request (%(default)s)"
+        "--starts", type=int, default=20, help="motions per request (%(default)s)"
     )
     arguments.add_argument("--robot", default="ur5e", help="robot (%(default)s)")
     arguments.add_argument(
-        "--load", type=float, default=0.0, help="share of a joint's load that is lost (%(default)s)"
+        "--load", type=float, default=0.0, help="friction over the load of a joint (%(default)s)"
     )
     arguments.add_argument(
         "--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)"

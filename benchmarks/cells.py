@@ -1,9 +1,7 @@
-"""Seeded random cells and tasks in them: tables with things on them, shelves, boxes with walls,
-cages of bars.
+"""Seeded random cells with tasks: tables with objects, shelves, boxes with walls, cages of bars.
 
-Task `index` of a seed is the first draw of (seed, index) that has a solution: start and goal are
-collision-free, and the path planner finds a path between them in AMPLE seconds. `python -m
-benchmarks.path_existence` asks other planners about the draws that are left out.
+Task `index` of a seed is the first draw of (seed, index) with a solution: start and goal are free
+of collisions, and the path planner finds a path between them within PLANNING_TIME.
 """
 
 from __future__ import annotations
@@ -41,19 +39,21 @@ Cell = Literal["table", "shelf", "bin", "cage"]
 CELLS: tuple[Cell, ...] = ("table", "shelf", "bin", "cage")
 MARGIN = 0.01
 """Margin of every obstacle [m]."""
-AMPLE = 5.0
-"""Longest time for the path planner [s]."""
-# a gripper 10 cm long, and where it grips
+PLANNING_TIME = 5.0
+"""Longest time of the path planner [s]."""
 TOOL = capsule_between(np.zeros(3), np.array([0.0, 0.0, 0.1]), 0.03)
+"""A gripper 10 cm long."""
 GRIP = 0.15
+"""Distance of the TCP from the flange [m]."""
 
 
 @dataclass(frozen=True)
 class CellTask:
-    """From q_start (nq,) [rad] to the TCP pose T_goal (4, 4), which q_goal reaches; found at draw
-    number `draws`.
+    """A task from q_start (nq,) [rad] to the TCP pose T_goal (4, 4), or to q_goal (nq,) at this
+    pose.
 
-    `blocked`: the straight line in joint space between q_start and q_goal collides.
+    `draws` is the number of the draw. If `blocked`, the straight line in joint space from q_start
+    to q_goal collides.
     """
 
     seed: int
@@ -73,7 +73,7 @@ class CellTask:
 
 
 def cell_task(seed: int, index: int) -> CellTask:
-    """Task `index` of a seed; the kinds of cells take turns."""
+    """Task `index` of a seed; the tasks alternate between the kinds of cells."""
     cell = CELLS[index % len(CELLS)]
     table = Obstacle("table", Box(np.array([2.0, 2.0, 0.04])), _at(0, 0, -0.03))
     for draw in count():
@@ -87,11 +87,11 @@ def cell_task(seed: int, index: int) -> CellTask:
         )
         model = CollisionModel(arm)
         T_start, T_goal = starts(), goals()
-        from_, to = (_clear(arm, model, T) for T in (T_start, T_goal))
-        if not from_ or not to:
+        starts_q, goals_q = (_clear(arm, model, T) for T in (T_start, T_goal))
+        if not starts_q or not goals_q:
             continue
-        q_start = from_[int(rng.integers(len(from_)))]
-        nearest_first = sorted(to, key=lambda q: float(np.abs(q - q_start).max()))
+        q_start = starts_q[int(rng.integers(len(starts_q)))]
+        nearest_first = sorted(goals_q, key=lambda q: float(np.abs(q - q_start).max()))
         q_goal = _reached(arm, model, q_start, nearest_first)
         if q_goal is not None:
             blocked = model.least_distance(np.linspace(q_start, q_goal, 200), 0.0) < 0
@@ -100,11 +100,12 @@ def cell_task(seed: int, index: int) -> CellTask:
 
 
 def _reached(arm: Arm, model: CollisionModel, q_start: Array, goals: list[Array]) -> Array | None:
-    """The first goal configuration (nq,) [rad] to which the path planner finds a path in AMPLE
-    seconds; None if there is none."""
-    checkers, one = ValidityCheckers(arm, model), Effort(paths=1)
+    """The first goal configuration (nq,) [rad] to which the path planner finds a path within
+    PLANNING_TIME; None if there is none."""
+    checkers, one_path = ValidityCheckers(arm, model), Effort(paths=1)
     for q_goal in goals:
-        if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), one, checkers=checkers).paths:
+        deadline = Deadline.after(PLANNING_TIME)
+        if plan_paths(arm, q_start, q_goal, deadline, one_path, checkers=checkers).paths:
             return q_goal
     return None
 
@@ -115,7 +116,8 @@ def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:
 
 
 def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
-    """Configurations (nq,) [rad] of a TCP pose with all margins and the reserve beyond them."""
+    """Configurations (nq,) [rad] at a TCP pose that requests may start or end at: with all margins,
+    and with the reserve of the clearance constraint beyond them."""
     kinematics = required_inverse_kinematics(arm.robot, "goal")
     try:
         found = kinematics.solve(
@@ -123,7 +125,6 @@ def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
         )
     except (UnreachablePose, SingularPose):
         return []
-    # what a request may start or end at
     return [
         each.q
         for each in found
@@ -132,13 +133,13 @@ def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
     ]
 
 
-# obstacles, and where the TCP may start and end (4, 4)
 _Cell = tuple[list[Obstacle], Callable[[], Array], Callable[[], Array]]
+"""Obstacles of a cell, and functions that draw TCP poses (4, 4) of the start and of the goal."""
 
 
 def _on_table(rng: np.random.Generator) -> _Cell:
     """Three to nine objects of any shape on the table."""
-    things = []
+    objects = []
     for number in range(int(rng.integers(3, 10))):
         size, kind = rng.uniform([0.05, 0.05, 0.1], [0.2, 0.2, 0.5]), int(rng.integers(4))
         shape: Shape = (
@@ -148,17 +149,14 @@ def _on_table(rng: np.random.Generator) -> _Cell:
             Sphere(size[2] / 4),
         )[kind]
         x, y = _around(rng, 0.3, 0.8)
-        things.append(
-            _thing(
-                f"thing {number}", shape, _at(x, y, size[2] / 2, _yaw(rng.uniform(-np.pi, np.pi)))
-            )
-        )
-    return things, lambda: _above(rng, 0.1, 0.4), lambda: _above(rng, 0.1, 0.4)
+        T = _at(x, y, size[2] / 2, _yaw(rng.uniform(-np.pi, np.pi)))
+        objects.append(_obstacle(f"thing {number}", shape, T))
+    return objects, lambda: _above(rng, 0.1, 0.4), lambda: _above(rng, 0.1, 0.4)
 
 
 def _shelf(rng: np.random.Generator) -> _Cell:
-    """Three boards between two sides, and a back; the goal is between two boards, the start in
-    front.
+    """A shelf of three boards, two sides and a back; the goal is between two boards, the start
+    above the table.
     """
     turn, distance = _yaw(rng.uniform(-np.pi, np.pi)), float(rng.uniform(0.55, 0.7))
     low, gap, width = (
@@ -169,7 +167,7 @@ def _shelf(rng: np.random.Generator) -> _Cell:
     depth, height = 0.3, 0.02 + 2 * gap
 
     def board(name: str, size: list[float], middle: tuple[float, float, float]) -> Obstacle:
-        return _thing(name, Box(np.array(size)), turn @ _at(*middle))
+        return _obstacle(name, Box(np.array(size)), turn @ _at(*middle))
 
     x = distance + depth / 2
     boards = [board(f"board {k}", [depth, width, 0.02], (x, 0, low + k * gap)) for k in range(3)]
@@ -189,9 +187,7 @@ def _shelf(rng: np.random.Generator) -> _Cell:
 
 
 def _bin(rng: np.random.Generator) -> _Cell:
-    """Two boxes open above, their four walls each; from the inside of one to the inside of the
-    other.
-    """
+    """Two open boxes with four walls each; the start is inside one, the goal inside the other."""
     walls, middles = [], []
     first = rng.uniform(-np.pi, np.pi)
     for number, angle in enumerate((first, first + rng.uniform(0.9, 2.5))):
@@ -201,22 +197,22 @@ def _bin(rng: np.random.Generator) -> _Cell:
         for side in (-1, 1):
             across, along = [length, 0.02, height], [0.02, width, height]
             walls.append(
-                _thing(
+                _obstacle(
                     f"wall {number} {2 * side}",
                     Box(np.array(across)),
                     T @ _at(0, side * width / 2, height / 2),
                 )
             )
             walls.append(
-                _thing(
+                _obstacle(
                     f"wall {number} {side}",
                     Box(np.array(along)),
                     T @ _at(side * length / 2, 0, height / 2),
                 )
             )
 
-    def inside(which: int) -> Array:
-        T, height = middles[which]
+    def inside(box: int) -> Array:
+        T, height = middles[box]
         x, y = rng.uniform(-0.06, 0.06, 2)
         return np.asarray(
             T @ _at(x, y, rng.uniform(0.05, 0.5 * height + 0.03), _DOWN @ _yaw(rng.uniform(-1, 1)))
@@ -226,12 +222,12 @@ def _bin(rng: np.random.Generator) -> _Cell:
 
 
 def _cage(rng: np.random.Generator) -> _Cell:
-    """Eight upright bars around the arm, and two that lie above."""
+    """Eight upright bars around the arm, and two horizontal beams above it."""
     bars = []
     for number in range(8):
         angle = 2 * np.pi * (number + rng.uniform(-0.25, 0.25)) / 8
         T = _yaw(angle) @ _at(rng.uniform(0.35, 0.75), 0, 0.4)
-        bars.append(_thing(f"bar {number}", Capsule(float(rng.uniform(0.01, 0.03)), 0.8), T))
+        bars.append(_obstacle(f"bar {number}", Capsule(float(rng.uniform(0.01, 0.03)), 0.8), T))
     for number in range(2):
         lying = np.eye(4)
         lying[:3, :3] = Rotation.from_euler("x", np.pi / 2).as_matrix()
@@ -240,7 +236,7 @@ def _cage(rng: np.random.Generator) -> _Cell:
             @ _at(rng.uniform(0.3, 0.6), 0, rng.uniform(0.7, 1.0))
             @ lying
         )
-        bars.append(_thing(f"beam {number}", Capsule(0.02, 1.0), T))
+        bars.append(_obstacle(f"beam {number}", Capsule(0.02, 1.0), T))
     return bars, lambda: _above(rng, 0.1, 0.6), lambda: _above(rng, 0.1, 0.6)
 
 
@@ -252,12 +248,13 @@ _DRAWS: dict[Cell, Callable[[np.random.Generator], _Cell]] = {
 }
 
 
-def _thing(name: str, shape: Shape, T: Array) -> Obstacle:
+def _obstacle(name: str, shape: Shape, T: Array) -> Obstacle:
     return Obstacle(name, shape, T, MARGIN)
 
 
 def _above(rng: np.random.Generator, least: float, most: float) -> Array:
-    """The TCP above the table, pointing down."""
+    """A random pose (4, 4) of the TCP above the table, with its z axis down, at a height between
+    `least` and `most` [m]."""
     x, y = _around(rng, 0.35, 0.65)
     return _at(x, y, rng.uniform(least, most), _DOWN @ _yaw(rng.uniform(-np.pi, np.pi)))
 
@@ -279,7 +276,7 @@ def _yaw(angle: float) -> Array:
     return T
 
 
-# the TCP's z axis points down, or outwards along x
+# orientations with the z axis of the TCP down, and outwards along x
 _DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
 _FORWARD = np.array(
     [[0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]

@@ -1,4 +1,4 @@
-"""Checks of the service's answers from outside: certificate, start and goal, limits, energy,
+"""Independent checks of the service's answers: certificate, start and goal, limits, energy,
 baselines.
 """
 
@@ -18,7 +18,7 @@ from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
 
-# RATIO, REACH and BALANCE are promises of the documentation of `POST /optimize`
+# the documentation of `POST /optimize` promises RATIO, REACH and BALANCE
 RATIO = 1 + 1e-6
 """Largest ratio of a quantity to its limit [1]."""
 REACH = 1e-6
@@ -30,8 +30,8 @@ SAME = 1e-9
 SLACK = 1e-6
 """Relative difference of energy below which a baseline is no better [1]; quadrature error."""
 MERGED = 2e-5
-"""The same for Ruckig's motion [1]: its representation as a spline merges close jumps of jerk, and
-is slower by up to this share."""
+"""SLACK of Ruckig's motion [1]: its representation as a spline merges close jumps of jerk, and is
+slower by up to this share."""
 LIMITS = ("position", "velocity", "acceleration", "jerk", "torque")
 PARTS = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered")
 
@@ -64,10 +64,10 @@ def errors_found(
 
 
 def refusal_errors(robot: Robot, problem: str, q_start: Array, q_goal: Array) -> list[str]:
-    """A message if the answer to a request between two configurations (nq,) [rad], both free of
-    collisions, is a problem, and the motors can hold the arm at both without any payload.
+    """A message if the service refuses a request between two collision-free configurations (nq,)
+    [rad] at which the motors can hold the arm without a payload.
 
-    Gravity's torques are those of Pinocchio.
+    Pinocchio computes the torques of gravity.
     """
     data = robot.model.createData()
     held = [np.abs(pin.computeGeneralizedGravity(robot.model, data, q)) for q in (q_start, q_goal)]
@@ -84,7 +84,7 @@ def _certificate_errors(answer: dict[str, Any]) -> Iterator[str]:
     certificate = answer["certificate"]
     for name in LIMITS:
         ratio = certificate["worst_ratio"][name]
-        # written so that NaN is an error, here and below
+        # these comparisons are written so that NaN is an error
         if ratio is None or not ratio <= RATIO:
             yield f"certificate: {name} ratio {ratio}"
     for end in ("start_error", "goal_error"):
@@ -127,7 +127,7 @@ def _replay_errors(
 
 
 def gap_of(gap: float | None) -> float:
-    """An optimality gap; infinite where no positive lower bound is known."""
+    """An optimality gap; infinite without a positive lower bound."""
     return math.inf if gap is None else gap
 
 
@@ -149,8 +149,7 @@ def _energy_errors(body: dict[str, Any], answer: dict[str, Any]) -> Iterator[str
 
 def beats(body: dict[str, Any], answer: dict[str, Any], baseline: dict[str, Any]) -> bool:
     """Whether a baseline is within limits, has an allowed duration, and needs less energy than the
-    answer.
-    """
+    answer."""
     if not baseline["within_limits"]:
         return False
     least, most = allowed(body.get("duration"))
@@ -173,7 +172,7 @@ def allowed(duration: Any) -> tuple[float, float]:
 
 
 def problem_of(body: dict[str, Any]) -> Problem:
-    """The problem of a request of `benchmarks.tasks`, with other targets."""
+    """The problem of a request of `benchmarks.tasks`, with a rest position as start and goal."""
     robot = load_robot(body["robot"])
     given = body.get("limits", {})
     limits: Limits = robot.limits.tightened(

@@ -1,5 +1,5 @@
-"""A motion replayed by Pinocchio and Coal: how many of its samples are in collision, for the bodies
-of the collision model, or for the meshes of the links.
+"""Replays of a motion by Pinocchio and Coal: the number of samples in collision, for the bodies of
+the collision model or for the meshes of the links.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from joulepath.optimizer.problem.arm import TOOL, Arm
 
 
 def collisions(arm: Arm, spline: Spline, period: float) -> int:
-    """Samples of a motion in collision, one every `period` [s] and the last."""
+    """Number of samples of a motion in collision; the samples are `period` [s] apart."""
     replay = CollisionReplay(arm, CollisionModel(arm))
     t = np.append(np.arange(0.0, spline.duration, period), spline.duration)
     return sum(replay.collides(q) for q in sample(spline, t)[0])
@@ -29,8 +29,8 @@ def collisions(arm: Arm, spline: Spline, period: float) -> int:
 def mesh_collisions(
     arm: Arm, meshes: Mapping[int, Sequence[Array]], spline: Spline, period: float
 ) -> int:
-    """Samples of a motion at which a mesh or a part of the tool overlaps an obstacle of the scene,
-    which is no cloud: one every `period` [s] and the last. Margins do not count.
+    """Number of samples of a motion at which a mesh of a link or a part of the tool overlaps an
+    obstacle. Point clouds do not count as obstacles, and margins are ignored.
 
     Args:
         arm: arm with its tool and scene.
@@ -44,13 +44,13 @@ def mesh_collisions(
         for k, triangles in enumerate(of_link):
             mesh = pin.GeometryObject(f"{link} {k}", link, pin.SE3.Identity(), _surface(triangles))
             moving.append((geometry.addGeometryObject(mesh), 0.0))
-    # the hulls of a tool, if it has any, and its capsules otherwise
+    # the tool is represented by its hulls if it has any, or else by its capsules
     has_hulls = any(part.is_hull for part in arm.tool)
     for number, body in enumerate(model.bodies[len(arm.robot.capsules) :]):
         if body.link == 0 or (body.name == TOOL and body.is_hull == has_hulls):
             growth = body.core.radius
             if _add(geometry, f"body {number}", body):
-                # Coal grows no meshes by a negative margin.
+                # Coal ignores a negative margin of a mesh, so the radius has the growth.
                 geometry.geometryObjects[geometry.ngeoms - 1].geometry.radius, growth = growth, 0.0
             (moving if body.link else obstacles).append((geometry.ngeoms - 1, growth))
     pairs = list(product(obstacles, moving))
@@ -66,7 +66,7 @@ def mesh_collisions(
 
 
 def _surface(triangles: Array) -> coal.CollisionGeometry:
-    """Coal's tree of triangles (t, 3, 3) [m]."""
+    """A bounding volume hierarchy of Coal over triangles (t, 3, 3) [m]."""
     mesh = coal.BVHModelOBBRSS()
     mesh.beginModel(len(triangles), 3 * len(triangles))
     for corners in triangles:
@@ -88,11 +88,8 @@ class CollisionReplay:
         skins = [
             _add(self._geometry, str(number), body) for number, body in enumerate(model.bodies)
         ]
-        self._clouds, self._model, self._reserve = (
-            np.flatnonzero(model.geometry.is_cloud),
-            model,
-            reserve,
-        )
+        self._clouds = np.flatnonzero(model.geometry.is_cloud)
+        self._model, self._reserve = model, reserve
         pairs = model.pairs[~model.geometry.is_cloud].tolist()
         for first, second in pairs:
             self._geometry.addCollisionPair(pin.CollisionPair(first, second))
@@ -101,20 +98,20 @@ class CollisionReplay:
             growth = [model.bodies[k].core.radius + model.bodies[k].margin - skins[k] for k in pair]
             request.security_margin = sum(growth) + reserve
             request.enable_contact = False
-        # It reads the security margins when it is built.
+        # The manager reads the security margins in its constructor.
         self._manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
             self._robot, self._geometry, self._geometry_data
         )
 
     def collides(self, q: Array) -> bool:
-        """Whether a pair is too near at q (nq,) [rad]."""
+        """Whether a pair of bodies is closer than allowed at q (nq,) [rad]."""
         chain = self._model.coupling.positions(q)
         if pin.computeCollisions(self._robot, self._data, self._manager, chain, True):
             return True
         return len(self._clouds) > 0 and self._hits_cloud(q)
 
     def _hits_cloud(self, q: Array) -> bool:
-        """Whether a body is nearer to a part of a cloud than allowed, by the cloud's own tree."""
+        """Whether a body is closer to a point cloud than allowed, by the tree of the cloud."""
         frames = self._model.frames(q[None])
         least = self._model.pair_distances(frames, self._clouds, self._reserve).distance.min()
         return bool(least < self._reserve)
@@ -125,14 +122,14 @@ def _add(geometry: pin.GeometryModel, name: str, body: Body) -> float:
     T, skin = np.eye(4), 0.0
     shape: coal.CollisionGeometry
     if body.cloud is not None:
-        # The cloud's own tree checks it; this placeholder keeps the number of the body.
+        # `_hits_cloud` checks clouds; this placeholder keeps the indices of the bodies.
         shape = coal.Sphere(COAL.skin)
     elif body.core.is_half_space:
         shape = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
     else:
         shape, skin, transform = coal_shape(body.core)
         T[:3, :3], T[:3, 3] = transform.getRotation(), transform.getTranslation()
-    # Names of bodies may repeat, and Pinocchio needs distinct ones.
+    # Pinocchio needs distinct names, and the names of bodies may repeat.
     placement = pin.SE3(body.T_link_core @ T)
     geometry.addGeometryObject(pin.GeometryObject(name, body.link, placement, shape))
     return skin

@@ -1,6 +1,4 @@
-"""Shared by the benchmarks' commands: one thread for linear algebra, common options, results as
-JSON.
-"""
+"""Common parts of all commands: one thread for linear algebra, shared options, results as JSON."""
 
 from __future__ import annotations
 
@@ -17,8 +15,9 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def on_one_core() -> None:
-    """Restarts this process if its linear algebra may use several threads. Call it before any
-    measurement.
+    """Restarts this process with one thread for linear algebra, unless it has one already.
+
+    Call this function before any measurement.
     """
     if any(os.environ.get(name) != "1" for name in THREADS):
         os.environ.update(dict.fromkeys(THREADS, "1"))
@@ -27,7 +26,7 @@ def on_one_core() -> None:
 
 
 def parser(description: str | None, seed: int = 0) -> argparse.ArgumentParser:
-    """A parser with the options that every command has: `--seed` and `--json`."""
+    """A parser with the common options `--seed` and `--json`."""
     result = argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -46,7 +45,7 @@ def write_json(path: Path | None, results: dict[str, Any]) -> None:
 
 
 def verdict(path: Path | None, results: dict[str, Any], failed: Sequence[object]) -> int:
-    """Writes results as JSON, and prints what failed; returns the exit code."""
+    """Writes results as JSON, and prints the failures; returns the exit code."""
     write_json(path, results)
     for each in failed:
         print(f"FAILED: {each}")

@@ -1,4 +1,4 @@
-"""Comparison of planners on the same tasks: one table, and one plot of energy over time."""
+"""Comparison of planners on the same tasks: a table, and a plot of energy over computing time."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from joulepath.models.robot import Array
 
 WHOLE = "joulepath, whole answer"
 PLOT = "time_against_energy.png"
-WITHIN = 1e-3  # largest relative excess over a limit at which a motion counts as within limits
-# Okabe and Ito's palette, which colour-blind readers can tell apart; joulepath's own in one colour
+WITHIN = 1e-3
+"""Largest relative excess over a limit of a motion that counts as within limits [1]."""
+# The palette of Okabe and Ito can be distinguished by colour-blind readers.
 OURS = "#D55E00"
+"""Colour of joulepath."""
 COLOURS = ["#0072B2", "#56B4E9", "#009E73", "#CC79A7", "#E69F00", "#000000", "#999999"]
 MARKERS = "osD^vPX*<"
 
 
 @dataclass(frozen=True)
 class Row:
-    """One planner: times (n,) [s], energies (n,) [J] and largest ratios (n,) value / limit; NaN
-    without a motion.
+    """Results of one planner: computing times (n,) [s], energies (n,) [J], largest ratios (n,) of
+    a value to its limit, and durations (n,) [s]; NaN without a motion.
     """
 
     title: str
@@ -37,13 +39,13 @@ class Row:
 
     @property
     def feasible(self) -> Array:
-        """Energies (n,) [J] of the motions within all limits, else NaN."""
+        """Energies (n,) [J] of the motions within all limits; NaN for other motions."""
         return np.where(self.ratio <= 1 + WITHIN, self.energy, np.nan)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All planners on the same tasks; `best` (n,) [J] is the least energy of any motion within
+    """All planners on the same tasks; `best` (n,) [J] has the least energies of the motions within
     limits.
     """
 
@@ -53,7 +55,7 @@ class Comparison:
 
     @staticmethod
     def of(results: dict[str, dict[str, Any]]) -> Comparison:
-        """From the results that `python -m benchmarks.planners` writes."""
+        """The comparison of results of `python -m benchmarks.planners`."""
         count = min((len(found["rows"]) for found in results.values()), default=0)
         rows = [_row(name, found, count) for name, found in results.items()]
         best = np.full(count, np.inf)
@@ -62,7 +64,7 @@ class Comparison:
         return Comparison(rows, best, next((found["seed"] for found in results.values()), 0))
 
     def above(self, row: Row) -> Array:
-        """Relative excess (n,) of a planner's energies over the best, within limits or not."""
+        """Relative excess (n,) of the energies of all motions of a planner over the best."""
         return row.energy / self.best - 1
 
     def formatted(self) -> str:
@@ -137,7 +139,7 @@ class Comparison:
 def _row(name: str, found: dict[str, Any], count: int) -> Row:
     def column(field: str, missing: float) -> Array:
         values = [row.get(field, np.nan) for row in found["rows"][:count]]
-        # JSON has no infinity
+        # JSON stores infinity as null
         return np.array([missing if value is None else value for value in values], dtype=float)
 
     return Row(
@@ -160,8 +162,8 @@ def _worst(row: Row) -> str:
 
 
 def draw(planners: Comparison, path: Path) -> None:
-    """Plots medians with quartiles, and every task as a dot; a hollow marker means that limits are
-    violated.
+    """Plots every task as a dot, and the medians with quartiles; the marker of a planner that
+    violates limits is hollow.
     """
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()

@@ -1,17 +1,17 @@
-"""How far the capsules and the hulls of links and tools reach beyond the meshes that they cover.
+"""Excess of the capsules and hulls of links and tools over the meshes that they cover.
 
     python -m benchmarks.covers
     python -m benchmarks.covers --meshes panda=FOLDER ur10e=FOLDER franka_hand=FOLDER
 
-FOLDER contains the meshes of a robot as `joulepath.models.meshes` describes, or of a tool as
-`joulepath.models.tool_meshes` does. Without folders, the meshes are those of UR3e, UR5e and Robotiq
-2F-85 in the package `airo-models`. For every moving link, the table has the number of uncovered
-pieces of the meshes' triangles, and the excess: the distance of points of the cover's surface from
-the nearest point of any mesh of the link. Points within the covers of a neighbouring link at eight
-angles of the joint between them do not count, nor do points of a tool in the flange that carries
-it. The opening of 24 mm × 19 mm in Gen3's flange counts as closed, by its lid in LIDS. The meshes
-of a tool are those at every opening, and the cover is proven in between, too. The exit code is 1 if
-a hull leaves a piece uncovered or exceeds the limits below.
+FOLDER contains the meshes of a robot (`joulepath.models.meshes`) or of a tool
+(`joulepath.models.tool_meshes`). Without folders, the package `airo-models` provides the meshes of
+UR3e, UR5e and Robotiq 2F-85. For every moving link, the table has the number of uncovered pieces of
+the mesh triangles, and the excess: the distance of points on the surface of the cover from the
+nearest point of any mesh of the link. Points within the covers of a neighbouring link, at eight
+angles of the joint between the links, do not count; neither do points of a tool inside the flange.
+The opening of 24 mm × 19 mm in the flange of Gen3 counts as closed by its lid in LIDS. A tool has
+one set of meshes per opening; the cover is also proven between the openings. The exit code is 1 if
+a hull leaves a piece uncovered or exceeds P99 or MOST.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ DIRECTIONS = 2_000
 
 @dataclass(frozen=True)
 class Excess:
-    """Excess [m] of the covers of one kind on one link, or on all links, with the number of bodies
+    """Excess [m] of the covers of one kind on one link or on all links, with the numbers of bodies
     and of uncovered pieces.
     """
 
@@ -91,14 +91,15 @@ def beyond(
     rng: np.random.Generator,
     within: Inside = nowhere,
 ) -> Array:
-    """Distances (n,) [m] of the outer surface of covers from meshes of triangles (t, 3, 3) [m],
-    except `within` other bodies.
+    """Distances (n,) [m] of the outer surface of covers from meshes of triangles (t, 3, 3) [m].
+
+    Points `within` other bodies are left out.
     """
     found = []
     for cover in covers:
-        points, others = shell(cover, rng), [each for each in covers if each is not cover]
-        if others:
-            points = points[outside(points, others).min(axis=0) >= 0]
+        points, other_covers = shell(cover, rng), [each for each in covers if each is not cover]
+        if other_covers:
+            points = points[outside(points, other_covers).min(axis=0) >= 0]
         found.append(points[~within(points)])
     near = np.concatenate([sampled(each, MESH_POINTS, rng) for each in meshes])
     return np.asarray(cKDTree(near).query(np.concatenate(found))[0])
@@ -110,8 +111,8 @@ def of_robot(name: str, folder: Path, seed: int) -> list[Excess]:
     meshes = {
         link: list(link_surfaces(folder, name, link).values()) for link in range(1, robot.nq + 1)
     }
-    for (of, link), lid in LIDS.items():
-        if of == name:
+    for (robot_name, link), lid in LIDS.items():
+        if robot_name == name:
             meshes[link].append(lid)
     for kind, covers in (("capsules", robot.capsules), ("hulls", robot.hulls)):
         of_links = {link: [each for each in covers if each.link == link] for link in meshes}
@@ -149,8 +150,9 @@ def of_tool(name: str, folder: Path, seed: int) -> list[Excess]:
 
 
 def unproven(openings: Array, covers: Sequence[LinkCover], sagitta: float) -> int:
-    """The number of uncovered pieces of triangles (n, t, 3, 3) [m] on their ways between openings,
-    which leave the chords by a sagitta [m].
+    """The number of uncovered pieces of triangles (n, t, 3, 3) [m] between the openings of a tool.
+
+    The paths between two openings deviate from the chords by a sagitta [m].
     """
     smaller = [replace(each, radius=each.radius - sagitta) for each in covers]
     return len(not_held(between(openings), smaller))
@@ -162,7 +164,7 @@ def _found(
     meshes: Sequence[Array],
     *rest: Any,
 ) -> tuple[Excess, Array]:
-    """The row of robot, link and kind of cover, and its distances by `beyond`."""
+    """The row of a robot, link and kind of cover, and its distances by `beyond`."""
     missed = sum(len(not_held(m, covers)) for m in meshes)
     excess = beyond(covers, meshes, *rest)
     return _row(*of, len(covers), missed, excess), excess
@@ -188,7 +190,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     folders = {name: Path(folder) for name, _, folder in (e.partition("=") for e in given.meshes)}
     if unknown := sorted(set(folders) - {*SHIFTS, *MESH_FILES, *TOOL_MESHES}):
         known = ", ".join((*SHIFTS, *MESH_FILES, *TOOL_MESHES))
-        command.error(f"no meshes of {', '.join(unknown)} are read: {known}")
+        command.error(f"meshes of {', '.join(unknown)} cannot be read: give one of {known}")
     on_one_core()
     if not folders:
         found = {name: installed(name) or installed_tool(name) for name in (*SHIFTS, *TOOL_MESHES)}

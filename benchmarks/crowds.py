@@ -1,9 +1,9 @@
-"""Crowds of clients on a service of their own: those that leave early, those with tight deadlines,
-all kinds at once.
+"""Crowds of clients on one service: impatient clients, short deadlines, or mixed requests.
 
-An honest client optimises short motions before, during and after; beside it, one asks for
-`/healthz`. Wanted: no status 500, all workers there afterwards, and an honest client that keeps a
-third of the answers that it gets alone.
+Each crowd has a new service. An honest client optimises short motions before, during and after the
+crowd, and a second client requests `/healthz`. The service passes if no status is 500, if all
+workers run afterwards, and if the honest client receives at least a third as many answers during
+the crowd as before it.
 """
 
 from __future__ import annotations
@@ -24,30 +24,41 @@ import numpy as np
 import orjson
 
 from benchmarks.attack_bodies import long_search, move
-from benchmarks.observed_attack import beside, honest, probe
+from benchmarks.observed_attack import honest, in_parallel, probe
 from benchmarks.service import Service, running
 
-ADDRESSES = [f"127.0.0.{k}" for k in range(66, 70)]  # of the crowd: each is a client of its own
-ALONE = 15.0  # time for which the honest client is alone, before and after [s]
-SETTLING = 5.0  # from the end of a crowd until all workers are to be there again [s]
-SHORT = 30.0  # time of a crowd, but for the mixed one [s]
-LEAVING = 0.05  # after which an impatient client leaves [s]
-HURRY = 1.0  # the same of a hurried one, which comes again [s]
-TIGHT = 2.0  # deadline of those that wait for their answers [s]
-PATIENCE = 60.0  # longest time for an answer [s]
+ADDRESSES = [f"127.0.0.{k}" for k in range(66, 70)]
+"""Addresses of the crowd; the service counts every address as a client."""
+ALONE = 15.0
+"""Duration of the phases without a crowd [s]."""
+SETTLING = 5.0
+"""Time from the end of a crowd until all workers must run again [s]."""
+SHORT = 30.0
+"""Longest duration of every crowd except `mixed` [s]."""
+IMPATIENT_TIMEOUT = 0.05
+"""Timeout of an impatient client [s]."""
+HURRIED_TIMEOUT = 1.0
+"""Timeout of a hurried client [s]."""
+TIGHT_DEADLINE = 2.0
+"""Deadline of the requests of the crowd `tight` [s]."""
+TIMEOUT = 60.0
+"""Timeout of every other client [s]."""
 HEAD = (
     "| crowd | phase | s | honest 200 per s | honest other | crowd | workers | /readyz | /healthz "
     "p99, ms | most |\n"
     "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 )
-NOTED = ('"traceback"', "mended the queue", "did not end in time", "begins again")
-LEFT = 0  # in place of the status of a client that did not wait for one
+COUNTED_MESSAGES = ('"traceback"', "mended the queue", "did not end in time", "begins again")
+"""Texts that are counted in the log of the service."""
+DISCONNECTED = 0
+"""Replaces the status if the client disconnected before the answer."""
 
 
 @dataclass(frozen=True)
 class Phase:
-    """What was seen in a phase of `time` [s]: statuses of the honest client and of the crowd,
-    workers and `/readyz` at its end, times for `/healthz` [ms]."""
+    """Observations of a phase: its duration `time` [s], counts of the statuses of the honest client
+    and of the crowd, number of workers and status of `/readyz` at its end, response times of
+    `/healthz` [ms]."""
 
     name: str
     time: float
@@ -60,9 +71,9 @@ class Phase:
 
 
 async def ask(
-    port: int, address: str, path: str, body: dict[str, Any], longest: float = PATIENCE
+    port: int, address: str, path: str, body: dict[str, Any], timeout: float = TIMEOUT
 ) -> int:
-    """The status of the answer; LEFT if that takes longer [s] than the client waits."""
+    """The status of the answer; DISCONNECTED if it does not arrive within the timeout [s]."""
     content = orjson.dumps(body)
     head = (
         f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nConnection: "
@@ -72,20 +83,20 @@ async def ask(
     reader, writer = await asyncio.open_connection("127.0.0.1", port, local_addr=(address, 0))
     try:
         writer.write(head.encode() + content)
-        async with asyncio.timeout(longest):
+        async with asyncio.timeout(timeout):
             status = int((await reader.readline()).split()[1])
             while await reader.read(1 << 16):
                 pass
             return status
     except (TimeoutError, OSError, IndexError):
-        return LEFT
+        return DISCONNECTED
     finally:
         writer.transport.abort()
 
 
 async def impatient(port: int, address: str, rng: random.Random) -> int:
-    """A client that leaves at once."""
-    return await ask(port, address, "/optimize", move(), LEAVING)
+    """A client that disconnects soon after its request."""
+    return await ask(port, address, "/optimize", move(), IMPATIENT_TIMEOUT)
 
 
 async def patient(port: int, address: str, rng: random.Random) -> int:
@@ -94,33 +105,33 @@ async def patient(port: int, address: str, rng: random.Random) -> int:
 
 
 async def hurried(port: int, address: str, rng: random.Random) -> int:
-    """A client that waits for less time than its turn takes."""
-    return await ask(port, address, "/optimize", move(), HURRY)
+    """A client whose timeout is shorter than the time its request needs in the crowd."""
+    return await ask(port, address, "/optimize", move(), HURRIED_TIMEOUT)
 
 
 async def tight(port: int, address: str, rng: random.Random) -> int:
-    """A client that waits for its answer, which is due soon."""
-    status = await ask(port, address, "/optimize", move() | {"deadline": TIGHT})
+    """A client that waits for its answer, and sets a short deadline in the request."""
+    status = await ask(port, address, "/optimize", move() | {"deadline": TIGHT_DEADLINE})
     await asyncio.sleep(0.1 if status in (429, 503) else 0.0)
     return status
 
 
 async def mixed(port: int, address: str, rng: random.Random) -> int:
-    """Any client: short and long requests, some that leave, jobs, inverse kinematics."""
+    """A client with a random request (a motion, a long search, inverse kinematics, a front or a
+    job) and a random timeout."""
     pose = {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
     path, body = rng.choice(
         [
             ("/optimize", move()),
-            ("/optimize", move() | {"deadline": rng.choice([0.2, 1.0, TIGHT])}),
-            ("/optimize", long_search(rng.choice([TIGHT, 5.0]))),
+            ("/optimize", move() | {"deadline": rng.choice([0.2, 1.0, TIGHT_DEADLINE])}),
+            ("/optimize", long_search(rng.choice([TIGHT_DEADLINE, 5.0]))),
             ("/ik", {"pose": pose}),
             ("/pareto", {**move(), "points": 3, "deadline": 5.0}),
             ("/jobs", {"requests": [{"optimize": move() | {"deadline": 5.0}}]}),
         ]
     )
-    status = await ask(
-        port, address, path, body, rng.choice([LEAVING, 0.3, 1.0, PATIENCE, PATIENCE])
-    )
+    timeout = rng.choice([IMPATIENT_TIMEOUT, 0.3, 1.0, TIMEOUT, TIMEOUT])
+    status = await ask(port, address, path, body, timeout)
     await asyncio.sleep(rng.uniform(0.0, 0.2))
     return status
 
@@ -133,14 +144,14 @@ CROWDS: dict[str, tuple[Kind, int, int]] = {
     "tight": (tight, 60, len(ADDRESSES)),
     "mixed": (mixed, 24, len(ADDRESSES)),
 }
-"""Each crowd: what one of its connections does again and again, how many there are, and from how
-many addresses.
-"""
+"""Crowds by name: the request that every connection repeats, the number of connections, and the
+number of addresses."""
 
 
 async def crowd(service: Service, name: str, seconds: float, kill_every: float) -> Counter[int]:
-    """How often each status was answered to the crowd; workers are killed meanwhile if a period [s]
-    is given.
+    """Counts of the statuses that a crowd receives within `seconds`.
+
+    A random worker is killed every `kill_every` seconds, or none if it is zero.
     """
     kind, connections, addresses = CROWDS[name]
     end, seen = time.perf_counter() + seconds, Counter[int]()
@@ -166,7 +177,8 @@ async def crowd(service: Service, name: str, seconds: float, kill_every: float) 
 
 
 def workers_of(service: Service) -> list[int]:
-    """Process ids of the workers: what the fork server has started."""
+    """Process ids of the workers: the descendants of the service that are not its children, because
+    the fork server starts them."""
     children = (
         Path(f"/proc/{service.process.pid}/task/{service.process.pid}/children").read_text().split()
     )
@@ -175,11 +187,12 @@ def workers_of(service: Service) -> list[int]:
 
 
 def observed(service: Service, name: str, attack: Callable[[], Counter[int]]) -> Phase:
-    """What is seen while `attack` runs."""
-    with beside(probe, service.port) as end_probe, beside(honest, service.port) as end_honest:
+    """The observations of the phase in which `attack` runs."""
+    port = service.port
+    with in_parallel(probe, port) as end_probe, in_parallel(honest, port) as end_honest:
         began = time.perf_counter()
-        seen = attack()
-        taken = time.perf_counter() - began
+        statuses = attack()
+        duration = time.perf_counter() - began
         walls, answers = end_probe(), end_honest()
     metrics = service.client().get("/metrics").raw.decode()
     workers = next(
@@ -187,9 +200,9 @@ def observed(service: Service, name: str, attack: Callable[[], Counter[int]]) ->
     )
     return Phase(
         name,
-        taken,
+        duration,
         dict(Counter(status for status, _ in answers)),
-        dict(seen),
+        dict(statuses),
         int(float(workers.split()[1])),
         service.client().get("/readyz").status,
         float(np.percentile(walls, 99)) * 1e3,
@@ -198,29 +211,33 @@ def observed(service: Service, name: str, attack: Callable[[], Counter[int]]) ->
 
 
 def alone() -> Counter[int]:
-    """Nobody but the honest client."""
+    """A phase without a crowd."""
     time.sleep(ALONE)
     return Counter()
 
 
 def line(name: str, phase: Phase) -> str:
     """A row of the table."""
-    share = phase.honest.get(200, 0) / phase.time
+    rate = phase.honest.get(200, 0) / phase.time
     crowd = ", ".join(
         f"{count} × {status or 'left'}" for status, count in sorted(phase.crowd.items())
     )
-    others = ", ".join(
+    refusals = ", ".join(
         f"{count} × {status}" for status, count in sorted(phase.honest.items()) if status != 200
     )
     return (
-        f"| {name} | {phase.name} | {phase.time:.0f} | {share:.2f} | {others} | {crowd} | "
+        f"| {name} | {phase.name} | {phase.time:.0f} | {rate:.2f} | {refusals} | {crowd} | "
         f"{phase.workers} | {phase.ready} | {phase.healthz_p99:.0f} | {phase.healthz_most:.0f} |"
     )
 
 
 def report(name: str, minutes: float, kill_every: float) -> list[Phase]:
-    """The phases of a crowd on a new service, which are printed, too. The mixed crowd takes so long
-    [min].
+    """Runs a crowd on a new service, and prints and returns its phases.
+
+    Args:
+        name: name of the crowd.
+        minutes: duration of the crowd [min]; every crowd except `mixed` lasts at most SHORT.
+        kill_every: period at which a worker is killed [s]; zero kills none.
     """
     seconds = 60 * minutes if name == "mixed" else min(SHORT, 60 * minutes)
     with running() as service:
@@ -237,8 +254,6 @@ def report(name: str, minutes: float, kill_every: float) -> list[Phase]:
             print(line(name, phase), flush=True)
         service.log.seek(0)
         log = service.log.read()
-    noted = {word: log.count(word.encode()) for word in NOTED}
-    print(
-        "in the log: " + ", ".join(f"{count} × {word}" for word, count in noted.items()), flush=True
-    )
+    counts = [f"{log.count(text.encode())} × {text}" for text in COUNTED_MESSAGES]
+    print("in the log: " + ", ".join(counts), flush=True)
     return phases

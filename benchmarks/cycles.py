@@ -1,5 +1,4 @@
-"""Cycles of stops: what deciding all stops together saves against move by move, the proven gap, and
-the time.
+"""Cycles of stops: the saving over decisions move by move, the proven gap, and the time.
 
     python -m benchmarks.cycles --count 20
     python -m benchmarks.cycles --count 50 --dwell 0
@@ -11,18 +10,21 @@ the time.
     python -m benchmarks.cycles --count 5 --stops 12 --free
     python -m benchmarks.cycles --count 1 --stops 245 --deadline 600
 
-A UR5e starts from rest at given joint positions over the table, takes up 2 kg at every other stop,
-puts it down at the next one, and comes back. Poses are drawn with the tool nearly down where the
-arm reaches them. It dwells 0.3 s at each, or as long as `--dwell` says: what it draws then, no
-choice of configurations saves. Collisions are ignored, so that every cycle has an answer. With
-`--anywhere`, the start is one more such pose, in any configuration: choosing move by move, the
-first move chooses it. With `--turned`, the parts are cycle: the tool may be turned by any angle
-about its axis at every stop. With `--time`, each cycle gets so many times the duration of least
-energy; the excess is what its answer needs beyond the least of its feasible baselines and of the
-cycle in its own time with a wait, and ends the benchmark if there is any. With `--passes`, it
-passes through the first stops without a rest, and carries the part nowhere; then a cycle that needs
-more than the one that stops there ends the benchmark. With `--free`, the order is free, and the arm
-carries nothing either.
+A UR5e starts from rest at given joint positions above the table, picks up 2 kg at every second
+stop, puts the part down at the next stop, and returns. The poses of the stops are random, within
+reach, and with the tool nearly down. The arm dwells 0.3 s at each stop, or the time of `--dwell`;
+no choice of configurations saves the energy of a dwell. Collisions are ignored, so that every cycle
+has an answer. The options change the cycles:
+
+- `--anywhere`: the start is also a pose, in any configuration. If the moves are decided one by one,
+  the first move decides this configuration.
+- `--turned`: the parts are round, so that the tool may have any angle about its axis at every stop.
+- `--time`: the duration of a cycle is this multiple of its duration of least energy. The excess is
+  the energy of the answer over the least energy of its feasible baselines and of the cycle of least
+  energy followed by a wait. The benchmark fails if there is any.
+- `--passes`: the arm passes through the first stops without a rest, and carries no part. The
+  benchmark fails if a cycle needs more energy than the same cycle with rests.
+- `--free`: the order of the stops is free, and the arm carries no part.
 """
 
 from __future__ import annotations
@@ -64,19 +66,20 @@ HEIGHTS = (0.05, 0.4)
 TILT = 0.2
 """Largest roll and pitch of the tool at a stop [rad]."""
 
-# of a stop [s]
 DWELL = 0.3
-# of a cycle: largest jump of a joint between legs [rad]; its energy without that of the legs and
-# rests, and without its parts, relative. All are sums of the same numbers in another order
+"""Dwell at a stop [s]."""
 SUMS = ("joins [rad]", "energy of the legs", "parts of the energy")
+"""Quantities of a cycle that are zero up to rounding: the largest jump of a joint between legs, and
+the relative errors of the sum of the energies of all legs, and of the sum of the energy's parts."""
 EXACT = 1e-9
+"""Largest rounding error of these quantities."""
 EXCESS = "excess over the least of all"
 NO_EXCESS = 1e-6
 """Relative difference within which energies of equal motions agree [1]."""
 
 
 def poses(rng: np.random.Generator, count: int) -> list[Pose]:
-    """Poses with the tool nearly down."""
+    """Random poses with the tool nearly down."""
     found = list[Pose]()
     while len(found) < count:
         x, y, z = rng.uniform([-FARTHEST, -FARTHEST, HEIGHTS[0]], [FARTHEST, FARTHEST, HEIGHTS[1]])
@@ -97,7 +100,7 @@ def rounds(
     anywhere: bool = False,
     turned: bool = False,
 ) -> Iterator[Cycle]:
-    """The cycles, each with a generator of its own."""
+    """The cycles; every cycle has its own random generator."""
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
     for k in range(count):
         *targets, first = poses(np.random.default_rng([seed, k]), stops + 1)
@@ -127,24 +130,24 @@ def _stop(
 
 
 def in_time(asked: Cycle, own: CycleSolution, factor: float) -> Cycle:
-    """The cycle in so many times the duration that it has by itself."""
+    """The cycle with a multiple `factor` of the duration of its solution of free duration."""
     duration = factor * own.duration
     return replace(asked, duration_min=duration, duration_max=duration)
 
 
 def excess(answer: CycleSolution, own: CycleSolution | None) -> float:
-    """What a cycle needs beyond the least of its feasible baselines, relative; `own` is it in its
-    own time, which may wait where that draws least, on its motors.
+    """Relative excess of a cycle over the least energy of the known feasible cycles: its baselines,
+    and the solution `own` of free duration followed by a wait on the motors, at the stop of least
+    power.
 
-    Not of `controller_default`, whose acceleration jumps where it begins: no certificate confirms
-    that.
+    The baseline `controller_default` does not count: its acceleration jumps at the start, so that
+    no certificate confirms it.
     """
-    others = [
-        each
+    known = [
+        each.electrical
         for each in answer.baselines
         if each.within_limits and each.name != "controller_default"
     ]
-    known = [each.electrical for each in others]
     if own is not None and answer.duration >= own.duration:
         held = [
             holding_power(
@@ -164,17 +167,15 @@ def _torque_at(arm: Arm, q: Array) -> Array:
 
 
 def _sums(answer: CycleSolution) -> dict[str, float]:
-    """What must be zero but for rounding: jumps between legs, and the legs' energies without the
-    cycle's.
-    """
+    """The quantities of SUMS."""
     electrical = answer.energy.electrical
-    own = sum(
+    of_legs = sum(
         move.solution.energy.electrical.total + move.dwell_energy + move.wait_energy
         for move in answer.moves
     )
     errors = (
         answer.joins,
-        abs(own / electrical.total - 1),
+        abs(of_legs / electrical.total - 1),
         abs(electrical.parts_sum / electrical.total - 1),
     )
     return dict(zip(SUMS, errors, strict=True))
@@ -189,7 +190,7 @@ def _given() -> argparse.Namespace:
         "--deadline", type=float, default=60.0, help="deadline of a cycle [s] (%(default)s)"
     )
     arguments.add_argument(
-        "--passes", type=int, default=0, help="stops that are passed (%(default)s)"
+        "--passes", type=int, default=0, help="stops without a rest (%(default)s)"
     )
     arguments.add_argument("--free", action="store_true", help="the order is free")
     arguments.add_argument(
@@ -199,7 +200,7 @@ def _given() -> argparse.Namespace:
         "--turned", action="store_true", help="the tool may be turned about its axis at the stops"
     )
     arguments.add_argument(
-        "--time", type=float, help="give each cycle so many times its own duration"
+        "--time", type=float, help="duration of a cycle over its duration of least energy"
     )
     arguments.add_argument(
         "--dwell", type=float, default=DWELL, help="dwell at each stop [s] (%(default)s)"
@@ -208,13 +209,12 @@ def _given() -> argparse.Namespace:
 
 
 def main() -> None:
-    """Solves every cycle, and prints savings, gaps, times and the number of motions sought."""
+    """Solves every cycle, and prints savings, gaps, times and the number of solved motions."""
     given = _given()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
-    plan_cycle(
-        next(rounds(given.seed + 1, 1, 1, given.deadline))
-    )  # loads what the others find loaded
+    # loads everything that is loaded once, so that the first cycle does not pay for it
+    plan_cycle(next(rounds(given.seed + 1, 1, 1, given.deadline)))
     found: dict[str, list[float]] = {}
     optimal = legs = certified = 0
     how = (given.passes, given.free, given.dwell, given.anywhere, given.turned)
@@ -250,7 +250,7 @@ def main() -> None:
 def _report(
     given: argparse.Namespace, found: dict[str, list[float]], counts: tuple[int, int, int]
 ) -> None:
-    """Prints the spread of all quantities; ends with 1 if a requirement fails."""
+    """Prints the distributions of all quantities. Raises SystemExit if a requirement fails."""
     optimal, certified, legs = counts
     print(f"{given.count} cycles of {given.stops} stops, seed {given.seed}: {optimal} optimal")
     print(f"legs with a valid certificate    {certified} of {legs}")
@@ -265,10 +265,10 @@ def _report(
     )
     if results[EXCESS].maximum > NO_EXCESS:
         raise SystemExit(
-            f"a cycle needs {results[EXCESS].maximum:.2%} more than another one in hand"
+            f"a cycle needs {results[EXCESS].maximum:.2%} more energy than a known cycle"
         )
     if certified < legs or max(results[name].maximum for name in SUMS) > EXACT:
-        raise SystemExit("a leg is not certified, or the legs are not the cycle")
+        raise SystemExit("a leg is not certified, or the legs do not add up to the cycle")
 
 
 if __name__ == "__main__":

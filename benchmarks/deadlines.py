@@ -1,14 +1,13 @@
-"""Overrun of short deadlines by hard requests. The exit code is 1 if one overruns by more than
-MOST.
+"""Overrun of short deadlines by hard requests.
 
     python -m benchmarks.deadlines --count 200 --seed 0
     python -m benchmarks.deadlines --only "slow TCP" fronts --count 40
 
-Each kind of request is hard in its own way: a TCP so slow that a motion takes minutes, 64
-obstacles, motions of ten minutes with 20,000 samples, 32 targets, the mechanical objective, and
-fronts. Each is run as a worker runs it, from the validated request to the encoded document, in this
-process, with a deadline of 20 ms to 2 s. The overrun is the time after the deadline at which the
-document or problem is there.
+The kinds of requests are a TCP so slow that a motion takes minutes, 64 obstacles, motions of ten
+minutes with 20,000 samples, 32 targets, the mechanical objective, and fronts. Every request runs in
+this process as in a worker, from the validated request to the encoded document, with a deadline of
+20 ms to 2 s. The overrun is the time from the deadline until the document or the problem is
+complete. The exit code is 1 if an overrun is above MOST. `--verbose` prints every request.
 """
 
 from __future__ import annotations
@@ -37,20 +36,21 @@ from joulepath.optimizer.optimize import warm_up
 
 Fields = dict[str, Any]
 
-# the greatest overrun that is allowed [s]
 MOST = 0.3
-# deadlines [s]
+"""Largest admissible overrun [s]."""
 DEADLINES = (0.02, 0.1, 0.3, 1.0, 2.0)
-# sample period [s] of which motions of ten minutes have as many samples as an answer may have
+"""Deadlines of the requests [s]."""
 COARSE = 0.03
-# the robot of all requests
+"""Sample period with which a motion of ten minutes has the largest allowed number of samples
+[s]."""
 ROBOT = "ur5e"
+"""The robot of all requests."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One request: its kind, deadline and overrun [s], and the status of its answer or the type of
-    its problem.
+    """The outcome of one request: its kind, deadline [s] and overrun [s], and the status of the
+    answer or the type of the problem.
     """
 
     kind: str
@@ -72,20 +72,21 @@ def pose(rng: np.random.Generator) -> Fields:
 
 
 def between(rng: np.random.Generator, to_pose: bool | None = None) -> Fields:
-    """A start and a goal: a pose, joint positions, or at random one of both."""
+    """Start at joint positions, and goal at a pose or at joint positions, at random if `to_pose` is
+    None."""
     to_pose = bool(rng.integers(2)) if to_pose is None else to_pose
     return {"start": joint(rng), "goal": pose(rng) if to_pose else joint(rng)}
 
 
 def slow_tcp(rng: np.random.Generator) -> Fields:
-    """Minutes long: the TCP creeps."""
+    """A motion of minutes, with a very low speed limit of TCP or elbow."""
     name = str(rng.choice(["tcp_speed", "elbow_speed"]))
     speed = float(np.exp(rng.uniform(np.log(1e-3), np.log(0.05))))
     return between(rng) | {"limits": {name: speed}, "sample_period": 0.02}
 
 
 def obstacles(rng: np.random.Generator) -> Fields:
-    """64 obstacles of every shape, and a tool of many capsules."""
+    """64 obstacles of four shapes, and a tool of 16 capsules."""
     shapes = []
     for k in range(64):
         at = rng.normal(size=3)
@@ -113,18 +114,18 @@ def obstacles(rng: np.random.Generator) -> Fields:
 
 
 def ten_minutes(rng: np.random.Generator) -> Fields:
-    """The longest motion, with as many samples as are allowed."""
+    """The longest allowed motion, with the largest allowed number of samples."""
     slow = {"limits": {"tcp_speed": 1.0}} if rng.integers(2) else {}
     return between(rng) | slow | {"duration": 600.0, "sample_period": COARSE}
 
 
 def many_targets(rng: np.random.Generator) -> Fields:
-    """32 poses, between them thousands of pairs."""
+    """32 goal poses, with thousands of pairs of configurations."""
     return {"start": pose(rng), "goal": {"any_of": [pose(rng) for _ in range(32)]}}
 
 
 def mechanical(rng: np.random.Generator) -> Fields:
-    """The mechanical objective, whose bound rules out little."""
+    """The mechanical objective, with a lower bound that excludes few candidates."""
     duration = {"max": float(rng.uniform(3, 600))}
     return between(rng, True) | {
         "objective": "mechanical",

@@ -1,14 +1,14 @@
-"""Least energies of seeded tasks with an ample deadline: what a change of the code must not change.
+"""Least energies of seeded tasks with an ample deadline, for comparisons of two versions.
 
     python -m benchmarks.energies --count 200 --json build/energies.json
     python -m benchmarks.energies --count 200 --compare build/energies.json
     python -m benchmarks.energies --kind slow --count 200
 
-Five kinds of tasks take turns: joint to joint, joint to pose, the mechanical objective, a payload,
-and the cells of `benchmarks.cells`. The library solves each of them. `--compare` exits with 1 if
-the task, the outcome or the energy of an index differs from the stored run. Energies may differ by
-RELATIVE. `--kind slow` solves slow moves instead, and compares them with variants of themselves:
-see `benchmarks.slow_moves`.
+The tasks alternate between five kinds: joint to joint, joint to pose, the mechanical objective, a
+payload, and the cells of `benchmarks.cells`. The library solves all tasks. With `--compare`, the
+exit code is 1 if the task, the outcome or the energy of an index differs from the stored run;
+energies may differ by RELATIVE. With `--kind slow`, slow moves are solved instead, and compared
+with their variants: see `benchmarks.slow_moves`.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ from joulepath.optimizer.problem.problem import Problem
 
 Kind = Literal["joint to joint", "joint to pose", "mechanical", "payload", "cell"]
 KINDS: tuple[Kind, ...] = ("joint to joint", "joint to pose", "mechanical", "payload", "cell")
-# so long that no search ends early, and its result does not depend on the machine [s]
 AMPLE = 600.0
-# rounding of reordered sums, amplified by the solver's convergence criterion: relative difference
-# of two energies
+"""Deadline that no search reaches, so that results do not depend on the machine [s]."""
 RELATIVE = 1e-6
-# of the numbers of a task (joints [rad], entries of the goal's matrix): rounding alone
+"""Relative difference of two equal energies [1]: rounding of reordered sums, amplified by the
+convergence criterion of the solver."""
 SAME_TASK = 1e-9
-# longest durations that mechanical tasks allow [s]
+"""Rounding error of the numbers of a task: joint positions [rad] and entries of the goal pose."""
 MECHANICAL = (3.0, 6.0)
+"""Range of the longest duration of mechanical tasks [s]."""
 
 
 def problem_of(seed: int, index: int) -> tuple[Kind, Problem]:
-    """Task `index` of a seed and its kind."""
+    """The kind of task `index` of a seed, and its problem."""
     kind, robot = KINDS[index % len(KINDS)], load_robot("ur5e")
     if kind == "cell":
         cell = cell_task(seed, index)
@@ -61,8 +61,8 @@ def problem_of(seed: int, index: int) -> tuple[Kind, Problem]:
     goal: Array | Pose = q_goal if kind == "joint to joint" else Pose(flange(robot, q_goal))
     if kind == "mechanical":
         longest = float(rng.uniform(*MECHANICAL))
-        # its lower bound rules out little: without full turns eight candidates remain, with them it
-        # takes minutes
+        # The lower bound of the mechanical objective excludes few candidates: eight remain without
+        # full turns, and with full turns the search takes minutes.
         return kind, Problem(
             arm=Arm(robot=robot),
             start=q_start,
@@ -113,7 +113,8 @@ def solve(seed: int, index: int) -> dict[str, Any]:
 
 
 def relative_difference(row: dict[str, Any], other: dict[str, Any]) -> float:
-    """|difference| of two energies over the first; 0 if neither has one, inf if only one has."""
+    """|difference| of two energies over the second one; 0 without energies, inf if one is
+    missing."""
     ours, theirs = row["energy"], other["energy"]
     if ours is None or theirs is None:
         return 0.0 if ours is theirs else float("inf")
@@ -121,7 +122,7 @@ def relative_difference(row: dict[str, Any], other: dict[str, Any]) -> float:
 
 
 def differences(rows: Sequence[dict[str, Any]], stored: Sequence[dict[str, Any]]) -> list[str]:
-    """One message per index whose task, outcome or energy differs, or that is not stored."""
+    """One message per index with a different task, outcome or energy, or without a stored row."""
     by_index = {row["index"]: row for row in stored}
     messages = []
     for row in rows:
@@ -132,7 +133,7 @@ def differences(rows: Sequence[dict[str, Any]], stored: Sequence[dict[str, Any]]
             messages.append(f"{name}: the task itself differs")
         elif row["outcome"] != other["outcome"]:
             messages.append(f"{name}: {row['outcome']}, stored {other['outcome']}")
-        # written so that NaN is a difference
+        # this comparison is written so that NaN is a difference
         elif not relative_difference(row, other) <= RELATIVE:
             messages.append(
                 f"{name}: {row['energy']:.9g} J, stored {other['energy']:.9g} J: "
@@ -141,11 +142,9 @@ def differences(rows: Sequence[dict[str, Any]], stored: Sequence[dict[str, Any]]
     return messages
 
 
-def same_task(numbers: Sequence[float], others: Sequence[float]) -> bool:
+def same_task(task: Sequence[float], other: Sequence[float]) -> bool:
     """Whether two tasks have the same start and goal up to rounding."""
-    return len(numbers) == len(others) and bool(
-        np.allclose(numbers, others, rtol=0.0, atol=SAME_TASK)
-    )
+    return len(task) == len(other) and bool(np.allclose(task, other, rtol=0.0, atol=SAME_TASK))
 
 
 def main() -> int:

@@ -1,14 +1,14 @@
-"""The `shortest` of `duration-too-short` against faster motions: from random starts, and of
-`/optimize`.
+"""The duration `shortest` of the problem `duration-too-short`, compared with faster motions.
 
     python -m benchmarks.fastest --count 60 --starts 8
     python -m benchmarks.fastest --count 400 --starts 20 --robot panda
 
-A move is asked for in a tenth of the time that its joints need, which is refused with `shortest`.
-Every other move has a payload of up to the robot's rating, and of four moves two are within ±1.5
-rad and two general. Then faster motions are looked for: by minimum-time solves from random smooth
-motions, and by `optimize` without a duration, and in 99 % of `shortest`. What the certificate
-confirms counts. Collisions are ignored.
+A move is requested with a tenth of the time that its joints need, and is refused with the duration
+`shortest`. Every second move has a payload up to the rated payload. Two of every four moves are
+within ±1.5 rad of the zero position, the other two anywhere within ±π. The benchmark then searches
+for faster motions: by minimum-time solves from random smooth motions, by `optimize` without a
+duration, and by `optimize` with 99 % of `shortest`. Only certified motions count. Collisions are
+ignored.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 
-NEAR = 1.5  # rad
+NEAR = 1.5
+"""Largest joint position of a short move [rad]."""
 LOAD = (0.5, 1.0)
 """Smallest and largest payload as a share of the rated payload [1]."""
 ASIDE = 0.05
@@ -51,15 +52,18 @@ SAMPLES = 121
 """Samples of a random start over time."""
 SLOWER = (1.0, 3.0)
 """Smallest and largest duration of a random start over the least duration [1]."""
-# a share by which another motion has to be faster to count
-COUNTS = 0.01
+FASTER = 0.01
+"""Relative difference of durations above which another motion counts as faster [1]."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One move: `shortest` [s], whether it is `proven`, and the durations [s] of the fastest motion
-    from random starts and from `optimize`, infinite if there is none; `seconds` of processor time
-    until the refusal."""
+    """The outcome of one move.
+
+    `shortest` is the duration of the refusal [s], and `proven` whether no shorter one exists.
+    `started` and `optimized` are the durations of the fastest motions from random starts and by
+    `optimize` [s], infinite without a motion. The refusal took `seconds` of processor time.
+    """
 
     index: int
     shortest: float
@@ -70,7 +74,7 @@ class Outcome:
 
     @property
     def ratio(self) -> float:
-        """`shortest` as a multiple of the fastest other motion."""
+        """`shortest` over the duration of the fastest motion [1]."""
         return self.shortest / min(self.started, self.optimized, self.shortest)
 
 
@@ -81,7 +85,7 @@ def problems(robot: Robot, seed: int, count: int) -> Iterator[Problem]:
         rng = np.random.default_rng([seed, index])
         most = NEAR if index % 4 < 2 else np.pi
         lower, upper = np.maximum(limits.q_min, -most), np.minimum(limits.q_max, most)
-        # a joint whose range does not hold zero has its own
+        # if the range of a joint is outside these bounds, the whole range is used
         lower, upper = (
             np.where(lower < upper, lower, limits.q_min),
             np.where(lower < upper, upper, limits.q_max),
@@ -100,8 +104,8 @@ def problems(robot: Robot, seed: int, count: int) -> Iterator[Problem]:
 
 
 def refused(problem: Problem) -> DurationTooShort | None:
-    """The refusal of a tenth of the time that the joints need; None if the move is refused for
-    another reason.
+    """The refusal of a move in a tenth of the time that its joints need; None if the move is
+    refused for another reason.
     """
     least = float(
         shortest_duration(
@@ -118,9 +122,7 @@ def refused(problem: Problem) -> DurationTooShort | None:
 
 
 def from_random_starts(problem: Problem, starts: int, rng: np.random.Generator) -> float:
-    """Duration [s] of the fastest of the motions that minimum-time solves from random smooth
-    motions find.
-    """
+    """Duration [s] of the fastest motion of minimum-time solves from random smooth motions."""
     run, best = Run(problem), np.inf
     run.prepare()
     state, candidate = run.state, run.state.candidates[0]
@@ -141,25 +143,23 @@ def from_random_starts(problem: Problem, starts: int, rng: np.random.Generator) 
 def _random(
     q_start: Array, q_goal: Array, duration: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Samples q (k, nq) [rad] at t (k,) [s]: the straight line at a random pace, and sines beside
-    it.
-    """
+    """Samples q (k, nq) [rad] at t (k,) [s] of the straight line in joint space with random
+    sines."""
     tau = np.linspace(0.0, 1.0, SAMPLES)
     sines = np.sin(np.pi * np.outer(tau, np.arange(1, SINES + 1)))
     height = AMPLITUDE * rng.normal(size=(SINES, len(q_start))) / np.arange(1, SINES + 1)[:, None]
-    # flat at both ends, so that it begins and ends at rest
-    beside = (quintic.fraction(np.minimum(1.0, 8 * np.minimum(tau, 1 - tau))))[:, None] * (
-        sines @ height
-    )
-    return q_start + np.outer(quintic.fraction(tau), q_goal - q_start) + beside, tau * duration
+    # the sines fade to zero at both ends, so that the motion begins and ends at rest
+    fading = quintic.fraction(np.minimum(1.0, 8 * np.minimum(tau, 1 - tau)))[:, None]
+    line = q_start + np.outer(quintic.fraction(tau), q_goal - q_start)
+    return line + fading * (sines @ height), tau * duration
 
 
 def optimized(problem: Problem, shortest: float) -> float:
-    """Duration [s] of the fastest motion that `optimize` finds, without a duration and in 99 % of
-    the shortest.
+    """Duration [s] of the fastest motion of `optimize`, without a duration and with slightly less
+    than the shortest.
     """
     best = np.inf
-    for longest in (None, (1 - COUNTS) * shortest):
+    for longest in (None, (1 - FASTER) * shortest):
         try:
             best = min(best, optimize(replace(problem, duration_max=longest)).duration)
         except DurationTooShort as error:
@@ -170,13 +170,13 @@ def optimized(problem: Problem, shortest: float) -> float:
 
 
 def main() -> None:
-    """Compares every move, and prints the worst and how many are more than 1 % too slow."""
+    """Compares every move, and prints the worst ratio and the number of ratios above 1 %."""
     arguments = parser(__doc__, seed=31)
     arguments.add_argument("--count", type=int, default=60, help="moves (%(default)s)")
     arguments.add_argument(
-        "--starts", type=int, default=8, help="random starts of each (%(default)s)"
+        "--starts", type=int, default=8, help="random starts per move (%(default)s)"
     )
-    arguments.add_argument("--robot", default="ur5e", help="(%(default)s)")
+    arguments.add_argument("--robot", default="ur5e", help="robot (%(default)s)")
     asked = arguments.parse_args()
     on_one_core()
     outcomes = list[Outcome]()
@@ -196,10 +196,10 @@ def main() -> None:
                     index, shortest, error.proven, started, optimized(problem, shortest), seconds
                 )
             )
-            if outcomes[-1].ratio > 1 + COUNTS:
+            if outcomes[-1].ratio > 1 + FASTER:
                 print(f"move {index}: {outcomes[-1]}, ratio {outcomes[-1].ratio:.4f}", flush=True)
     ratios = [each.ratio for each in outcomes]
-    above = sum(ratio > 1 + COUNTS for ratio in ratios)
+    above = sum(ratio > 1 + FASTER for ratio in ratios)
     print(
         f"{len(outcomes)} moves of {asked.robot}, {asked.starts} random starts each: worst ratio "
         f"{max(ratios):.4f},"

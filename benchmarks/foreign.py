@@ -1,15 +1,15 @@
-"""Planning problems of others, from a file: how many are answered, how fast, with how much energy.
+"""Planning problems from other sources, read from a file: answers, times, energies, collisions.
 
     python -m benchmarks.foreign FILE
     python -m benchmarks.foreign FILE --robot panda
     python -m benchmarks.foreign FILE --count 10 --seed 1 --families cage box --kinds joint
     python -m benchmarks.foreign FILE --meshes FOLDER
 
-FILE is JSON in the format of docs/explained/foreign_scenes.md, which names sources of such sets.
-Every problem is asked with its goal as joint positions and as a pose, as a worker runs it: from the
-validated request, with a deadline. Pinocchio and Coal replay every answer at a period of 1 ms. With
---meshes, a folder as `joulepath.models.meshes` describes, they replay the meshes of the links among
-the obstacles at 0.1 ms, too. The exit code is 1 if an answer collides.
+FILE is JSON in the format of docs/explained/foreign_scenes.md, which also names sources. Every
+problem is solved as in a worker, from the validated request and with a deadline, with its goal as
+joint positions and as a pose. Pinocchio and Coal replay every answer with a period of 1 ms. With
+`--meshes`, a folder for `joulepath.models.meshes`, the meshes of the links are also replayed among
+the obstacles, with a period of 0.1 ms. The exit code is 1 if an answer collides.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ DEADLINE = 10.0
 """Deadline of a request [s]."""
 REPLAY = 1e-3
 """Period of the replay of capsules and hulls [s]."""
-# period of the replay of meshes [s]
 MESH_REPLAY = 1e-4
-# robot of the problems, unless --robot names another
+"""Period of the replay of meshes [s]."""
 ROBOT = "ur5e"
-# a gripper modelled for another arm reaches into the capsules of this many links next to it
+"""Default robot of the problems."""
 TOUCHED = 2
+"""Number of last links that the gripper may touch: it was modelled for another arm, and overlaps
+the capsules of these links."""
 
 
 @dataclass(frozen=True)
 class ForeignProblem:
-    """One problem of a file: its name, its family, and the bodies of its requests by the kind of
-    goal.
-    """
+    """One problem of a file: its name, its family, and the bodies of its requests by kind of
+    goal."""
 
     name: str
     family: str
@@ -66,9 +66,8 @@ class ForeignProblem:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One request: times [s] by the wall and of the processor, energy [J] of the answer or the type
-    of the problem.
-    """
+    """The outcome of one request: wall and processor time [s], and the energy [J] of the answer or
+    the type of the problem."""
 
     name: str
     family: str
@@ -108,24 +107,22 @@ def problems_of(path: Path, robot: str = ROBOT) -> list[ForeignProblem]:
 
 
 def _renamed(obstacle: dict[str, Any]) -> dict[str, Any]:
-    """The obstacle with a name that no body of the arm has; without a margin unless the file gives
-    one.
-    """
+    """The obstacle with a name unlike the names of the arm's bodies, and without a margin unless
+    the file states one."""
     return {"margin": 0.0} | obstacle | {"name": f"scene {obstacle['name']}"}
 
 
 def chosen(
     problems: Iterable[ForeignProblem], families: Sequence[str], count: int, seed: int
 ) -> list[ForeignProblem]:
-    """`count` problems of each family, drawn by `seed`; all of them if `count` is 0 or more than
-    there are.
-    """
+    """At most `count` random problems of every family, in the order of the file; all problems if
+    `count` is 0."""
     found: list[ForeignProblem] = []
     problems = list(problems)
     for family in families:
-        of = [each for each in problems if each.family == family]
-        taken = np.sort(np.random.default_rng(seed).permutation(len(of))[: count or len(of)])
-        found += [of[k] for k in taken]
+        members = [each for each in problems if each.family == family]
+        order = np.random.default_rng(seed).permutation(len(members))
+        found += [members[k] for k in np.sort(order[: count or len(members)])]
     return found
 
 
@@ -166,13 +163,13 @@ def run(
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Statistics by kind of goal and family; the family `all` has all of them."""
+    """Statistics by kind of goal and family; the family `all` contains all problems."""
     rows = []
     for kind in dict.fromkeys(each.kind for each in outcomes):
         of_kind = [each for each in outcomes if each.kind == kind]
         for family in [*dict.fromkeys(each.family for each in of_kind), "all"]:
-            of = of_kind if family == "all" else [each for each in of_kind if each.family == family]
-            rows += [_row(kind, family, of)]
+            members = [each for each in of_kind if family in (each.family, "all")]
+            rows += [_row(kind, family, members)]
     return {"rows": rows, "outcomes": [asdict(each) for each in outcomes]}
 
 
@@ -210,13 +207,11 @@ def print_summary(results: dict[str, Any]) -> None:
 
 
 def problem_parser(description: str | None, robot: str, deadline: float) -> ArgumentParser:
-    """A parser with the options that choose problems of a file, a robot and a deadline."""
+    """A parser with the options for the choice of problems, robot and deadline."""
     command = parser(description)
     command.add_argument("file", type=Path, help="file of problems")
     command.add_argument("--robot", default=robot, help="robot of the problems (%(default)s)")
-    command.add_argument(
-        "--count", type=int, default=0, help="problems of each family, drawn by --seed (0: all)"
-    )
+    command.add_argument("--count", type=int, default=0, help="random problems per family (0: all)")
     command.add_argument("--families", nargs="+", help="families (all)")
     command.add_argument(
         "--deadline", type=float, default=deadline, help="deadline of a request [s] (%(default)s)"
@@ -226,9 +221,8 @@ def problem_parser(description: str | None, robot: str, deadline: float) -> Argu
 
 
 def selected(command: ArgumentParser, given: Namespace) -> list[ForeignProblem]:
-    """The problems that the options of `problem_parser` choose; ends the command if there is no
-    such family.
-    """
+    """The problems chosen by the options of `problem_parser`; ends the command if a family is
+    unknown."""
     problems = problems_of(given.file, given.robot)
     families = list(dict.fromkeys(each.family for each in problems))
     unknown = sorted(set(given.families or ()) - set(families))

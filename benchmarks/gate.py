@@ -1,18 +1,18 @@
-"""A measured figure of a benchmark, and the range it must lie in."""
+"""A measured figure of a benchmark, and its admissible range."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 GATED_RUNS = 200
-"""Runs of the gates of shares."""
+"""Number of runs for which the limits of the gates hold."""
 MARGIN = 2.0
-"""Further standard errors that fewer runs have as a margin."""
+"""Margin of fewer runs in standard errors [1]."""
 
 
 @dataclass(frozen=True)
 class Gate:
-    """A measured figure and the range it must lie in."""
+    """A measured figure and its admissible range."""
 
     what: str
     value: float
@@ -21,12 +21,13 @@ class Gate:
 
     @property
     def kept(self) -> bool:
-        """Whether it does."""
+        """Whether the value is within the range."""
         return self.least <= self.value <= self.most
 
 
 def sampling_margin(sd: float, runs: int) -> float:
-    """Margin of a mean over few runs: the standard errors beyond those of `GATED_RUNS` runs.
+    """Margin of a mean over few runs: MARGIN times the excess of its standard error over the
+    standard error of GATED_RUNS runs.
 
     Args:
         sd: standard deviation of one run.

@@ -1,25 +1,25 @@
-"""Mechanical work of motions among obstacles, on the problems of a file: ours beside other motions.
+"""Mechanical work of motions among obstacles, for the planning problems of a file.
 
     python -m benchmarks.least_work FILE
     python -m benchmarks.least_work FILE --count 3 --families cage --verbose
 
-FILE is as for `python -m benchmarks.foreign`. Every motion carries `--mass`. It lasts `--duration`,
-or hardly longer than the fastest motion found if that takes more. Its work is the integral of the
-sum of |torque · speed| over the joints. The robot has neither rotors nor friction, as in cuRobo's
-metric. The motions:
+FILE has the format of `python -m benchmarks.foreign`. Every motion carries `--mass` and lasts
+`--duration`, or slightly more than the fastest known motion if `--duration` is too short. The work
+is the integral of the sum of |torque · speed| over the joints. The robot has neither rotors nor
+friction, as in the metric of cuRobo. The motions are
 
 - ours: from the start to the pose of the goal, in any posture
 - free: the same without obstacles
-- slowed: the fastest motion found to the goal's joint positions, slowed down
-- quintic: the straight line in joints to the goal's joint positions, whether it collides or not
+- slowed: the fastest known motion to the joint positions of the goal, slowed down
+- quintic: the straight line in joint space to the joint positions of the goal, with collisions
 
-Means are over the problems for which all motions are found.
+The means are over the problems for which all four motions exist.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -49,15 +49,16 @@ COM = [0.0, 0.0, 0.1]
 """Centre of mass of the payload in the flange frame [m]."""
 SAMPLES = 4_001
 """Samples of a motion."""
-# deadline of a request [s]
 DEADLINE = 30.0
-# of the fastest motion found, to the duration of motions that cannot be shorter
+"""Deadline of a request [s]."""
 LONGER = 1.001
+"""Duration of a motion over the shortest known duration, if the duration asked for is shorter
+[1]."""
 
 
 @dataclass(frozen=True)
 class Works:
-    """Works [J] of the motions of a problem; None for a motion that is not found."""
+    """Works [J] of the motions of a problem; None without a motion."""
 
     name: str
     family: str
@@ -69,7 +70,7 @@ class Works:
 
 
 def rigid(robot: Robot) -> Robot:
-    """A robot of the same rigid bodies, without rotors and friction."""
+    """A robot with the same rigid bodies, without rotors and friction."""
     law, model = robot.friction, robot.model.copy()
     none, model.armature = np.zeros(robot.nq), np.zeros(model.nv)
     law = replace(law, coulomb=none, curved=none, viscous=none, load=None)
@@ -88,7 +89,7 @@ def work(arm: Arm, spline: Spline) -> float:
 
 
 def motion(problem: Problem) -> Spline | None:
-    """The motion of an answer; None without one."""
+    """The motion of the answer to a problem; None without an answer."""
     try:
         return optimize(problem).trajectory.spline
     except JoulepathError:
@@ -96,7 +97,7 @@ def motion(problem: Problem) -> Spline | None:
 
 
 def fastest(problem: Problem) -> Spline | None:
-    """The motion in hardly more than the shortest duration found; None without one."""
+    """The motion with slightly more than the shortest known duration; None without a motion."""
     try:
         optimize(replace(problem, duration_min=None, duration_max=DURATIONS.least))
     except DurationTooShort as error:
@@ -130,7 +131,7 @@ def run(
     arm = asked("pose", duration).arm
     free = replace(asked("pose", duration), arm=replace(arm, scene=Scene()))
     found = {"ours": ours, "free": motion(free)}
-    # the goal's joint positions may be beyond the limits
+    # the joint positions of the goal may be outside the limits
     with suppress(JoulepathError):
         to_joints = asked("joint", duration)
         assert isinstance(to_joints.start, np.ndarray) and isinstance(to_joints.goal, np.ndarray)
@@ -138,16 +139,12 @@ def run(
         quick = fastest(to_joints)
         if quick is not None and quick.duration <= duration:
             found["slowed"] = lasting(quick, duration)
-    return Works(problem.name, problem.family, duration, **works(arm, found))
-
-
-def works(arm: Arm, motions: Mapping[str, Spline | None]) -> dict[str, float]:
-    """Works [J] of the motions that were found."""
-    return {name: work(arm, each) for name, each in motions.items() if each is not None}
+    works = {name: work(arm, each) for name, each in found.items() if each is not None}
+    return Works(problem.name, problem.family, duration, **works)
 
 
 def summary(outcomes: Sequence[Works]) -> dict[str, Any]:
-    """Statistics by family; the family `all` has all problems."""
+    """Statistics by family; the family `all` contains all problems."""
     families = [*dict.fromkeys(each.family for each in outcomes), "all"]
     rows = [
         _row(family, [each for each in outcomes if family in (each.family, "all")])

@@ -1,5 +1,5 @@
-"""The service under steady load: each client sends its next request as soon as the last one is
-answered.
+"""The service under steady load: every client sends its next request as soon as it has the answer
+to the previous one.
 """
 
 from __future__ import annotations
@@ -18,14 +18,16 @@ from benchmarks.service import Client, Service, resident, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
 
-PERIOD = 1.0  # between two measurements of memory [s]
+PERIOD = 1.0
+"""Time between two measurements of memory [s]."""
 VALID = b'"certificate"'
+"""Part of every valid answer."""
 
 
 @dataclass
 class Record:
-    """Results of all clients: wall times [s], statuses, lost requests, and most simultaneous
-    requests.
+    """Results of all clients: wall times [s], statuses, errors of lost requests, and the largest
+    number of simultaneous requests.
     """
 
     walls: list[float] = field(default_factory=list)
@@ -42,7 +44,7 @@ class Record:
             self.most_in_flight = max(self.most_in_flight, self.in_flight)
         try:
             answer = client.optimize(body)
-        except Exception as error:  # any failure loses the answer
+        except Exception as error:  # every failure counts as a lost answer
             with self.lock:
                 self.lost.append(repr(error))
             return
@@ -56,7 +58,7 @@ class Record:
 
 
 def steady(service: Service, seed: int, clients: int, seconds: float) -> dict[str, Any]:
-    """Results of `clients` clients over `seconds`, each with tasks of its own."""
+    """Results of `clients` clients over `seconds`; no two clients have the same tasks."""
     record, end = Record(), time.perf_counter() + seconds
     workers = service.worker_pids()
     memory: list[float] = []

@@ -1,15 +1,16 @@
-"""How far answers are above the best of many local solves, where nothing is in the way.
+"""Energies of answers without obstacles, relative to the best of many local solves.
 
     python -m benchmarks.many_starts --count 36
     python -m benchmarks.many_starts --count 12 --objective mechanical --guesses 1000
 
-Tasks take turns over objectives, goals, and fixed and free durations, and over ROBOTS; half of them
-carry a payload. Local solves start from random motions between random pairs of the postures that
-reach the targets: all branches, full turns and samples of self-motions. The choice of pairs and
-motions is independent of the search. The best solves, each of another kind, are refined. For
-mechanical work, random motions first become coarse ones. Prints for every task how far the answer
-is above the best, and how the best differs: duration, ends, and each joint's greatest distance on
-the way. Exits with 1 if the 95th percentile of the excess is above MOST_EXCESS.
+The tasks alternate between objectives, kinds of targets, fixed and free durations, and ROBOTS; half
+of them have a payload. The local solves start from random motions between random pairs of postures
+at the targets: all branches, full turns and samples of self-motions. Pairs and motions are chosen
+independently of the search. For mechanical work, the random motions are first solved coarsely. The
+best solves of different kinds are refined. For every task, the command prints the excess of the
+answer over the best solve, and the differences of their durations, of their ends, and of every
+joint along the motion. The exit code is 1 if the 95th percentile of the excess is above
+MOST_EXCESS.
 """
 
 from __future__ import annotations
@@ -52,31 +53,32 @@ from joulepath.optimizer.solve.methods.solve_result import SolveResult
 ROBOTS = ("ur5e", "panda", "iiwa14")
 OBJECTIVES = ("mechanical", "electrical")
 KINDS = tuple(product(("joint", "pose", "poses"), ("fixed", "free")))
-"""Targets and durations: joint positions to joint positions or to a pose, or pose to pose."""
+"""Kinds of targets (joint positions to joint positions, joint positions to a pose, or pose to pose)
+and of durations."""
 DURATIONS = 1.0, 2.4
-"""Least and greatest duration asked for [s]; longer if no motion is as fast."""
+"""Smallest and largest requested duration [s]; it is extended if no motion is as fast."""
 MASSES = 0.5, 2.9
-"""Least and greatest payload [kg]."""
-# greatest 95th percentile of the excess that is allowed
+"""Smallest and largest payload [kg]."""
 MOST_EXCESS = 1e-2
-# so long that no search ends early [s]
+"""Largest admissible 95th percentile of the relative excess [1]."""
 AMPLE = 600.0
+"""Deadline that no search reaches [s]."""
 BATCH = 40
-"""Coarse motions solved at a time."""
+"""Number of coarse motions that are solved together."""
 WAVES = 3
-"""Half waves of a random motion."""
+"""Number of half waves of a random motion."""
 AMPLITUDES = 0.3, 5.0
-"""Least and greatest standard deviation of their amplitudes [rad]."""
+"""Smallest and largest standard deviation of the amplitudes of half waves [rad]."""
 MOST_PAIRS = 2000
-"""Pairs of postures, of least estimate, of which guesses are drawn."""
+"""Number of pairs of postures from which guesses are drawn; they have the lowest estimates."""
 SLOWER = 1.05, 2.0
-"""Durations of guesses of free duration, in multiples of the shortest."""
+"""Range of the durations of guesses over the shortest duration, for a free duration [1]."""
 SOLVED = 14
-"""Coarse motions that are solved."""
+"""Number of coarse motions that are solved finely."""
 REFINED = 5
-"""Solved motions that are refined."""
+"""Number of solved motions that are refined."""
 KIND_DISTANCE = 0.3
-"""Distance of control points [rad] above which motions are of different kinds."""
+"""Distance between control points above which two motions are of different kinds [rad]."""
 
 
 def problem_of(seed: int, index: int, objective: str) -> Problem:
@@ -101,7 +103,8 @@ def problem_of(seed: int, index: int, objective: str) -> Problem:
 
 
 def guess(rng: np.random.Generator, candidate: Candidate, arm: Arm) -> CoarseMotion:
-    """A random motion of a candidate; in a third of them, two joints at most leave the line."""
+    """A random motion of a candidate; in a third of the motions, at most two joints deviate from
+    the straight line in joint space."""
     space, rest, limits = (
         bspline.uniform(COARSE.control_points),
         bspline.REST_POINTS,
@@ -120,7 +123,7 @@ def guess(rng: np.random.Generator, candidate: Candidate, arm: Arm) -> CoarseMot
 
 
 def guesses(rng: np.random.Generator, state: SearchState, count: int) -> list[CoarseMotion]:
-    """Random motions; those of mechanical work are coarse ones of another kind each."""
+    """Random motions; for mechanical work, coarsely solved motions of different kinds."""
     pool = [each for each in state.candidates if each.holdable and np.isfinite(each.lower_bound)]
     order = np.argsort(estimates(state.prepared, pool), kind="stable")[:MOST_PAIRS]
     near = np.minimum(rng.exponential(8.0, count).astype(int), len(order) - 1)
@@ -143,12 +146,12 @@ def guesses(rng: np.random.Generator, state: SearchState, count: int) -> list[Co
 def best_of_many(problem: Problem, count: int, seed: Sequence[int]) -> tuple[float, Spline | None]:
     """The least energy [J] of many local solves, with its motion; inf if none is certified."""
     if problem.objective == "mechanical":
-        # rest does no work: none needs less than the longest
+        # Rest needs no work, so no shorter motion needs less work than the longest one.
         problem = replace(problem, duration_min=problem.duration_max)
     rng, run = np.random.default_rng(seed), Run(problem)
     run.prepare()
     state = run.state
-    # its own random motions would be followed from here, too
+    # prevents the search from solving its own random motions
     state.sliding_work_sought = True
     solved = list[Candidate]()
     for each in guesses(rng, state, count):
@@ -173,12 +176,12 @@ ENDS = ("start", "goal", "q_start", "q_goal")
 
 
 def _solved(points: Array, duration: float, solver: Method) -> SolveResult:
-    """A solve from control points (n, nq) [rad] of a motion of a duration [s]."""
+    """A solve from a motion with control points (n, nq) [rad] and a duration [s]."""
     return solver.solve_control_points(bspline.uniform(len(points)), points, duration)
 
 
 def _kinds(points: Sequence[Array], most: int) -> list[int]:
-    """Indices of the first motions of different kinds, from control points (n, nq) [rad]."""
+    """Indices of the first `most` motions of different kinds, by control points (n, nq) [rad]."""
     kept = list[int]()
     for k, each in enumerate(points):
         if all(np.abs(each - points[other]).max() > KIND_DISTANCE for other in kept):
@@ -189,7 +192,7 @@ def _kinds(points: Sequence[Array], most: int) -> list[int]:
 
 
 def difference(answer: Spline, other: Spline) -> str:
-    """How another motion differs from an answer."""
+    """The differences of another motion from an answer, as text."""
     at = np.linspace(0.0, 1.0, 101)
     q, q_other = (each.curve(at * each.duration) for each in (answer, other))
     apart = np.abs(q_other - q)
@@ -201,7 +204,7 @@ def difference(answer: Spline, other: Spline) -> str:
 
 
 def run_task(seed: int, index: int, objective: str, count: int) -> dict[str, Any] | None:
-    """The outcome of a task; None if it has no motion."""
+    """The outcome of a task; None without a motion."""
     problem = problem_of(seed, index, objective)
     compile_kernel(problem.arm.robot)
     name = f"{index:3d} {problem.arm.robot.name:7}{objective:11}{' '.join(KINDS[index % 6]):12}"
@@ -220,7 +223,7 @@ def run_task(seed: int, index: int, objective: str, count: int) -> dict[str, Any
     spent, energy = time.process_time() - began, answer.energy.of(problem.objective)
     least_energy, spline = best_of_many(problem, count, [seed, index])
     if spline is None:
-        print(f"{name} none of the starts leads to a motion", flush=True)
+        print(f"{name} no start leads to a motion", flush=True)
         return None
     excess = (energy - least_energy) / abs(least_energy)
     other = difference(answer.trajectory.spline, spline) if excess > 0 else ""
@@ -232,14 +235,14 @@ def main() -> int:
     """Runs the command; returns the exit code."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=36, help="tasks (%(default)s)")
-    arguments.add_argument("--guesses", type=int, default=400, help="of a task (%(default)s)")
-    arguments.add_argument("--objective", choices=OBJECTIVES, help="only this (default: in turn)")
+    arguments.add_argument("--guesses", type=int, default=400, help="per task (%(default)s)")
+    arguments.add_argument("--objective", choices=OBJECTIVES, help="(default: alternately)")
     given = arguments.parse_args()
     on_one_core()
-    asked = [
+    objectives = [
         given.objective or OBJECTIVES[k // len(KINDS) % len(OBJECTIVES)] for k in range(given.count)
     ]
-    rows = [run_task(given.seed, k, each, given.guesses) for k, each in enumerate(asked)]
+    rows = [run_task(given.seed, k, each, given.guesses) for k, each in enumerate(objectives)]
     found = [each for each in rows if each is not None]
     excess = Spread.of([each["excess"] for each in found])
     within = sum(each["excess"] <= MOST_EXCESS for each in found) / max(len(found), 1)

@@ -1,5 +1,4 @@
-"""Motions of any planner on one fine grid: exact energy, and the ratio of every value to its
-limit."""
+"""Replays of planners' motions on a fine grid: exact energies, and ratios of values to limits."""
 
 from __future__ import annotations
 
@@ -19,7 +18,8 @@ from joulepath.optimizer.motion.limit_ratios import limit_ratios
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.energy import Energy
 
-PERIOD = 1e-3  # largest period of the fine grid [s]
+PERIOD = 1e-3
+"""Largest period of the fine grid [s]."""
 
 
 class Motion(Protocol):
@@ -60,10 +60,10 @@ class SplineMotion:
 
 @dataclass(frozen=True)
 class Replay:
-    """A motion on the fine grid: duration [s], energy, and the largest value / limit per kind of
-    limit.
+    """A motion on the fine grid: duration [s], energy, and the largest ratio of a value to its
+    limit per kind of limit.
 
-    `end_error` [rad] is the largest joint error at start and goal.
+    `end_error` is the largest joint error at start and goal [rad].
     """
 
     duration: float
@@ -73,7 +73,7 @@ class Replay:
 
     @property
     def worst(self) -> float:
-        """The largest value / limit."""
+        """The largest ratio of a value to its limit."""
         return max(self.ratios.values())
 
 
@@ -94,7 +94,7 @@ def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> R
 
 
 def worst_ratios(problem: Problem, motion: Motion) -> dict[str, float]:
-    """The largest value / limit on the fine grid, per kind of limit."""
+    """The largest ratio of a value to its limit on the fine grid, per kind of limit."""
     t, _ = fine_grid(motion.duration)
     q, v, a, jerk = motion.sample(t)
     return _ratios(problem, q, v, a, jerk, torques(problem, q, v, a))

@@ -1,5 +1,5 @@
-"""What an attack does to a service: memory of its main process, times for `/healthz`, answers of an
-honest client.
+"""Effects of an attack on a service: memory of its main process, response times of `/healthz`, and
+answers to an honest client.
 """
 
 from __future__ import annotations
@@ -19,18 +19,23 @@ import numpy as np
 from benchmarks.attack_bodies import move
 from benchmarks.service import Client, Service, resident
 
-HONEST = "127.0.0.1"  # address of the client with valid requests
-PROBE = "127.0.0.2"  # address of the client for /healthz
-PROBE_PERIOD = 0.025  # between two requests for /healthz [s]
-SETTLING = 3.0  # from the end of an attack to the last measurement of memory [s]
+HONEST = "127.0.0.1"
+"""Address of the client with valid requests."""
+PROBE = "127.0.0.2"
+"""Address of the client that requests `/healthz`."""
+PROBE_PERIOD = 0.025
+"""Time between two requests of `/healthz` [s]."""
+SETTLING = 3.0
+"""Time from the end of an attack to the last measurement of memory [s]."""
 
 Attack = Callable[[int], Awaitable[str]]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Memory of the main process [MiB], times for `/healthz` [ms], answers of the honest client,
-    and what was seen.
+    """Memory of the main process before, during and after an attack [MiB], response times of
+    `/healthz` [ms], numbers of answers and refusals to the honest client and its longest response
+    time [s], and the attacker's own observations `seen`.
     """
 
     attack: str
@@ -46,7 +51,10 @@ class Outcome:
 
 
 def probe(port: int, pipe: Connection) -> None:
-    """Times of `/healthz` [s], from a first message to the pipe until it is written to."""
+    """Measures the response times of `/healthz` [s].
+
+    Sends a message to the pipe at the start, and the times when the other end writes to the pipe.
+    """
     walls: list[float] = []
     client = Client(port, PROBE)
     pipe.send(None)
@@ -59,8 +67,9 @@ def probe(port: int, pipe: Connection) -> None:
 
 
 def honest(port: int, pipe: Connection) -> None:
-    """Status and time [s] of each request of a client that waits for its answers, as `probe`
-    measures.
+    """Records status and response time [s] of every request of a client that waits for its answers.
+
+    The pipe is used as in `probe`.
     """
     answers: list[tuple[int, float]] = []
     client = Client(port, HONEST)
@@ -69,24 +78,25 @@ def honest(port: int, pipe: Connection) -> None:
         began = time.perf_counter()
         try:
             status = client.optimize(move()).status
-        except Exception:  # any failure loses the answer
+        except Exception:  # every failure counts as a lost answer
             status = 0
         answers.append((status, time.perf_counter() - began))
     pipe.send(answers)
 
 
 @contextmanager
-def beside(
+def in_parallel(
     target: Callable[[int, Connection], None], port: int
 ) -> Iterator[Callable[[], list[Any]]]:
-    """Runs `target` in a process of its own, so that it does not wait for the attacker; gives what
-    ends it.
+    """Runs `target` in another process, so that it does not wait for the attacker.
+
+    The value of the context is a function that ends `target` and returns its result.
     """
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=target, args=(port, theirs), daemon=True)
     process.start()
-    # on a busy machine a process may take longer to begin than an attack takes
+    # on a busy machine, the start of a process may take longer than an attack
     ours.recv()
 
     def end() -> list[Any]:
@@ -117,7 +127,8 @@ def observed(name: str, attack: Attack, service: Service) -> Outcome:
         finally:
             measuring.cancel()
 
-    with beside(probe, service.port) as end_probe, beside(honest, service.port) as end_honest:
+    port = service.port
+    with in_parallel(probe, port) as end_probe, in_parallel(honest, port) as end_honest:
         time.sleep(2.0)
         seen = asyncio.run(run())
         walls, answers = end_probe(), end_honest()

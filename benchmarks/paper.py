@@ -1,10 +1,10 @@
-"""Comparison of the founding paper's three tables with this model.
+"""Comparison of the three tables of the paper with this model.
 
     python -m benchmarks.paper            # prints the tables
-    python -m benchmarks.paper --write    # and writes them into docs/explained/paper.md
+    python -m benchmarks.paper --write    # also writes the tables into docs/explained/paper.md
 
-`tests/reference/README.md` names the paper. Its joint convention is not Universal Robots'; see
-`to_ur`.
+`tests/reference/README.md` names the paper. Its joint convention differs from that of Universal
+Robots: see `to_ur`.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ END = "<!-- end of what it made -->"
 REFERENCE = ROOT / "tests" / "reference"
 
 SECONDS = 1.5
-"""Duration [s] of the motion from home to a configuration, and of the motion back."""
+"""Duration of the motion from home to a configuration, and of the motion back [s]."""
 TOLERANCE = 0.10
-"""Relative deviation from a common factor within which a row of Table 3 counts as proportional to
-our power.
-"""
+"""Largest relative deviation from a common factor at which a row of Table 3 is proportional to our
+power [1]."""
 
-# Universal Robots, "DH parameters for calculations of kinematics and dynamics": a, d [m], alpha
+# a, d [m] and alpha [rad] from Universal Robots, "DH parameters for calculations of kinematics and
+# dynamics"
 ALPHA = (np.pi / 2, 0, 0, np.pi / 2, -np.pi / 2, 0)
 UR5 = ((0, -0.425, -0.39225, 0, 0, 0), (0.089159, 0, 0, 0.10915, 0.09465, 0.0823))
 UR5E = ((0, -0.425, -0.3922, 0, 0, 0), (0.1625, 0, 0, 0.1333, 0.0997, 0.0996))
@@ -58,9 +58,10 @@ def table(name: str) -> Array:
 
 
 def to_ur(degrees: Array) -> Array:
-    """Joint positions (6,) of the paper [deg] in Universal Robots' convention [rad].
+    """Joint positions (6,) of the paper [deg] in the convention of Universal Robots [rad].
 
-    Joint 6, which changes neither positions nor power here, follows from Table 1's orientations.
+    Joint 6 changes neither positions nor power here; its convention follows from the orientations
+    in Table 1.
     """
     q1, q2, q3, q4, q5, q6 = degrees
     return np.radians([q1, q2 - 90, 90 - q3, -90 - q4, 180 - q5, 180 - q6])
@@ -71,30 +72,30 @@ HOME = to_ur(np.zeros(6))
 
 @cache
 def configurations() -> Array:
-    """Table 2 (15, 6) in Universal Robots' convention [rad]."""
+    """Table 2 (15, 6) in the convention of Universal Robots [rad]."""
     return np.array([to_ur(row) for row in table("table2_configurations")])
 
 
 def there_and_back(arm: Arm, q: Array) -> Evaluation:
-    """The paper's motion: home, q (6,), home, at constant joint speed."""
+    """The motion of the paper at constant joint speed: from home to q (6,) [rad] and back."""
     return evaluate(arm, Waypoints(np.array([HOME, q, HOME]), np.array(SECONDS), "linear"))
 
 
 def powers(arm: Arm) -> Array:
-    """True mean mechanical power (15,) [W] of the paper's motions."""
+    """Mean mechanical power (15,) [W] of the motions of the paper in our model."""
     return np.array([there_and_back(arm, q).total.mean_mechanical_power for q in configurations()])
 
 
 def older_links() -> Array:
-    """Factors (6,) that give the UR5e's links the masses of the UR5's."""
+    """Factors (6,) from the link masses of the UR5e to those of the UR5."""
     inertias = load_robot("ur5e").model.inertias
     return np.asarray(UR5_MASSES / np.array([body.mass for body in inertias][1:]))
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of Table 3 with our powers: rank correlation, and the factor common to most rows
-    within TOLERANCE.
+    """Agreement of Table 3 with our powers: rank correlation, and the common factor of the most
+    rows within TOLERANCE.
     """
 
     rank_correlation: float
@@ -104,17 +105,18 @@ class Agreement:
 
     @staticmethod
     def of(ours: Array, theirs: Array) -> Agreement:
-        """Tries every factor at which a row enters or leaves the band; `needed` is the tolerance
-        for twelve rows.
+        """Tries every factor at which a row enters or leaves the tolerance.
+
+        `needed` is the tolerance with which twelve rows have a common factor.
         """
         ratios = theirs / ours
-        # 1e-9 of slack, so that a row on the edge of the band counts
+        # a slack of 1e-9 includes rows on the edge of the tolerance
         factors = np.concatenate([ratios / (1 - TOLERANCE), ratios / (1 + TOLERANCE)])
         inside = [
             int((np.abs(ratios / factor - 1) <= TOLERANCE * (1 + 1e-9)).sum()) for factor in factors
         ]
         best = np.flatnonzero(np.array(inside) == max(inside))
-        # twelve neighbours in order of ratio, the factor in their middle
+        # twelve consecutive ratios in ascending order, with the factor in their middle
         order = np.sort(ratios)
         low, high = order[:-11], order[11:]
         return Agreement(
@@ -126,7 +128,7 @@ class Agreement:
 
 
 def forward(geometry: tuple[Sequence[float], Sequence[float]], q: Array) -> Array:
-    """T_base_flange (4, 4) by Denavit-Hartenberg parameters."""
+    """T_base_flange (4, 4) by Denavit-Hartenberg parameters a [m] and d [m]."""
     T = np.eye(4)
     for a, d, alpha, angle in zip(*geometry, ALPHA, q, strict=True):
         c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
@@ -155,7 +157,8 @@ def _head(*names: str) -> list[str]:
 
 
 def table_1() -> list[str]:
-    """Table 1 beside the poses of Table 2's configurations, with the geometries of UR5 and UR5e."""
+    """Table 1, and the poses of the configurations of Table 2 with the geometries of UR5 and
+    UR5e."""
     asked = poses()
     reached = {
         name: [forward(geometry, q) for q in configurations()]
@@ -195,7 +198,7 @@ def table_1() -> list[str]:
 
 
 def table_2() -> list[str]:
-    """Table 2 beside the nearest configurations that reach the poses of Table 1 exactly."""
+    """Table 2, and the nearest configurations that reach the poses of Table 1 exactly."""
     robot = load_robot("ur5e")
     solver = required_inverse_kinematics(robot, "pose")
 
@@ -205,7 +208,7 @@ def table_2() -> list[str]:
     def cells(k: int) -> list[str]:
         q = configurations()[k]
         solutions = solver.solve(poses()[k])
-        # configurations that differ by full turns are equal here
+        # configurations with a difference of full turns count as equal
         apart = [wrapped(solution.q - q) for solution in solutions]
         best = int(np.argmin([np.abs(each).max() for each in apart]))
         branch = str(solutions[best].label).split(" ")[0]
@@ -226,7 +229,7 @@ def table_2() -> list[str]:
 
 
 def table_3() -> list[str]:
-    """Table 3 beside our mean powers, and the ratios of the two."""
+    """Table 3, our mean powers, and their ratios."""
     theirs = table("table3_power")[:, 1]
     arms = {
         "UR5e": powers(Arm(robot=load_robot("ur5e"))),
@@ -264,9 +267,8 @@ def table_3() -> list[str]:
 
 
 def savings() -> list[str]:
-    """Energies of the paper's motion to each configuration, of ours, and of the controller's
-    default.
-    """
+    """Energies of the motions to all configurations: of the paper, ours, and of the controller by
+    default."""
 
     def saved(ours: float, theirs: float) -> str:
         return f"{100 * (1 - ours / theirs):.1f}"
@@ -330,7 +332,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--write", action="store_true", help="write them into the page, too")
+    parser.add_argument("--write", action="store_true", help="also write the tables into the page")
     write = parser.parse_args().write
     tables = made()
     print(tables)

@@ -1,19 +1,20 @@
-"""Placements: what the best place saves against a sensible one, against an exhaustive grid, the
-lower bound, the time and the memory.
+"""Placements: the saving of the best place over the nominal one, the lower bound, time and memory.
 
     python -m benchmarks.placement --count 50
     python -m benchmarks.placement --count 10 --grid
 
-Cells of three robots, in turn. Two picks are on a table on one side, two places on a shelf on the
-other, with a post between them and a floor; the arm carries a part from each pick to a place. The
-nominal base is where a planner would put it: the stops lie about 60 % of the reach away. The region
-is x, y and z about the nominal base, 40 % of the reach wide and 20 % high on either side. Cells
-whose nominal place has no cycle are drawn anew. Times are CPU times, and so is the deadline.
+The cells alternate between three robots. Two pick stops are on a table on one side, two place stops
+on a table on the other side; a post stands between the tables, and a floor lies below. The arm
+carries a part from every pick stop to a place stop. At the nominal base, the distance to the stops
+is about 60 % of the reach. The region around the nominal base is 40 % of the reach wide in x and y,
+and extends 20 % of the reach up and down. Cells without a cycle at the nominal place are drawn
+again. Times and deadline are CPU times (`--deadline`). The memory is the resident memory of the
+process after each placement.
 
-With `--grid`, a cycle is computed at every place of a grid of 5 cm whose proven bound does not
-exclude it, too, and the excess over the best of them is printed. An energy of any place below the
-lower bound ends the benchmark, and so does a best place above the nominal one, or a motion without
-a valid certificate. The memory is the resident one of the process after each placement.
+With `--grid`, a cycle is also computed at every place of a 5 cm grid, except where the proven bound
+excludes the place, and the excess over the best of these places is printed. The benchmark fails if
+the energy at a place is below the lower bound, if the best place needs more energy than the nominal
+one, or if a motion has no valid certificate.
 """
 
 from __future__ import annotations
@@ -67,12 +68,14 @@ CLEARANCE = 0.06
 """Height of the stops of a side above their table [m]."""
 GRID = 0.05
 """Step of the exhaustive grid [m]."""
-AMPLE = 1e6  # so long that no computation on the exhaustive grid ends early [s]
+AMPLE = 1e6
+"""Deadline that no computation on the exhaustive grid reaches [s]."""
 TOOL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.12], [0, 0, 0, 1]])
+"""T_flange_tcp."""
 
 
 def cell(robot: str, rng: np.random.Generator) -> Cycle:
-    """A cycle between two sides, in the frame of the nominal base."""
+    """A cycle between two tables, in the frame of the nominal base."""
     model = load_robot(robot)
     reach = Chain.of(model.model).length
     middle = rng.uniform(0.6, 1.1)
@@ -123,9 +126,7 @@ def _box(name: str, centre: Array, size: list[float]) -> Obstacle:
 
 
 def numbered(seed: int, number: int, deadline: float) -> Placement:
-    """The placement of a number, with a generator of its own; cells without a nominal cycle are
-    drawn anew.
-    """
+    """Placement `number` of a seed: the first random cell with a cycle at the nominal place."""
     rng, robot = np.random.default_rng([seed, number]), ROBOTS[number % len(ROBOTS)]
     while True:
         cycle = cell(robot, rng)
@@ -141,9 +142,9 @@ def numbered(seed: int, number: int, deadline: float) -> Placement:
 
 
 def exhaustive(placement: Placement) -> list[float]:
-    """The energies [J] at the places of a fine grid with a cycle.
+    """The energies [J] of the cycles at the places of a fine grid.
 
-    Places whose proven bounds are not below the least energy cannot change it, and are left out.
+    Places with proven bounds above the least energy are left out.
     """
     space, energies = Space.of(replace(placement, resolution=GRID)), [np.inf]
     rounds, ample = Rounds(space, time.process_time), Deadline.after(AMPLE, time.process_time)
@@ -161,13 +162,14 @@ def exhaustive(placement: Placement) -> list[float]:
     return energies
 
 
-def checked(found: PlacementSolution, others: list[float]) -> None:
-    """Ends the benchmark if a promise is broken."""
-    energies = [found.best.energy, *(each.energy for each in found.map if each.energy), *others]
+def check(found: PlacementSolution, on_grid: list[float]) -> None:
+    """Raises SystemExit if a promise of the solution is broken, given the energies [J] on the fine
+    grid."""
+    energies = [found.best.energy, *(each.energy for each in found.map if each.energy), *on_grid]
     if found.lower_bound is not None and found.lower_bound > min(energies):
         raise SystemExit(f"the bound {found.lower_bound} J is above {min(energies)} J")
     if found.nominal is None or found.best.energy > found.nominal.energy:
-        raise SystemExit("the best place is above the nominal one")
+        raise SystemExit("the best place needs more energy than the nominal one")
     for solution in found.best.solutions:
         if not all(move.solution.certificate.valid for move in solution.moves):
             raise SystemExit("a move has no valid certificate")
@@ -177,7 +179,7 @@ def measured(placement: Placement, grid: bool) -> tuple[PlacementSolution, dict[
     """The solution of a placement, and its figures."""
     began, wall = time.process_time(), time.perf_counter()
     found = place_robot(placement, clock=time.process_time, progress=False)
-    own = {
+    figures = {
         "saving": found.saving or 0.0,
         "gap": gap_of(found.optimality_gap),
         "time": time.process_time() - began,
@@ -188,12 +190,12 @@ def measured(placement: Placement, grid: bool) -> tuple[PlacementSolution, dict[
         "memory": resident(os.getpid()),
     }
     energies = [each.energy for each in found.map if each.energy is not None]
-    own["against_worst"] = 1 - found.best.energy / max(energies)
-    others = exhaustive(placement) if grid else []
-    checked(found, others)
+    figures["against_worst"] = 1 - found.best.energy / max(energies)
+    on_grid = exhaustive(placement) if grid else []
+    check(found, on_grid)
     if grid:
-        own["excess"] = found.best.energy / min(others) - 1
-    return found, own
+        figures["excess"] = found.best.energy / min(on_grid) - 1
+    return found, figures
 
 
 def main() -> None:
@@ -206,12 +208,12 @@ def main() -> None:
     statuses, reasons = Counter[str](), Counter[str]()
     for number in range(arguments.count):
         placement = numbered(arguments.seed, number, arguments.deadline)
-        found, own = measured(placement, arguments.grid)
+        found, figures = measured(placement, arguments.grid)
         statuses[found.status] += 1
         reasons.update(each.reason for each in found.map if each.reason is not None)
-        results.append(own)
+        results.append(figures)
         robot = placement.cycles[0].cycle.arm.robot.name
-        shown = ", ".join(f"{name} {value:.4g}" for name, value in own.items())
+        shown = ", ".join(f"{name} {value:.4g}" for name, value in figures.items())
         print(f"{number} {robot}: {shown}", flush=True)
     report(results, statuses, reasons)
     write_json(arguments.json, {"placements": results})
@@ -242,7 +244,7 @@ def _arguments() -> argparse.Namespace:
     options = parser(__doc__)
     options.add_argument("--count", type=int, default=50, help="number of cells (%(default)s)")
     options.add_argument(
-        "--deadline", type=float, default=120.0, help="of a placement [s] (%(default)s)"
+        "--deadline", type=float, default=120.0, help="deadline of a placement [s] (%(default)s)"
     )
     options.add_argument("--grid", action="store_true", help="compare with a grid of 5 cm")
     return options.parse_args()

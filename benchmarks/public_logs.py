@@ -1,6 +1,6 @@
-"""Public logs of arms, from clones of their repositories beside the other real logs.
+"""Public logs of arms, from clones of their repositories.
 
-In the folder `logs` that `benchmarks.identification_logs.folder` finds:
+The clones are in the folder `logs` of `benchmarks.identification_logs.folder`:
 
 - `FrankaEmikaPandaDynModel` (github.com/marcocognetti/FrankaEmikaPandaDynModel, GPL-3): a Panda,
   with the torques of its sensors behind the gears.
@@ -36,9 +36,9 @@ UR10E_DAYS: dict[str, tuple[str, ...]] = {
 }
 """Logs without payload, by day."""
 POSSIBLE_Q = 7.0
-"""Joint position above which the recorder garbled a row [rad]."""
+"""Largest plausible joint position [rad]; the recorder has garbled rows with larger values."""
 POSSIBLE_V = 4.0
-"""Joint speed above which the recorder garbled a row [rad/s]."""
+"""Largest plausible joint speed [rad/s]; the recorder has garbled rows with larger values."""
 
 
 def ur10e_days(
@@ -55,7 +55,7 @@ def ur10e_days(
 
 
 def ur10e_split(place: Path) -> tuple[Robot, Log, Log]:
-    """The log that the authors of the dataset fit, and the one that they predict."""
+    """A UR10e, with the log that the authors of the dataset fit, and the log that they predict."""
     files, robot = place / "dynamic_calibration" / "dataset_ur10e", load_robot("ur10e")
     fitted = files / "identification_data" / "ur-20_02_10-30sec_12harm.csv"
     other = files / "validation_data" / "ur-20_01_17-ptp_10_points.csv"
@@ -64,8 +64,10 @@ def ur10e_split(place: Path) -> tuple[Robot, Log, Log]:
 
 
 def ur10e_log(robot: Robot, file: Path, chosen: slice = slice(None)) -> Log:
-    """Some rows of one of these logs: columns without header, time, q, v and current of each joint
-    first."""
+    """The chosen rows of a log of the UR10e after the last garbled row.
+
+    The file has no header; its first columns are time, q, v and current of all joints.
+    """
     rows = np.loadtxt(file, delimiter=",", usecols=range(1 + 3 * robot.nq))[chosen]
     q, v = np.abs(rows[:, 1:7]).max(axis=1), np.abs(rows[:, 7:13]).max(axis=1)
     garbled = np.flatnonzero((q > POSSIBLE_Q) | (v > POSSIBLE_V))
@@ -78,7 +80,7 @@ def ur10e_log(robot: Robot, file: Path, chosen: slice = slice(None)) -> Log:
 
 
 def panda_by_inria(place: Path) -> Log:
-    """A Panda over 21 s at 1 kHz, from text files with one value in a line."""
+    """A log of a Panda over 21 s at 1 kHz, from text files with one value per line."""
     files = place / "FrankaEmikaPandaDynModel" / "matlab" / "data" / "Exciting_Traj"
     files = files / "Trajectory_1" / "rbt_log"
     robot = load_robot("panda")
@@ -98,7 +100,7 @@ def panda_by_inria(place: Path) -> Log:
 
 
 def panda_by_unisa(place: Path) -> Log:
-    """Another Panda over 24 s at 30 Hz."""
+    """A log of another Panda over 24 s at 30 Hz."""
     folder = place / "inverse-dynamics-solver" / "franka_inria_inverse_dynamics_solver"
     options = LogOptions(effort="torque", payload=Payload())
     file = folder / "bagfiles" / "panda_exciting_trajectory.db3"

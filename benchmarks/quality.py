@@ -1,13 +1,12 @@
-"""Energy of the answers relative to the references of `benchmarks.reference`."""
+"""Energies of answers relative to the reference energies of `benchmarks.reference`."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from benchmarks.command import on_one_core, parser, write_json
-from benchmarks.reference import FILE, fingerprint, load, problem_of
+from benchmarks.reference import fingerprint, load, problem_of
 from benchmarks.statistics import Spread
 from benchmarks.tasks import move
 from joulepath.models.registry import load_robot
@@ -15,39 +14,31 @@ from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import optimize
 
-# so long that no search ends early, and its result does not depend on the machine [s]
 AMPLE = 600.0
+"""Deadline that no search reaches, so that results do not depend on the machine [s]."""
 
 
 def main() -> None:
-    """Solves every task that has a reference, and compares the energies."""
+    """Solves all tasks with references, and compares the energies."""
     arguments = parser(__doc__)
-    arguments.add_argument("--count", type=int, help="tasks (all that have a reference)")
-    arguments.add_argument(
-        "--reference", type=Path, default=FILE, help="the stored references (%(default)s)"
-    )
-    arguments.add_argument(
-        "--deadline", type=float, default=AMPLE, help="of each search [s] (%(default)s)"
-    )
+    arguments.add_argument("--count", type=int, help="tasks (all with references)")
     given = arguments.parse_args()
     on_one_core()
     robot = load_robot("ur5e")
     compile_kernel(robot)
-    reference = load(given.reference)
+    reference = load()
     if reference["fingerprint"] != fingerprint(robot):
         raise SystemExit(
-            "The robot's parameters have changed: renew the references by python -m "
+            "The robot's parameters have changed: renew the references with python -m "
             "benchmarks.reference"
         )
     rows: list[dict[str, Any]] = []
     for row in reference["tasks"][: given.count]:
-        if row["energy"] is None:  # no start has a motion
+        if row["energy"] is None:  # no start led to a motion
             continue
         task = move(reference["seed"], row["index"])
         try:
-            energy = optimize(
-                replace(problem_of(task), deadline=given.deadline)
-            ).energy.electrical.total
+            energy = optimize(replace(problem_of(task), deadline=AMPLE)).energy.electrical.total
         except JoulepathError as error:
             print(f"index {task.index}: {error!r}")
             energy = float("inf")

@@ -1,23 +1,21 @@
-"""Reference energies of seeded tasks: the best of many starts on a fine grid, by two independent
-solvers.
+"""Reference energies of seeded tasks: the best results of two solvers from many initial guesses.
 
-    python -m benchmarks.reference            writes benchmarks/reference_energies.json, in about
-    half an hour
+    python -m benchmarks.reference
 
-A run that was interrupted continues when it is started again.
+The command writes benchmarks/reference_energies.json in about half an hour. An interrupted run
+continues when the command is started again. `make bench` compares answers with these energies.
 
-Each task is solved by joulepath's SQP from STARTS initial guesses (the straight line and random
-perturbations of it) on POINTS control points, and by IPOPT from IPOPT_STARTS initial guesses on the
-same spline. The SQP then refines IPOPT's motions, so that they satisfy the limits between the
-nodes, too. Finally it refines the best motion on twice as many spans. Limits are those of the
-robot, and the duration is free. `make bench` compares answers with the stored energies.
+The SQP of joulepath solves every task with POINTS control points from STARTS initial guesses: the
+straight line, and random perturbations of it. IPOPT solves the task with the same spline from
+IPOPT_STARTS initial guesses. The SQP refines the motions of IPOPT, so that they also satisfy the
+limits between the nodes, and finally the best motion with twice as many spans. The limits are the
+limits of the robot, and the duration is free.
 """
 
 from __future__ import annotations
 
 import hashlib
 import multiprocessing
-from collections.abc import Callable
 from dataclasses import fields
 from functools import cache, partial
 from pathlib import Path
@@ -46,18 +44,27 @@ from joulepath.optimizer.solve.methods.solve_context import SolveContext
 FILE = Path(__file__).with_name("reference_energies.json")
 SEED = 1
 TASKS = 100
-STARTS = 64  # initial guesses of the SQP per task
-POINTS = 25  # control points
-IPOPT_STARTS = 4  # initial guesses of IPOPT per task
-FINE_POINTS = 45  # spans of half the length
-MODES = 3  # half waves of a perturbation
-PERTURBATIONS = (0.1, 1.5)  # least and largest standard deviation of the waves' amplitudes [rad]
-PATIENCE = 60.0  # longest time for one start [s]
+STARTS = 64
+"""Number of initial guesses of the SQP per task."""
+POINTS = 25
+"""Number of control points."""
+IPOPT_STARTS = 4
+"""Number of initial guesses of IPOPT per task."""
+FINE_POINTS = 45
+"""Number of control points of the final refinement, with spans of half the length."""
+MODES = 3
+"""Number of half waves of a perturbation."""
+PERTURBATIONS = (0.1, 1.5)
+"""Smallest and largest standard deviation of the amplitudes of half waves [rad]."""
+SOLVE_TIME = 60.0
+"""Longest time of the solve from one initial guess [s]."""
+PROCESSES = 2
+"""Number of processes."""
 
 
 def perturbation(rng: np.random.Generator, space: bspline.Basis, nq: int) -> Array:
-    """Random displacement (m, nq) [rad] of an initial guess's free control points: waves that
-    vanish at both ends.
+    """Random displacement (m, nq) [rad] of the m free control points of an initial guess, by half
+    waves over the motion.
     """
     size = np.exp(rng.uniform(*np.log(PERTURBATIONS)))
     at = bspline.greville(space.knots)[space.free]
@@ -79,7 +86,7 @@ def problem_of(task: Move) -> Problem:
 
 
 class Search:
-    """The best motion found for one task, and its exact energy [J] in the objective."""
+    """The best known motion of one task, and its exact energy in the objective [J]."""
 
     def __init__(self, task: Move) -> None:
         self.move = task
@@ -88,11 +95,10 @@ class Search:
         self.energy = np.inf
 
     def improve(self, guess: Guess) -> float:
-        """The energy [J] reached from an initial guess, inf without a motion. The best motion is
-        stored.
-        """
+        """Solves from an initial guess, keeps the best motion, and returns the energy reached [J],
+        inf without a motion."""
         interval = duration_intervals(self.prepared, self.move.q_goal)[0]
-        deadline = Deadline.after(PATIENCE)
+        deadline = Deadline.after(SOLVE_TIME)
         context = SolveContext(
             self.prepared, self.move.q_start, self.move.q_goal, deadline, interval
         )
@@ -105,8 +111,8 @@ class Search:
         return float(energy)
 
 
-def search(seed: int, starts: int, ipopt_starts: int, index: int) -> dict[str, Any]:
-    """The results for one task; energies in J."""
+def search(seed: int, index: int) -> dict[str, Any]:
+    """The results of one task, with energies in J."""
     task = move(seed, index)
     found, space = Search(task), bspline.uniform(POINTS)
     nq = len(task.q_start)
@@ -123,8 +129,8 @@ def search(seed: int, starts: int, ipopt_starts: int, index: int) -> dict[str, A
         return np.clip(points, limits.q_min, limits.q_max)
 
     from_line = found.improve(guess(straight))
-    energies = [from_line, *(found.improve(guess(perturbed())) for _ in range(starts - 1))]
-    by_ipopt = [_ipopt(found, perturbed() - straight if k else None) for k in range(ipopt_starts)]
+    energies = [from_line, *(found.improve(guess(perturbed())) for _ in range(STARTS - 1))]
+    by_ipopt = [_ipopt(found, perturbed() - straight if k else None) for k in range(IPOPT_STARTS)]
     least = found.energy
     if found.best is not None:
         fine = bspline.uniform(FINE_POINTS)
@@ -154,17 +160,16 @@ def _ipopt(found: Search, moved: Array | None) -> float:
 
 
 def fingerprint(robot: Robot) -> str:
-    """Hash of the robot's parameters that energies and limits depend on: references are valid for
-    these only.
+    """Hash of all parameters of a robot that influence energies and limits. References are valid
+    for one fingerprint only.
     """
     friction = next(iter(robot.friction_laws.values()))
     parts_of = (robot.limits, robot.drives, friction, robot.electronics)
-    # not `vars`: it has what was computed from the fields, too
+    # `vars` would also contain cached properties
     parameters = {each.name: getattr(part, each.name) for part in parts_of for each in fields(part)}
-    # names are no parameters, and joint ranges do not limit a motion between two configurations
-    # within them
+    # Names are no parameters. Joint ranges hardly limit motions between configurations within them.
     left_out = {"name", "q_min", "q_max"}
-    # terms of friction that the robot does not have
+    # terms of friction without effect for this robot
     left_out |= {term for term in ("load", "bend") if not np.any(parameters[term])}
     parts = [np.atleast_1d(v) for k, v in parameters.items() if k not in left_out]
     parts += [placement.homogeneous.ravel() for placement in robot.model.jointPlacements]
@@ -173,52 +178,36 @@ def fingerprint(robot: Robot) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def load(path: Path = FILE) -> dict[str, Any]:
+def load() -> dict[str, Any]:
     """The stored reference energies."""
-    content: dict[str, Any] = orjson.loads(path.read_bytes())
+    content: dict[str, Any] = orjson.loads(FILE.read_bytes())
     return content
 
 
 def main() -> None:
     """Solves the tasks and stores the results."""
-    arguments = parser(__doc__, seed=SEED)
-    arguments.add_argument("--count", type=int, default=TASKS, help="tasks (%(default)s)")
-    arguments.add_argument(
-        "--starts", type=int, default=STARTS, help="initial guesses of the SQP (%(default)s)"
-    )
-    arguments.add_argument(
-        "--ipopt-starts", type=int, default=IPOPT_STARTS, help="and of IPOPT (%(default)s)"
-    )
-    arguments.add_argument("--processes", type=int, default=2, help="processes (%(default)s)")
-    arguments.add_argument("--output", type=Path, default=FILE, help="file to write (%(default)s)")
-    given = arguments.parse_args()
+    given = parser(__doc__, seed=SEED).parse_args()
     on_one_core()
-    output: Path = given.output
     robot = load_robot("ur5e")
     compile_kernel(robot)
     settings = {
         "robot": robot.name,
         "fingerprint": fingerprint(robot),
         "seed": given.seed,
-        "starts": given.starts,
-        "ipopt_starts": given.ipopt_starts,
+        "starts": STARTS,
+        "ipopt_starts": IPOPT_STARTS,
         "control_points": POINTS,
         "fine_control_points": FINE_POINTS,
     }
-    before = load(output) if output.exists() else {}
-    continued = {name: before.get(name) for name in settings} == settings
-    rows: list[dict[str, Any]] = before["tasks"] if continued else []
-    done = {row["index"] for row in rows}
-    one: Callable[[int], dict[str, Any]] = partial(
-        search, given.seed, given.starts, given.ipopt_starts
-    )
-    with multiprocessing.get_context("spawn").Pool(given.processes) as pool:
-        for row in pool.imap_unordered(
-            one, (index for index in range(given.count) if index not in done)
-        ):
+    stored = load() if FILE.exists() else {}
+    is_continued = {name: stored.get(name) for name in settings} == settings
+    rows: list[dict[str, Any]] = stored["tasks"] if is_continued else []
+    remaining = set(range(TASKS)) - {row["index"] for row in rows}
+    with multiprocessing.get_context("spawn").Pool(PROCESSES) as pool:
+        for row in pool.imap_unordered(partial(search, given.seed), sorted(remaining)):
             rows = sorted([*rows, row], key=lambda each: int(each["index"]))
             print(row, flush=True)
-            output.write_bytes(
+            FILE.write_bytes(
                 orjson.dumps({**settings, "tasks": rows}, option=orjson.OPT_INDENT_2) + b"\n"
             )
 

@@ -1,6 +1,4 @@
-"""benchmarks/RESULTS.md from the results of the sections: requirements, distributions, other
-planners.
-"""
+"""The report benchmarks/RESULTS.md on all sections: requirements, distributions, other planners."""
 
 from __future__ import annotations
 
@@ -17,7 +15,15 @@ RESULTS = ROOT / "benchmarks" / "RESULTS.md"
 def write(
     path: Path, machine: Results, results: dict[str, Results | None], took: float, whole: bool
 ) -> None:
-    """Writes the report to `path` and the plot beside it."""
+    """Writes the report to `path`, and the plot into the same folder.
+
+    Args:
+        path: file of the report.
+        machine: description of the machine, by `benchmarks.machine`.
+        results: results by section; None without results.
+        took: duration of the run [s].
+        whole: whether all sections ran.
+    """
     planners = Comparison.of(
         {name: found for name, found in results.items() if name.startswith("planner-") and found}
     )
@@ -130,7 +136,7 @@ def _spread(task: str, quantity: str, spread: Results, factor: float, digits: in
 
 
 def _notes(results: dict[str, Results | None]) -> str:
-    """Results that are no distribution, and the tasks that were not solved."""
+    """Single figures, unsolved tasks and errors."""
     lines = []
     if scenes := results.get("scenes"):
         planned = sum(scenes["from_planned_path"].values())
@@ -170,7 +176,7 @@ def _arms(found: Results | None) -> str:
             str(row["joints"]),
             f"{row['answered']} of {row['count']}",
             str(len(row["errors"])),
-            *_times(row, 0),
+            *(f"{row['wall'][name] * MS:.0f}" for name in ("p50", "p95")),
             "" if row["gap"]["p50"] is None else f"{PERCENT * row['gap']['p50']:.1f}",
         ]
         for row in found["rows"]
@@ -199,12 +205,8 @@ def _load(found: Results | None) -> str:
     )
 
 
-def _times(row: Results, digits: int = 1) -> list[str]:
-    return [f"{row['wall'][name] * MS:.{digits}f}" for name in ("p50", "p95")]
-
-
 def _foreign(found: Results | None) -> str:
-    """Planning problems of others, per kind of goal and family."""
+    """Planning problems from other sources, per kind of goal and family."""
     if found is None:
         return ""
     times = ["time: median [s]", "95th percentile [s]"]

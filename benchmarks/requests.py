@@ -1,14 +1,13 @@
-"""Random requests to the service over HTTP. Every answer is checked; the exit code is 1 if a
-requirement fails.
+"""Random requests to the service over HTTP, with checks of all answers.
 
     python -m benchmarks.requests --count 300 --seed 0
     python -m benchmarks.requests --count 200 --robot panda --kind "joint to pose"
     python -m benchmarks.requests --count 100 --kind "joint to pose" --bound tight --line-every 0
 
-Starts the service with its default settings and sends joint-to-pose and pose-to-pose requests in
-turn. The certificate of each answer is checked, its spline is replayed here, and baselines, energy
-balance and lower bound are compared. Some tasks are also solved by time scaling with the same
-duration.
+The command starts the service with its default settings and sends joint-to-pose and pose-to-pose
+requests alternately, from one client or from `--clients`. It checks the certificate, replays the
+spline, and compares energy balance, baselines and lower bound. Every task number `--line-every` is
+also solved by time scaling with the same duration. The exit code is 1 if a requirement fails.
 """
 
 from __future__ import annotations
@@ -28,14 +27,20 @@ from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, RequestTask, request_tasks
 from joulepath.models.registry import robot_names
 
-ANSWERED = 0.99  # least fraction of valid answers
-MOST_EXCESS = 1e-2  # largest relative excess of the energy over that of the time-scaled motion
+ANSWERED = 0.99
+"""Smallest admissible fraction of valid answers [1]."""
+MOST_EXCESS = 1e-2
+"""Largest admissible relative excess of the energy over that of the time-scaled motion [1]."""
 PROBLEM = "application/problem+json"
 
 
 @dataclass
 class Outcome:
-    """Result of one request: status, wall time [s], errors found, energy [J] of the objective."""
+    """Result of one request: status, wall time [s], errors, and figures of the answer.
+
+    `energy` is the energy of the objective [J]; `relative_excess` is its excess over the energy of
+    the time-scaled motion.
+    """
 
     task: RequestTask
     status: int = 0
@@ -48,7 +53,7 @@ class Outcome:
     candidates: int = 0
     solves: int = 0
     optimal: bool = False
-    relative_excess: float | None = None  # energy / energy of the time-scaled motion - 1
+    relative_excess: float | None = None
     bytes: int = 0
 
     @property
@@ -80,9 +85,7 @@ def examine(task: RequestTask, answer: Answer) -> Outcome:
 
 
 def compare_with_line(client: Client, task: RequestTask, outcome: Outcome, duration: float) -> None:
-    """Requests the time-scaled motion of the same duration, and sets the relative excess of the
-    energy over it.
-    """
+    """Requests the time-scaled motion of the same duration [s], and sets the relative excess."""
     answer = client.optimize({**task.body, "method": "time_scaling", "duration": duration})
     content = answer.content
     if answer.status == 200:
@@ -94,8 +97,9 @@ def compare_with_line(client: Client, task: RequestTask, outcome: Outcome, durat
 def send_all(
     service: Service, tasks: Sequence[RequestTask], clients: int = 1, line_every: int = 0
 ) -> list[Outcome]:
-    """Sends every task by `clients` clients and checks the answers; compares every `line_every`-th
-    with the line.
+    """Sends the tasks from `clients` clients, and checks the answers.
+
+    One pair of tasks in `line_every` is compared with the time-scaled line; none if it is zero.
     """
     local = threading.local()
 
@@ -104,7 +108,7 @@ def send_all(
             local.client = service.client()
         answer = local.client.optimize(task.body)
         outcome = examine(task, answer)
-        # by pairs, so that both kinds take part
+        # selected by pairs, so that both kinds of tasks are compared
         if line_every and (task.index // len(KINDS)) % line_every == 0 and outcome.status == 200:
             compare_with_line(local.client, task, outcome, answer.content["duration"])
         return outcome
@@ -150,7 +154,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def failed_requirements(results: dict[str, Any]) -> list[str]:
-    """A message for every requirement that a run fails."""
+    """A message for every failed requirement of a run."""
     found = list(results["errors"])
     if results["valid_fraction"] < ANSWERED:
         found.append(
@@ -205,21 +209,19 @@ def main() -> int:
     arguments.add_argument(
         "--clients", type=int, default=1, help="simultaneous requests (%(default)s)"
     )
-    arguments.add_argument("--robot", choices=robot_names(), default="ur5e", help="(%(default)s)")
-    arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
+    arguments.add_argument(
+        "--robot", choices=robot_names(), default="ur5e", help="robot (%(default)s)"
+    )
     arguments.add_argument(
         "--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)"
     )
-    arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
+    arguments.add_argument("--kind", choices=KINDS, help="(default: alternately)")
     arguments.add_argument(
-        "--line-every", type=int, default=5, help="compare every n-th task with time scaling"
+        "--line-every", type=int, default=5, help="one comparison in so many tasks (0: none)"
     )
     given = arguments.parse_args()
     tasks = list(request_tasks(given.seed, given.count, given.kind, given.robot))
-    settings = {"bound": given.bound} | (
-        {} if given.deadline is None else {"deadline": given.deadline}
-    )
-    tasks = [replace(task, body=task.body | settings) for task in tasks]
+    tasks = [replace(task, body=task.body | {"bound": given.bound}) for task in tasks]
     with running() as service:
         outcomes = send_all(service, tasks, given.clients, given.line_every)
     results = summary(outcomes)

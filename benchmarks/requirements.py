@@ -8,7 +8,8 @@ from typing import Any
 
 Results = dict[str, Any]
 
-MS = 1e3  # per second
+MS = 1e3
+"""Milliseconds per second."""
 PERCENT = 1e2
 
 
@@ -26,7 +27,7 @@ class Requirement:
 
     @property
     def satisfied(self) -> bool:
-        """Whether the measured value is on the right side of the bound; NaN is not."""
+        """Whether the measured value satisfies the bound; NaN does not."""
         return self.measured >= self.bound if self.at_least else self.measured <= self.bound
 
     def row(self) -> list[str]:
@@ -38,7 +39,7 @@ class Requirement:
 
 
 def requirements(results: dict[str, Results | None]) -> list[Requirement]:
-    """The requirements of all sections that have results."""
+    """The requirements of all sections with results."""
     return [
         each
         for name, rows in SECTIONS.items()

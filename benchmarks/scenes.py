@@ -1,13 +1,12 @@
-"""Random tasks among obstacles, solved and replayed. The exit code is 1 if a requirement fails.
+"""Random tasks among obstacles, solved and replayed.
 
     python -m benchmarks.scenes --count 300 --seed 0
     python -m benchmarks.scenes --count 60 --method time_scaling
 
-Tables, shelves, boxes and cages take turns; every task has a collision-free path. Each is solved
-twice: joint to joint,
-which is one candidate, and joint to pose, a whole request. Pinocchio and Coal replay every answer
-at a period of
-0.1 ms.
+The tasks alternate between tables, shelves, boxes and cages, and have collision-free paths. Every
+task is solved twice: from joint positions to joint positions, as one candidate, and to a pose, as a
+whole request. Pinocchio and Coal replay every answer with a period of 0.1 ms. The exit code is 1 if
+a requirement fails.
 """
 
 from __future__ import annotations
@@ -35,8 +34,10 @@ from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.solve.methods import METHODS
 from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 
-REPLAY = 1e-4  # s
-SOLVED = 0.99  # least fraction of solved tasks, of either kind
+REPLAY = 1e-4
+"""Period of the replay [s]."""
+SOLVED = 0.99
+"""Smallest admissible fraction of solved tasks of each kind [1]."""
 KINDS = ("one candidate", "whole request")
 PLANNED = (MotionOrigin.FROM_PLANNED_PATH.value, MotionOrigin.ALONG_PLANNED_PATH.value)
 
@@ -136,7 +137,7 @@ def _solved(outcomes: Sequence[Outcome], cell: str) -> str:
 
 
 def failed_requirements(results: dict[str, Any]) -> list[str]:
-    """A message for every requirement that a run fails."""
+    """A message for every failed requirement of a run."""
     found = list(results["collisions"])
     for kind, number in results["solved"].items():
         if number < SOLVED * results["count"]:

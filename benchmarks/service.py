@@ -1,4 +1,4 @@
-"""The service in a process of its own (`python -m joulepath.app`), and clients over HTTP."""
+"""The service in its own process (`python -m joulepath.app`), and clients over HTTP."""
 
 from __future__ import annotations
 
@@ -21,15 +21,18 @@ from typing import IO, Any
 import orjson
 
 ROOT = Path(__file__).parents[1]
-START = 120.0  # longest time until the service is ready [s]
-STOP = 20.0  # longest time from SIGTERM to the end of the process [s]
-PAUSE = 0.005  # between two attempts [s]
+START = 120.0
+"""Longest time until the service is ready [s]."""
+STOP = 20.0
+"""Longest time from SIGTERM to the end of the process [s]."""
+PAUSE = 0.005
+"""Time between two attempts to reach the service [s]."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A response: status, raw body, headers in lower case, and wall time from sending to the last
-    byte [s].
+    """A response: status, raw body, headers in lower case, and wall time from sending the request
+    to the last byte [s].
     """
 
     status: int
@@ -44,9 +47,7 @@ class Answer:
 
 
 COMPUTED = {"Cache-Control": "no-cache"}
-"""Headers of a request whose answer is to be computed, although an equal request was answered
-before.
-"""
+"""Headers with which the service does not return the stored answer of an equal request."""
 
 
 class Client:
@@ -62,21 +63,13 @@ class Client:
         return self._exchange("GET", path, None)
 
     def optimize(self, body: dict[str, Any]) -> Answer:
-        """`POST /optimize`, computed now. Raises the same errors as `get`."""
+        """`POST /optimize` without stored answers. Raises the same errors as `get`."""
         return self._exchange("POST", "/optimize", orjson.dumps(body), **COMPUTED)
 
     def send_raw(self, content: bytes) -> None:
         """Sends bytes as they are."""
         self._connection.connect()
         self._connection.sock.sendall(content)
-
-    def post(self, path: str, body: Any, **headers: str) -> Answer:
-        """A POST with a JSON body. Raises the same errors as `get`."""
-        return self._exchange("POST", path, orjson.dumps(body), **headers)
-
-    def close(self) -> None:
-        """Closes the connection."""
-        self._connection.close()
 
     def _exchange(self, method: str, path: str, body: bytes | None, **headers: str) -> Answer:
         began = time.perf_counter()
@@ -108,11 +101,12 @@ class Service:
 
     @property
     def age(self) -> float:
-        """Time [s] since the start of its process."""
+        """Time since the start of the process [s]."""
         return time.perf_counter() - self.began
 
-    def wait(self, path: str) -> float:
-        """Waits until `path` answers 200 and returns the age of the service [s]."""
+    def wait(self, path: str) -> None:
+        """Waits until `path` answers 200. Raises RuntimeError if the service ends or needs more
+        than START."""
         client = self.client()
         while True:
             if self.process.poll() is not None:
@@ -121,13 +115,13 @@ class Service:
                 raise RuntimeError(f"no 200 from {path} within {START:g} s:\n" + self.logged())
             try:
                 if client.get(path).status == 200:
-                    return self.age
+                    return
             except (OSError, http.client.HTTPException):
                 pass
             time.sleep(PAUSE)
 
     def logged(self) -> str:
-        """The end of its log."""
+        """The last 4000 bytes of the log."""
         self.log.seek(0)
         return self.log.read()[-4000:].decode(errors="replace")
 
@@ -137,12 +131,13 @@ class Service:
 
 
 @contextmanager
-def running(ready: bool = True, **environment: str) -> Iterator[Service]:
-    """A service with default settings on a free port; it ends with the context. Waits for `/readyz`
-    if `ready`.
+def running(**environment: str) -> Iterator[Service]:
+    """A ready service on a free port, with default settings except for environment variables.
+
+    The service ends with the context.
     """
     port = _free_port()
-    # a SIGTERM to the benchmark then ends the service, too
+    # SIGTERM becomes an exception, so that it also ends the service
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     given = os.environ | {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)} | environment
     with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
@@ -153,8 +148,7 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
         )
         service = Service(process, port, began, log)
         try:
-            if ready:
-                service.wait("/readyz")
+            service.wait("/readyz")
             yield service
         finally:
             process.send_signal(signal.SIGTERM)
@@ -166,8 +160,7 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
 
 
 def _free_port() -> int:
-    """A port that no connection of a client gets by chance: Linux gives them ports from 32768
-    on."""
+    """A free port below 32768, from where Linux assigns ports to connections of clients."""
     for port in random.sample(range(20_000, 32_000), 100):
         with socket.socket() as free, contextlib.suppress(OSError):
             free.bind(("127.0.0.1", port))
@@ -189,7 +182,7 @@ def _descendants(pid: int) -> list[int]:
     for status in Path("/proc").glob("[0-9]*/stat"):
         try:
             state, parent = status.read_text().rpartition(")")[2].split()[:2]
-        except OSError:  # it has just ended
+        except OSError:  # the process has just ended
             continue
         if state != "Z":
             parents[int(status.parent.name)] = int(parent)

@@ -1,11 +1,11 @@
-"""Planners on the same seeded tasks, task by task in turns: their ratio hardly hangs on a machine
-whose speed changes.
+"""Planners that alternate on the same seeded tasks, so that changes of the machine's speed hardly
+affect the ratios of their times.
 
-    python -m benchmarks.side_by_side answer drake --count 20
+    python -m benchmarks.side_by_side answer drake --count 20 --repeat 3
 
-Every planner has a process of its own, on one core. The first one plans a task before and after
-each of the others, and all do so `--repeat` times. The median of a planner's times for a task
-counts.
+Every planner runs in its own process on one core. For every task, the first planner runs before
+and after every other planner, and this is repeated `--repeat` times. The result of a planner for a
+task is the median of its times.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from benchmarks.statistics import Spread
 from benchmarks.tasks import moves
 from joulepath.models.robot import Array
 
-# what begins the lines that tell a time: planners may print others
 WALL = "wall "
+"""Prefix of the lines with times, because planners may print other lines."""
 
 
 class Worker:
-    """A planner in another process, which plans the seeded tasks by their numbers."""
+    """A planner in another process, which plans the seeded tasks by their indices."""
 
     def __init__(self, name: str, seed: int, count: int) -> None:
         call = f"from benchmarks.side_by_side import serve; serve({name!r}, {seed}, {count})"
@@ -41,7 +41,7 @@ class Worker:
             stdout=subprocess.PIPE,
             text=True,
         )
-        self._told()
+        self._reported_wall()
 
     def end(self) -> None:
         """End the process."""
@@ -52,9 +52,9 @@ class Worker:
         """Wall time [s] of a task. Raises RuntimeError if the process ends."""
         assert self._process.stdin is not None
         print(index, file=self._process.stdin, flush=True)
-        return self._told()
+        return self._reported_wall()
 
-    def _told(self) -> float:
+    def _reported_wall(self) -> float:
         assert self._process.stdout is not None
         for line in self._process.stdout:
             if line.startswith(WALL):
@@ -65,8 +65,9 @@ class Worker:
 
 
 def serve(name: str, seed: int, count: int) -> None:
-    """Plans the tasks whose numbers come in, and tells their wall times [s]; at first that of
-    building all.
+    """Plans the tasks whose indices arrive on the standard input, and prints their wall times [s].
+
+    The first time printed is for a first call, which builds the planner.
     """
     planner, tasks = planner_of(name), list(moves(seed, count))
     print(f"{WALL}{attempt(planner, tasks[0])[0]}", flush=True)
@@ -78,13 +79,13 @@ def measured(first: Worker, others: Sequence[Worker], count: int, repeat: int) -
     """Wall times (1 + others, count) [s] of all planners."""
     walls = np.empty((1 + len(others), count))
     for task in range(count):
-        own, each = list[float](), [list[float]() for _ in others]
+        of_first, of_others = list[float](), [list[float]() for _ in others]
         for _ in range(repeat):
-            for other, times in zip(others, each, strict=True):
-                own.append(first.wall(task))
+            for other, times in zip(others, of_others, strict=True):
+                of_first.append(first.wall(task))
                 times.append(other.wall(task))
-                own.append(first.wall(task))
-        walls[:, task] = [np.median(times) for times in (own, *each)]
+                of_first.append(first.wall(task))
+        walls[:, task] = [np.median(times) for times in (of_first, *of_others)]
     return walls
 
 
@@ -95,7 +96,7 @@ def main() -> None:
     arguments.add_argument("others", choices=PLANNERS, nargs="+")
     arguments.add_argument("--count", type=int, default=20, help="tasks (%(default)s)")
     arguments.add_argument(
-        "--repeat", type=int, default=1, help="plans of a task by each of the others (%(default)s)"
+        "--repeat", type=int, default=1, help="repetitions of every task (%(default)s)"
     )
     given = arguments.parse_args()
     names, workers = [given.first, *given.others], list[Worker]()

@@ -1,13 +1,13 @@
-"""How far the energies of slow moves are above those of the same moves with other durations, spaces
-and methods.
+"""Energies of slow moves, relative to the best of their variants with other durations, spline
+spaces and methods.
 
     python -m benchmarks.energies --kind slow --count 200
 
-Three kinds take turns: all joints at no more than REDUCED, one joint at a speed of ONE_JOINT, all
-at TENTH of their limits of speed. Each answer is compared with fixed durations near its own, with
-four times the control points, evenly spaced and next to its own knots, and with the Lagrange
-method. Exits with 1 if the 95th percentile of the excess over the best of them is above
-MOST_EXCESS.
+The moves alternate between three kinds: all joints no faster than REDUCED, one joint with a speed
+limit from ONE_JOINT, and all joints at TENTH of their speed limits. The variants of an answer have
+fixed durations near its duration, four times as many control points (evenly spaced, or between the
+knots of the answer), or the Lagrange method. The exit code is 1 if the 95th percentile of the
+excess over the best variant is above MOST_EXCESS.
 """
 
 from __future__ import annotations
@@ -49,22 +49,22 @@ ONE_JOINT = (0.02, 0.6)
 """Smallest and largest speed limit of the joint in the kind `one joint` [rad/s]."""
 TENTH = 0.1
 """Share of the robot's speed limits in the kind `tenth` [1]."""
-# greatest 95th percentile of the excess that is allowed
 MOST_EXCESS = 3e-3
-# durations that are tried, in multiples of the answer's
+"""Largest admissible 95th percentile of the relative excess [1]."""
 NEAR = (0.9, 0.97, 0.99, 0.997, 1.003, 1.01, 1.03, 1.1)
+"""Durations of variants over the duration of the answer [1]."""
 FEW = 13
 """Control points of a first solve."""
 MORE = 4
 """Factor on the number of control points in the fine solve."""
 PROGRESS = 1e-5
 """Relative decrease of the energy at which a fine solve ends [1]."""
-# so long that no search ends early [s]
 AMPLE = 600.0
+"""Deadline that no search reaches [s]."""
 
 
 def slow_problem(seed: int, index: int) -> tuple[SlowKind, Problem]:
-    """Task `index` of a seed and its kind."""
+    """The kind of task `index` of a seed, and its problem."""
     robot, kind, task = load_robot("ur5e"), SLOW_KINDS[index % len(SLOW_KINDS)], move(seed, index)
     rng, v_max = np.random.default_rng([seed, index, 1]), robot.limits.v_max.copy()
     if kind == "all joints":
@@ -78,23 +78,23 @@ def slow_problem(seed: int, index: int) -> tuple[SlowKind, Problem]:
 
 
 def other_searches(problem: Problem, duration: float) -> Iterator[tuple[str, float]]:
-    """Energies [J] of the same move, each with its name, at durations near that of the answer and
-    by another method.
+    """Names and energies [J] of variants of a move: with fixed durations near its `duration` [s],
+    and by the Lagrange method.
     """
     for factor in NEAR:
-        longest = duration * factor
+        fixed = duration * factor
         with suppress(JoulepathError):
             yield (
                 f"{factor:g} T",
-                _energy(replace(problem, duration_min=longest, duration_max=longest)),
+                _energy(replace(problem, duration_min=fixed, duration_max=fixed)),
             )
     with suppress(JoulepathError):
         yield "lagrange", _energy(replace(problem, method="lagrange"))
 
 
 def more_points(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]:
-    """Energies [J] of the same move, each with its name, from the answer's motion in larger
-    spaces."""
+    """Names and energies [J] of variants of a move in larger spline spaces, solved from its
+    answer's motion."""
     prepared = PreparedProblem.of(problem)
     q_start, q_goal = spline.control_points[[0, -1]]
     solver = FreeSpline(SolveContext.of(prepared, q_start, q_goal, NEVER))
@@ -111,19 +111,18 @@ def _energy(problem: Problem) -> float:
 
 
 def _finer(solver: FreeSpline, spline: Spline) -> SolveResult:
-    """From a motion in the space with its own knots, and MORE times as many spans."""
+    """A solve from a motion, in a spline space with every span divided into MORE spans."""
     duration = spline.duration
-    own: Array = spline.knots / duration
-    breaks = np.unique(own)
-    between = [np.linspace(a, b, MORE + 1)[1:-1] for a, b in pairwise(breaks)]
-    space = Basis.of(np.sort(np.concatenate([own, *between])))
-    points = bspline.refit(spline.control_points, own, space.knots)
+    knots: Array = spline.knots / duration
+    inserted = [np.linspace(a, b, MORE + 1)[1:-1] for a, b in pairwise(np.unique(knots))]
+    space = Basis.of(np.sort(np.concatenate([knots, *inserted])))
+    points = bspline.refit(spline.control_points, knots, space.knots)
     return solver.improve(Guess(space, points, duration, nearly_feasible=True, progress=PROGRESS))
 
 
 def compare(seed: int, count: int, json: Path | None) -> int:
-    """Solves the moves, prints how far they are above the best of their variants; 1 if that is too
-    far.
+    """Solves the moves and their variants, and prints the excess over the best variants; returns 1
+    if it is too large.
     """
     rows = []
     for index in range(count):
@@ -132,14 +131,16 @@ def compare(seed: int, count: int, json: Path | None) -> int:
         answer = optimize(problem)
         spent = time.process_time() - began
         energy, spline = answer.energy.electrical.total, answer.trajectory.spline
-        others = dict(other_searches(problem, spline.duration)) | dict(more_points(problem, spline))
-        best = min(others, key=lambda name: others[name])
+        variants = dict(other_searches(problem, spline.duration)) | dict(
+            more_points(problem, spline)
+        )
+        best = min(variants, key=lambda name: variants[name])
         row: dict[str, Any] = {
             "index": index,
             "kind": kind,
             "energy": energy,
             "duration": answer.duration,
-            "excess": max(energy / others[best] - 1, 0.0),
+            "excess": max(energy / variants[best] - 1, 0.0),
             "best": best,
             "cpu": spent,
         }

@@ -1,9 +1,9 @@
 """Time of one candidate, joint to joint, on one core: the free B-spline and the time-scaled line.
 
-The time is that of the method alone, from two configurations to a motion within all limits, also
-between the nodes. The refinement of the incumbent, the baselines and the certificate are not
-included. If start and goal have no self-collision, the B-spline is also timed with self-collision
-constraints, each task with and without in turn.
+The time covers the method alone: from two configurations to a motion that is within all limits,
+also between the nodes. It does not include the refinement of the incumbent, the baselines and the
+certificate. If start and goal are free of self-collisions, the B-spline is also timed with
+self-collision constraints, alternately with and without them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from joulepath.optimizer.solve.methods import solver_for
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 from joulepath.optimizer.solve.methods.solve_result import SolveResult
 
-PATIENCE = 60.0  # longest time of one solve [s]
+SOLVE_TIME = 60.0
+"""Longest time of one solve [s]."""
 METHODS: tuple[MethodName, ...] = ("bspline", "time_scaling")
 
 
@@ -46,7 +47,7 @@ def solve(move: Move, method: MethodName, collisions: bool = False) -> tuple[flo
     )
     began = time.perf_counter()
     outcome = solver_for(
-        SolveContext.of(task, move.q_start, move.q_goal, Deadline.after(PATIENCE))
+        SolveContext.of(task, move.q_start, move.q_goal, Deadline.after(SOLVE_TIME))
     ).solve()
     return time.perf_counter() - began, outcome
 
@@ -66,9 +67,8 @@ def measure(seed: int, count: int, method: MethodName) -> dict[str, Any]:
 
 
 def with_self_collision(seed: int, count: int) -> dict[str, Any]:
-    """Statistics of the time with self-collision constraints, and of its ratio to the time without,
-    task by task.
-    """
+    """Statistics of the time with self-collision constraints, and of its ratio to the time without
+    them."""
     model = CollisionModel(Arm(robot=load_robot("ur5e")))
     ratios, walls = [], []
     for move in moves(seed, count):

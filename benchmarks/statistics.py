@@ -25,7 +25,7 @@ class Spread:
 
     @staticmethod
     def of(values: Sequence[float]) -> Spread:
-        """The statistics of a sample; NaN for an empty one."""
+        """The statistics of a sample; NaN for an empty sample."""
         if not len(values):
             return Spread(0, *[math.nan] * 8)
         return Spread(

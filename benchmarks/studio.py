@@ -1,14 +1,14 @@
-"""The studio page in Chromium: first picture, size, frames per second, findings of axe. The exit
-code is 1 if the first picture is too late, the page too large, its own code too slow for a frame, a
-still page drawn again, or axe has a serious finding.
+"""The studio page in Chromium: first picture, size, frames per second, findings of axe.
 
     python -m benchmarks.studio --count 10
 
-Each visit has an empty cache, and the service and the browser are warm. The first picture is there
-when the arm has been drawn; the first answer, when the energy of the example is. Without a graphics
-card, WebGL is drawn by the processor (SwiftShader), and no frame rate is required. The time of the
-page's own code for a frame (arms, path, labels, charts; not the drawing itself) is required
-everywhere: the rest of 1/60 s is left to the graphics card.
+Every visit has an empty cache; the service and the browser are warm. The first picture is the
+instant at which the arm has been drawn, the first answer the instant at which the energy of the
+example is shown. Without a graphics card, the processor draws WebGL (SwiftShader), so no frame rate
+is required. The time per frame of the page's own code (arms, path, labels and charts, without the
+drawing) is limited to half of 1/60 s on all machines; the rest is left to the graphics card. The
+exit code is 1 if the first picture is too late, if the page is too large, if its own code is too
+slow, if a still page is redrawn, or if axe has a serious finding.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from tests.browsers import SOFTWARE, chromium
 PICTURE = 1.2
 """Latest first picture [s]."""
 SIZE = 1.2e6
-"""Largest size of the page, compressed, without meshes [byte]."""
+"""Largest compressed size of the page without meshes [byte]."""
 FRAME = 8.0
-"""Longest mean processor time of the page's own code for a frame: half of 1/60 s [ms]."""
+"""Largest mean processor time of the page's own code per frame [ms]: half of 1/60 s."""
 WORK = ("ScriptDuration", "LayoutDuration", "RecalcStyleDuration")
-"""Metrics of Chromium that are the page's own."""
+"""Metrics of Chromium for the page's own code."""
 PLAYED = 5.0
-"""Time over which frames are counted [s]."""
+"""Period in which frames are counted [s]."""
 SETTLED = 1500
-"""Time after which a still picture is drawn in full [ms]."""
+"""Time after which a still picture is complete [ms]."""
 BUILT = ROOT / "app" / "static" / "studio"
 LOOKS = (("light", 1440), ("dark", 1440), ("light", 390))
 TIMES = """(() => {
@@ -52,14 +52,14 @@ TIMES = """(() => {
     };
     look();
 })()"""
-"""Notes the instants of the first picture and the first answer [ms]."""
+"""Records the instants of the first picture and the first answer [ms]."""
 FRAMES = """(time) => new Promise((resolve) => {
     const first = studio.view.frames;
     document.querySelector("#play").click();
     setTimeout(() => resolve((studio.view.frames - first) / time), 1000 * time);
 })"""
 COUNT = 200
-"""Frames over which the time of the page's own code is measured."""
+"""Number of frames over which the time of the page's own code is averaged."""
 OWN = """(count) => {
     const { view } = studio;
     const draw = view.renderer.render;
@@ -72,12 +72,12 @@ OWN = """(count) => {
     }
     view.renderer.render = draw;
 }"""
-"""Goes through the motion in so many frames, without the drawing by WebGL."""
+"""Steps through the motion in `count` frames without drawing by WebGL."""
 STILL = """(time) => new Promise((resolve) => {
     const first = studio.view.frames;
     setTimeout(() => resolve(studio.view.frames - first), 1000 * time);
 })"""
-"""Frames that are drawn while nothing moves."""
+"""Number of frames drawn in a period without motion."""
 RENDERER = """() => {
     const gl = document.createElement("canvas").getContext("webgl2");
     const told = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -86,7 +86,7 @@ RENDERER = """() => {
 
 
 def visits(browser: Browser, url: str, count: int) -> dict[str, Spread]:
-    """Instants of the first picture and the first answer of visits [s]."""
+    """Distributions of the instants of the first picture and the first answer [s]."""
     found: dict[str, list[float]] = {"picture": [], "answer": []}
     for _ in range(count):
         context = browser.new_context(viewport={"width": 1440, "height": 900})
@@ -108,8 +108,8 @@ def frames(page: Page) -> float:
 
 
 def still(page: Page) -> tuple[float, int]:
-    """What the code of the page takes for a frame [ms], and the frames of a page on which nothing
-    moves."""
+    """Processor time of the page's own code per frame [ms], and number of frames of a still
+    page."""
     page.locator("#play").click()
     until(page, "() => studio.state.postures?.every(({ state }) => state !== 'computing')")
     session = page.context.new_cdp_session(page)
@@ -128,7 +128,7 @@ def still(page: Page) -> tuple[float, int]:
 
 
 def compressed(folder: Path) -> int:
-    """Size of the built page [byte], each file compressed by gzip unless it is a font."""
+    """Size of the built page [byte], with all files except fonts compressed by gzip."""
     files = [each for each in folder.iterdir() if each.suffix != ".txt"]
     return sum(
         each.stat().st_size if each.suffix == ".woff2" else len(gzip.compress(each.read_bytes()))
@@ -137,7 +137,7 @@ def compressed(folder: Path) -> int:
 
 
 def serious(browser: Browser, url: str) -> list[str]:
-    """Serious findings of axe on all pages, in light and dark and on a phone."""
+    """Serious findings of axe on all pages: light, dark, and on a phone."""
     found = list[str]()
     for scheme, width in LOOKS:
         size = {"width": width, "height": 900}
@@ -151,7 +151,7 @@ def serious(browser: Browser, url: str) -> list[str]:
 
 
 def main() -> None:
-    """Measure, print and judge."""
+    """Measures the page, prints the results, and exits with the verdict."""
     options = parser(__doc__)
     options.add_argument("--count", type=int, default=10, help="visits (%(default)s)")
     args = options.parse_args()

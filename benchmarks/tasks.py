@@ -1,5 +1,5 @@
-"""Seeded random tasks. Task `index` of a seed is drawn by a generator with seed (seed, index); none
-is left out.
+"""Seeded random tasks. A generator with the seed (seed, index) draws task `index`; no task is left
+out.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ MOUNTS = {"floor": [0.0, 0.0, -9.81], "wall": [9.81, 0.0, 0.0], "ceiling": [0.0,
 
 @dataclass(frozen=True)
 class Move:
-    """A motion between two configurations (nq,) [rad]; each joint is uniform over one turn within
-    its limits.
+    """A motion between two configurations (nq,) [rad], with uniform joint positions in one turn
+    within the limits.
 
-    Collisions are ignored, because the other planners do not check them.
+    Collisions are ignored, because the other planners do not check for collisions.
     """
 
     seed: int
@@ -38,9 +38,8 @@ class Move:
 
 @dataclass(frozen=True)
 class RequestTask:
-    """A body for `POST /optimize`, and the configurations (nq,) [rad] and poses T_base_flange (4,
-    4) it was made of.
-    """
+    """A body for `POST /optimize`, and configurations (nq,) [rad] and poses T_base_flange (4, 4) of
+    its targets."""
 
     seed: int
     index: int
@@ -71,8 +70,8 @@ def request_task(
 ) -> RequestTask:
     """Task `index` of a seed: a request with default settings between reachable targets.
 
-    A target is the pose, or the joint positions, of a configuration that is uniform over the joint
-    ranges and without self-collision. The kinds alternate if `kind` is None.
+    The targets are poses or joint positions of configurations, which are uniform over the joint
+    ranges and free of self-collisions. The kinds alternate if `kind` is None.
     """
     arm = load_robot(robot)
     rng = np.random.default_rng([seed, index])
@@ -112,6 +111,6 @@ def flange(robot: Robot, q: Array) -> Array:
 
 
 def as_pose(T: Array) -> dict[str, list[float]]:
-    """A pose as requests state it: position [m] and quaternion x, y, z, w."""
+    """A pose in the form of requests: position [m] and quaternion x, y, z, w."""
     quaternion = pin.Quaternion(np.ascontiguousarray(T[:3, :3])).normalized()
     return {"position": T[:3, 3].tolist(), "quaternion": quaternion.coeffs().tolist()}

@@ -1,5 +1,4 @@
-"""One planner on the seeded joint-to-joint tasks, in a process of its own. Its motions are replayed
-on the fine grid.
+"""One planner on the seeded joint-to-joint tasks, with replays of its motions on the fine grid.
 
 python -m benchmarks.planners drake --count 20
 """
@@ -30,11 +29,12 @@ PLANNERS = {
     "toppra": "toppra_fastest:ToppraFastest",
     "ruckig": "ruckig_fastest:RuckigFastest",
 }
-REACHED = 1e-6  # largest joint error at start and goal [rad]
+REACHED = 1e-6
+"""Largest joint error at start and goal [rad]."""
 
 
 def planner_of(name: str) -> Planner:
-    """The planner of this name, for a UR5e. Raises ImportError if its packages are missing."""
+    """The planner with a name, for a UR5e. Raises ImportError if its packages are missing."""
     module, kind = PLANNERS[name].split(":")
     planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(
         load_robot("ur5e")
@@ -78,7 +78,7 @@ def main() -> None:
     began = time.perf_counter()
     planner = planner_of(given.planner)
     tasks = list(moves(given.seed, given.count))
-    attempt(planner, tasks[0])  # the first call builds what later calls reuse
+    attempt(planner, tasks[0])  # the first call builds objects for all later calls
     built = time.perf_counter() - began
     rows: list[dict[str, Any]] = []
     for task in tasks:

@@ -17,26 +17,27 @@ from joulepath.optimizer.dynamics.losses import drawn_power, power_flow
 from joulepath.optimizer.motion.bspline import DEGREE, Basis, basis_matrix, clamped
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 
-WIDTH = 0.5  # width of the smoothed corners of the power [W]
-KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]
-# duration of the initial guess / shortest duration within the limits on speed, acceleration and
-# jerk
+WIDTH = 0.5
+"""Width of the smoothed corners of the power [W]."""
+KNEE = 0.02
+"""Speed range of the smoothed friction reversal [rad/s]."""
 RETIMED = 1.5
-RESTING = 3  # coinciding control points at each end: standstill
-GRID = np.linspace(
-    0.0, 1.0, 61
-)  # points at which limits are constraints if the hull does not imply them
+"""Duration of the initial guess over the shortest duration within the limits on speed, acceleration
+and jerk [1]."""
+RESTING = 3
+"""Number of equal control points at each end, for a start and an end at rest."""
+GRID = np.linspace(0.0, 1.0, 61)
+"""Points of the limits of `CasadiOptiGrid`."""
 OPTIONS: dict[str, Any] = {"print_time": False}
 IPOPT: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": 300, "tol": 1e-6}
 
 
 class CasadiOpti:
-    """The NLP is built once with the two configurations as parameters, as one would for many
-    solves.
+    """An NLP that is built once, with the two configurations as parameters.
 
     Torque limits are constraints at the Gauss-Legendre nodes of the cost. Limits on speed,
-    acceleration and jerk are constraints on the control points of the derivatives, whose hull
-    contains the derivatives everywhere.
+    acceleration and jerk are constraints on the control points of the derivatives; their convex
+    hull contains the derivatives.
     """
 
     title = "CasADi Opti with IPOPT, hull bounds"
@@ -76,8 +77,8 @@ class CasadiOpti:
     def plan(
         self, q_start: Array, q_goal: Array, perturbation: Array | None = None
     ) -> SplineMotion | None:
-        """See `Planner.plan`. `perturbation` (n - 6, nq) [rad] is added to the initial guess's free
-        control points.
+        """See `Planner.plan`. `perturbation` (n - 6, nq) [rad] is added to the free control points
+        of the initial guess.
         """
         opti, basis = self.opti, self.basis
         free = q_start + np.outer(basis.quintic[RESTING:-RESTING], q_goal - q_start)
@@ -89,15 +90,15 @@ class CasadiOpti:
         )
         try:
             solution = opti.solve()
-        except RuntimeError:  # what Opti raises when the solver gives up
+        except RuntimeError:  # Opti raises it if the solver fails
             return None
         duration = float(solution.value(self.duration))
         return SplineMotion(basis.knots * duration, np.array(solution.value(self.points)).T, DEGREE)
 
 
 class CasadiOptiGrid(CasadiOpti):
-    """The same, with limits on speed, acceleration and jerk on a grid: less conservative, and
-    violated in between.
+    """`CasadiOpti` with limits on speed, acceleration and jerk at the points of a grid: less
+    conservative, but violated between the points.
     """
 
     title = "CasADi Opti with IPOPT, bounds on a grid"
@@ -108,7 +109,8 @@ class CasadiOptiGrid(CasadiOpti):
 
 
 def derivative_points(knots: Array, order: int) -> Array:
-    """Matrix (n - order, n) from control points to those of a derivative (de Boor 1978, ch. X)."""
+    """Matrix (n - order, n) from control points to the control points of a derivative (de Boor
+    1978, ch. X)."""
     n = len(knots) - DEGREE - 1
     matrix = np.eye(n)
     for k in range(order):

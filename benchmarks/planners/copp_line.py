@@ -1,5 +1,5 @@
-"""copp: a time scaling of the straight line with least idle energy, copper loss and friction, by
-conic programming.
+"""copp: a time scaling of the straight line with the least idle energy, copper loss and friction,
+by conic programming.
 """
 
 from __future__ import annotations
@@ -11,20 +11,26 @@ import pinocchio as pin
 from benchmarks.motion import Motion
 from joulepath.models.robot import Array, Robot
 
-# stations are denser near the ends, where the motion is slow: even spacing would cost time there
 _X = np.linspace(0.0, 1.0, 201)
 STATIONS = 3 * _X**2 - 2 * _X**3
-ROUNDS = 3  # of linearising jerk limits and friction around the last profile
-THERMAL = 0.25  # ThermalEnergy of copp 0.2 is four times ∫ Σ (normalize · tau)² dt
-TYPICAL = 0.5  # speed at which concave friction is evaluated / largest speed
-FLOOR = 1e-3  # least speed at which friction work is linearised / largest speed
+"""Stations of the path, denser at both ends: the motion is slow there, and even spacing would make
+it slower."""
+ROUNDS = 3
+"""Number of linearisations of jerk limits and friction around the previous profile."""
+THERMAL = 0.25
+"""Weight of ThermalEnergy, which is four times ∫ Σ (normalize · tau)² dt in copp 0.2."""
+TYPICAL = 0.5
+"""Speed at which concave friction is evaluated over the largest speed [1]."""
+FLOOR = 1e-3
+"""Smallest speed at which friction work is linearised over the largest speed [1]."""
 
 
 class CoppMotion:
     """A line with the profile a = (ds/dt)², b = d²s/dt² over stations; b is linear in s between
     stations.
 
-    In the first and the last interval, which begin or end at rest, jerk is constant over time.
+    In the first and the last interval, the jerk is constant over time, because the motion begins
+    and ends at rest.
     """
 
     def __init__(self, q_start: Array, q_goal: Array, profile: copp.Profile3rd) -> None:
@@ -67,11 +73,11 @@ class CoppMotion:
 
 
 class CoppLine:
-    """∫ (idle power + copper loss + viscous friction) dt along the straight line.
+    """Minimises ∫ (idle power + copper loss + viscous friction) dt along the straight line.
 
-    The first two are copp's own objectives. Viscous work is concave in its variables and linearised
-    around the last profile, as copp advises for such terms. The work of dry friction does not
-    depend on the time scaling; it enters the torques only.
+    copp has objectives for idle power and copper loss. The work of viscous friction is concave in
+    the variables of copp, and linearised around the previous profile, as copp advises. The work of
+    dry friction does not depend on the time scaling; dry friction contributes to the torques only.
     """
 
     title = "copp, thermal line"

@@ -23,11 +23,13 @@ from joulepath.models.urdf import urdf_of
 from joulepath.optimizer.motion.bspline import DEGREE, Basis, clamped
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 
-WIDTH = 0.5  # width of the smoothed corners of the power [W]
-KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]
-# duration of the initial guess / shortest duration within the limits on speed, acceleration and
-# jerk
+WIDTH = 0.5
+"""Width of the smoothed corners of the power [W]."""
+KNEE = 0.02
+"""Speed range of the smoothed friction reversal [rad/s]."""
 RETIMED = 1.5
+"""Duration of the initial guess over the shortest duration within the limits on speed, acceleration
+and jerk [1]."""
 OPTIONS = {
     "Major optimality tolerance": 1e-5,
     "Major feasibility tolerance": 1e-6,
@@ -36,11 +38,11 @@ OPTIONS = {
 
 
 class DrakeTrajectory:
-    """Hull bounds on speed, acceleration and jerk, and effort bounds at the nodes, as Drake offers
-    them.
+    """Hull bounds on speed, acceleration and jerk, and effort bounds at the nodes, by methods of
+    Drake.
 
-    Drake's plant has no friction of this kind: effort bounds are tightened by the largest friction
-    torque.
+    Drake's plant lacks this friction law, so the effort bounds are tightened by the largest
+    friction torque.
     """
 
     title = "Drake with SNOPT"
@@ -92,11 +94,12 @@ class DrakeTrajectory:
 
 
 class _Energy:
-    """Drawn electrical energy [J, in hundreds] of control points row by row and a duration.
+    """Electrical energy from the supply [100 J] as a function of the control points, row by row,
+    and the duration.
 
-    Torques and their derivatives come from the plant by automatic differentiation over the 3 nq
-    states of a node; from there to power and to the variables by the chain rule, which is far
-    cheaper than 79 derivatives all the way.
+    The plant computes torques and their derivatives by the 3 nq states of a node with automatic
+    differentiation. The chain rule leads to the derivatives of the power by the variables, at far
+    less cost than automatic differentiation by all 79 variables.
     """
 
     SCALE = 1e-2
@@ -108,7 +111,7 @@ class _Energy:
         self.forces = MultibodyForces_[AutoDiffXd](self.plant)
 
     def __call__(self, x: Array) -> Any:
-        """The cost, with its gradient where Drake requests it."""
+        """The cost, with its gradient if Drake requests it."""
         if x.dtype != object:
             return self._evaluate(x)[0]
         value, gradient = self._evaluate(ExtractValue(x).ravel())
@@ -130,7 +133,7 @@ class _Energy:
         return self.SCALE * cost, self.SCALE * np.append(by_points.ravel(), by_duration)
 
     def _power(self, states: Array) -> tuple[Array, Array]:
-        """Drawn power (N,) [W] at states (3, N, nq), and its derivatives by them."""
+        """Power from the supply (N,) [W] at states (3, N, nq), and its derivatives by states."""
         robot, v = self.robot, states[1]
         tau, jacobian = self._torques(states)
         law, drives, electronics = robot.friction, robot.drives, robot.electronics

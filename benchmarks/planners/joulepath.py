@@ -13,15 +13,16 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.optimize import optimize, warm_up
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import Problem
+from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.solve.methods import solver_for
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
 
-PATIENCE = 10.0  # s
+SOLVE_TIME = 10.0
+"""Longest time of one solve [s]."""
 
 
 class Candidate:
-    """One candidate, no refinement, no baselines, no certificate."""
+    """One candidate, without refinement, baselines and certificate."""
 
     title = "joulepath, one candidate"
     packages: tuple[str, ...] = ()
@@ -29,6 +30,7 @@ class Candidate:
         "B-spline of 13 control points, duration free, least electrical energy; within limits "
         "between the nodes, too"
     )
+    method: MethodName = "bspline"
 
     def __init__(self, robot: Robot) -> None:
         _prepare(robot)
@@ -36,18 +38,14 @@ class Candidate:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """See `Planner.plan`."""
-        task = PreparedProblem.of(
-            Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal)
-        )
-        return _motion(
-            solver_for(SolveContext.of(task, q_start, q_goal, Deadline.after(PATIENCE)))
-            .solve()
-            .spline
-        )
+        arm = Arm(robot=self.robot, collisions=False)
+        task = PreparedProblem.of(Problem(arm=arm, start=q_start, goal=q_goal, method=self.method))
+        context = SolveContext.of(task, q_start, q_goal, Deadline.after(SOLVE_TIME))
+        return _motion(solver_for(context).solve().spline)
 
 
 class Answer:
-    """The answer that a user gets: refined, compared with the baselines, certified."""
+    """The answer of `optimize`: refined, compared with the baselines, and certified."""
 
     title = "joulepath, whole answer"
     packages: tuple[str, ...] = ()
@@ -72,35 +70,15 @@ class Answer:
             return None
 
 
-class Line:
-    """One candidate, on the straight line in joint space."""
+class Line(Candidate):
+    """One candidate on the straight line in joint space."""
 
     title = "joulepath, time-scaled line"
-    packages: tuple[str, ...] = ()
     what = (
         "straight line in joint space, time scaling by a B-spline of least electrical energy, "
         "duration free"
     )
-
-    def __init__(self, robot: Robot) -> None:
-        _prepare(robot)
-        self.robot = robot
-
-    def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
-        """See `Planner.plan`."""
-        task = PreparedProblem.of(
-            Problem(
-                arm=Arm(robot=self.robot, collisions=False),
-                start=q_start,
-                goal=q_goal,
-                method="time_scaling",
-            )
-        )
-        return _motion(
-            solver_for(SolveContext.of(task, q_start, q_goal, Deadline.after(PATIENCE)))
-            .solve()
-            .spline
-        )
+    method: MethodName = "time_scaling"
 
 
 def _prepare(robot: Robot) -> None:

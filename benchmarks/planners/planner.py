@@ -8,17 +8,16 @@ from typing import Protocol
 from benchmarks.motion import Motion
 from joulepath.models.robot import Array
 
-# planners that minimise energy get the discretisation of joulepath's own first solve
+# the discretisation of joulepath's first solve, for all planners of least energy
 CONTROL_POINTS = 13
 NODES = 31
 
 
 class Planner(Protocol):
-    """Plans motions from standstill to standstill under all limits of a robot. Only `plan` is
-    timed.
+    """A planner of motions from rest to rest within all limits of a robot. Only `plan` is timed.
 
-    `title` is the planner's name, `packages` are the packages that it uses, `what` describes its
-    method and limits.
+    `title` is the name of the planner, `packages` are its packages, and `what` describes its method
+    and limits.
     """
 
     title: str
@@ -30,5 +29,5 @@ class Planner(Protocol):
 
 
 def versions(planner: Planner) -> str:
-    """The planner's packages with their versions."""
+    """The packages of a planner with their versions."""
     return ", ".join(f"{name} {version(name)}" for name in planner.packages) or "this repository"

@@ -1,4 +1,4 @@
-"""ruckig: time-optimal under limits on speed, acceleration and jerk."""
+"""ruckig: time-optimal motions within limits on speed, acceleration and jerk."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import ruckig
 from benchmarks.motion import Motion
 from joulepath.models.robot import Array, Robot
 
-INSTANT = 1e-6  # step of the finite difference that gives jerk from acceleration [s]
+INSTANT = 1e-6
+"""Step of the finite differences from acceleration to jerk [s]."""
 
 
 class RuckigMotion:

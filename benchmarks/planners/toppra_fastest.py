@@ -31,7 +31,7 @@ class ToppraMotion:
         return float(self.trajectory.duration)
 
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
-        """See `Motion.sample`: acceleration is discontinuous, so that jerk is unbounded."""
+        """See `Motion.sample`: the acceleration is discontinuous, so the jerk is unbounded."""
         q, v, a = (np.asarray(self.trajectory(t, order)) for order in range(3))
         return q, v, a, None
 
@@ -50,7 +50,7 @@ class ToppraFastest:
         self.model = robot.model
         self.data = self.model.createData()
         limits, friction = robot.limits, robot.friction
-        # dry friction at its greatest: Coulomb's and the concave part at full speed
+        # largest dry friction: the Coulomb part, and the concave part at full speed
         dry = friction.torque(limits.v_max) - friction.viscous * limits.v_max
         self.constraints = [
             constraint.JointVelocityConstraint(_both(limits.v_max)),
@@ -59,8 +59,8 @@ class ToppraFastest:
         ]
 
     def _torque(self, q: Array, v: Array, a: Array) -> Array:
-        # viscous friction is left out: toppra takes torque to be affine in the acceleration and the
-        # square of the speed
+        # without viscous friction, because toppra needs a torque that is affine in the acceleration
+        # and in the square of the speed
         return np.asarray(pin.rnea(self.model, self.data, q, v, a))
 
     def plan(self, q_start: Array, q_goal: Array) -> Motion | None:
