@@ -148,7 +148,7 @@ def exhaustive(placement: Placement) -> list[float]:
     """
     space, energies = Space.of(replace(placement, resolution=GRID)), [np.inf]
     rounds, ample = Rounds(space, time.process_time), Deadline.after(AMPLE, time.process_time)
-    reached = [rounds.checked(each, ample) for each in space.map()[0]]
+    reached = [rounds.checked(each, ample) for each in space.map()]
     reached = [each for each in reached if each.reason is None]
     for each in sorted(reached, key=lambda each: each.bound or 0.0):
         if each.bound is not None and each.bound >= min(energies):

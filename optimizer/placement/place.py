@@ -54,7 +54,8 @@ def place(
         moves: "base", a group of stops and obstacles, or several bodies, each with a region.
         base: nominal pose of the robot base in the world, shape (4, 4); None for the identity: the
             world frame is then the base frame.
-        resolution: distance between the places of the map [m]; None for about 100 places.
+        resolution: largest distance between neighbouring places of the map [m]; None for at most
+            100 places.
         deadline: limit of the wall time [s].
         clock: returns the current time [s].
         tell: receives the progress: places of the map as candidates, and the best place so far.
@@ -116,7 +117,7 @@ def _solution(search: PlacementSearch, wall_time: float) -> PlacementSolution:
         nominal=None if nominal.energy is None else _placed(search, nominal),
         nominal_reason=nominal.reason,
         map=[_point(space, each) for each in search.map],
-        resolution=search.resolution,
+        resolution=search.space.resolution,
         tolerance=_tolerance(search),
         lower_bound=search.lower_bound,
         status="complete" if search.is_refined and not left_out else "cut_short",

@@ -69,8 +69,8 @@ class Placement:
         cycles: cycles of one robot. Poses, obstacles, directions and gravity are in the world.
         moved: the movable bodies, with the regions of their places.
         base: nominal pose of the robot base in the world, shape (4, 4).
-        resolution: distance between the places of the map [m]; None for a map of about
-            `MapSettings.points` places.
+        resolution: largest distance between neighbouring places of the map [m]; None for a map of
+            at most `MapSettings.points` places.
         deadline: limit of the wall time [s].
 
     Raises:

@@ -81,10 +81,10 @@ class PlacementSearch:
         self.clock, self.deadline = clock, placement.deadline
         self.end = Deadline.after(placement.deadline, clock)
         self.rounds = Rounds(self.space, clock)
-        self.points, self.resolution = self.space.map()
+        self.points = self.space.map()
         self.map = [Round(place) for place in self.points]
         self.lower_bound = region_bound(self.space)
-        self.spacing = self.space.spacing(self.resolution)
+        self.spacing = self.space.spacing
         axes = self.space.axes
         self.box = Box(
             np.array([axis.low for axis in axes]),

@@ -120,7 +120,7 @@ class SolvedPlacement:
     """How precisely every free coordinate of the best place must be kept. Empty for listed places,
     and if there was no time to find it."""
     resolution: Metres | None
-    """Distance between neighbouring places of the map; null if its places were listed."""
+    """Largest distance between neighbouring places of the map; null if its places were listed."""
     map: list[MapPoint]
     """Places all over the region."""
     evaluated: Count
@@ -141,7 +141,8 @@ class PlacementSolution(Result):
         nominal: nominal place; None where its cycles cannot be run, for `nominal_reason`.
         nominal_reason: why the nominal place has no cycles.
         map: places of the map, in the order of the axes.
-        resolution: distance between neighbouring places of the map [m]; None of listed places.
+        resolution: largest distance between neighbouring places of the map [m]; None of listed
+            places.
         tolerance: how precisely every free coordinate must be kept; empty if there was no time.
         lower_bound: lower bound of the objective at every place of the region [J]; None where none
             is known.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
-from math import ceil
+from math import ceil, prod
 
 import numpy as np
 
@@ -63,14 +64,24 @@ class Axis:
         """Change of the coordinate that counts as much as one metre [m, rad]."""
         return 1 / MAP.lever if self.name == "yaw" else 1.0
 
-    def values(self, resolution: float) -> Array:
-        """Values of a map, no farther apart than the resolution [m]."""
-        turn, length = 2 * np.pi, self.high - self.low
-        count = ceil(length / (resolution * self.scale) - MAP.inside) + 1
-        values = np.linspace(self.low, self.high, max(count, 2))
-        # the last value of a full turn repeats the first value
-        is_turn = self.name == "yaw" and abs(length - turn) < MAP.inside
-        return values[:-1] if is_turn and len(values) > 2 else values
+    def count(self, resolution: float) -> int:
+        """Number of values of a map that are no farther apart than the resolution [m]."""
+        steps = ceil((self.high - self.low) / (resolution * self.scale) - MAP.inside)
+        return max(steps if self.is_turn else steps + 1, 2)
+
+    def distance(self, count: int) -> float:
+        """Distance of neighbouring values of a map [m, rad]."""
+        return (self.high - self.low) / (count if self.is_turn else count - 1)
+
+    def values(self, count: int) -> Array:
+        """Values of a map, evenly spaced, shape (count,) [m, rad]."""
+        # the end of a full turn repeats its beginning
+        return np.linspace(self.low, self.high, count, endpoint=not self.is_turn)
+
+    @property
+    def is_turn(self) -> bool:
+        """Whether the range is a full turn."""
+        return self.name == "yaw" and abs(self.high - self.low - 2 * np.pi) < MAP.inside
 
 
 Key = tuple[tuple[int, ...], bytes]
@@ -236,46 +247,61 @@ class Space:
                 obstacles |= dict.fromkeys(moved.moves.obstacles, pose)
         return stops, obstacles
 
-    def map(self) -> tuple[list[Place], float | None]:
-        """The places of the map, and its resolution [m]; None of listed places alone.
+    def map(self) -> list[Place]:
+        """The places of the map.
 
         Raises:
             InvalidProblem: the resolution gives too many places.
         """
-        resolution = self.placement.resolution
-        if not self.axes:
-            return [self.place(choice, np.zeros(0)) for choice in self.choices], None
-        if resolution is None:
-            resolution = self._resolution()
-        elif self._points(resolution) > MAP.most_points:
+        size = self._size(self._counts)
+        if self.placement.resolution is not None and size > MAP.most_points:
             raise InvalidProblem(
                 "resolution",
-                f"This resolution gives {self._points(resolution)} places, of at most "
-                f"{MAP.most_points}: give a coarser one, or a smaller region.",
+                f"This resolution gives {size} places, of at most {MAP.most_points}: give a "
+                "coarser one, or a smaller region.",
             )
-        values = [axis.values(resolution) for axis in self.axes]
-        grid = [
+        values = [axis.values(count) for axis, count in zip(self.axes, self._counts, strict=True)]
+        return [
             self.place(choice, np.array(x)) for choice in self.choices for x in product(*values)
         ]
-        return grid, resolution
 
-    def spacing(self, resolution: float | None) -> Array:
+    @property
+    def resolution(self) -> float | None:
+        """Largest distance between neighbouring places of the map [m]; None of listed places."""
+        scale = np.array([axis.scale for axis in self.axes])
+        return float((self.spacing / scale).max()) if self.axes else None
+
+    @cached_property
+    def spacing(self) -> Array:
         """Distances between neighbouring places of the map along the axes, shape (n,) [m, rad]."""
-        if resolution is None:
-            return np.zeros(0)
-        return np.array([axis.values(resolution)[1] - axis.low for axis in self.axes])
+        pairs = zip(self.axes, self._counts, strict=True)
+        return np.array([axis.distance(count) for axis, count in pairs])
 
-    def _points(self, resolution: float) -> int:
-        counts = [len(axis.values(resolution)) for axis in self.axes]
-        return int(np.prod([len(self.choices), *counts]))
+    def _size(self, counts: Sequence[int]) -> int:
+        return len(self.choices) * prod(counts)
 
-    def _resolution(self) -> float:
-        """Finest resolution [m] with at most `MapSettings.points` places, if there is one."""
-        low, high = 0.0, max((axis.high - axis.low) / axis.scale for axis in self.axes)
-        for _ in range(40):
-            middle = (low + high) / 2
-            low, high = (low, middle) if self._points(middle) <= MAP.points else (middle, high)
-        return max(high, PLACEMENT_RANGES.finest)
+    @cached_property
+    def _counts(self) -> list[int]:
+        """Number of values of every axis on the map.
+
+        Without a given resolution, the axis with the largest distance gets one more value as long
+        as the map has at most `MapSettings.points` places.
+        """
+        given = self.placement.resolution
+        if given is not None:
+            return [axis.count(given) for axis in self.axes]
+        counts, open_ = [2] * len(self.axes), set(range(len(self.axes)))
+
+        def distance(k: int) -> float:
+            return self.axes[k].distance(counts[k]) / self.axes[k].scale
+
+        while open_:
+            longest = max(open_, key=distance)
+            counts[longest] += 1
+            if self._size(counts) > MAP.points or distance(longest) < PLACEMENT_RANGES.finest:
+                counts[longest] -= 1
+                open_.remove(longest)
+        return counts
 
 
 def _body(placement: Placement, k: int) -> Body:

@@ -194,8 +194,8 @@ class PlacementRequest(Request):
         default="base",
     )
     resolution: float | None = described(
-        "Distance between neighbouring places of the map; 0.15 m count like one radian of yaw. "
-        f"Null: so that the map has at most {MAP.points} places, where that is possible.",
+        "Largest distance between neighbouring places of the map; 0.15 m count like one radian of "
+        f"yaw. Null: so that the map has at most {MAP.points} places, where that is possible.",
         "m",
         0.1,
         default=None,

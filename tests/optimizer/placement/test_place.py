@@ -52,7 +52,7 @@ def test_brute_force_finds_no_better_place() -> None:
         resolution=0.02,
     )
     space, energies = Space.of(placement), list[float]()
-    for each in space.map()[0]:
+    for each in space.map():
         (own,) = space.cycles(each)
         try:
             energies.append(plan_cycle(own, progress=False).energy.electrical.total)

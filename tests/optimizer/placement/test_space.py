@@ -25,7 +25,7 @@ def placement(*moved: Moved, **fields: Any) -> Placement:
 def test_the_map_spans_the_region() -> None:
     region = Region(x=(-0.3, 0.3), y=(0.0, 0.2), yaw=(-0.5, 0.5))
     space = Space.of(placement(Moved(region), resolution=0.1))
-    places, _ = space.map()
+    places = space.map()
     assert len(places) == 7 * 3 * 3
     x = np.array([each.x for each in places])
     assert x.min(axis=0) == pytest.approx([-0.3, 0.0, -0.5])
@@ -34,39 +34,47 @@ def test_the_map_spans_the_region() -> None:
     assert np.allclose(T, at(0.1, 0.2, 0.0, Rotation.from_euler("z", 0.5).as_matrix()))
 
 
-def test_without_a_resolution_the_map_is_as_fine_as_its_size_allows() -> None:
-    space = Space.of(placement(Moved(Region(x=(-0.4, 0.4), y=(-0.3, 0.3), z=(0.0, 0.3)))))
-    places, resolution = space.map()
-    finer = Space.of(
-        placement(
-            Moved(Region(x=(-0.4, 0.4), y=(-0.3, 0.3), z=(0.0, 0.3))),
-            resolution=0.99 * resolution,
-        )
-    )
-    assert MAP.points / 3 < len(places) <= MAP.points < len(finer.map()[0])
+@pytest.mark.parametrize(
+    ("region", "count"),
+    [
+        (Region(x=(-0.4, 0.4), y=(-0.4, 0.4), z=(-0.4, 0.4)), 5 * 5 * 4),
+        (Region(x=(-0.4, 0.4), y=(-0.4, 0.4)), 10 * 10),
+        (Region(x=(-0.4, 0.4), mounts=("floor", "wall")), 50 * 2),
+        (Region(x=(-0.4, 0.4), y=(-0.3, 0.3), z=(0.0, 0.3)), 6 * 5 * 3),
+    ],
+)
+def test_without_a_resolution_the_map_is_as_fine_as_its_size_allows(
+    region: Region, count: int
+) -> None:
+    assert MAP.points == 100
+    places = Space.of(placement(Moved(region))).map()
+    assert len(places) == count
+    x = np.array([each.x for each in places])
+    for values in map(np.unique, x.T):
+        assert count // len(values) * (len(values) + 1) > MAP.points
 
 
 def test_the_map_of_a_tiny_region_is_no_finer_than_any_resolution() -> None:
     space = Space.of(placement(Moved(Region(x=(-1e-8, 1e-8), y=(-1e-8, 1e-8)))))
-    assert len(space.map()[0]) == 4
+    assert len(space.map()) == 4
 
 
 def test_a_whole_turn_has_each_yaw_once() -> None:
     space = Space.of(placement(Moved(Region(yaw=(0.0, 2 * np.pi))), resolution=0.15 * np.pi / 2))
-    yaw = [float(each.x[0]) for each in space.map()[0]]
+    yaw = [float(each.x[0]) for each in space.map()]
     assert yaw == pytest.approx([0.0, np.pi / 2, np.pi, 1.5 * np.pi])
 
 
 def test_mounts_turn_the_base() -> None:
     region = Region(x=(-0.1, 0.1), mounts=("floor", "wall", "ceiling"))
     space = Space.of(placement(Moved(region), resolution=0.2))
-    z_axes = {space.mount(each): space.base(each)[:3, 2] for each in space.map()[0]}
+    z_axes = {space.mount(each): space.base(each)[:3, 2] for each in space.map()}
     assert {name: axis.round(9).tolist() for name, axis in z_axes.items()} == {
         "floor": [0, 0, 1],
         "wall": [1, 0, 0],
         "ceiling": [0, 0, -1],
     }
-    for each in space.map()[0]:
+    for each in space.map():
         R = space.base(each)[:3, :3]
         assert np.allclose(R @ R.T, np.eye(3)) and np.linalg.det(R) > 0
         (cycle,) = space.cycles(each)
@@ -105,7 +113,7 @@ def test_both_may_move() -> None:
 
 def test_listed_places_include_the_nominal_one() -> None:
     space = Space.of(placement(Moved(Places([at(0.1), at(0.2), at()]))))
-    x = [float(space.base(each)[0, 3]) for each in space.map()[0]]
+    x = [float(space.base(each)[0, 3]) for each in space.map()]
     assert x == [0.0, 0.1, 0.2]
 
 
