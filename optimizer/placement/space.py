@@ -6,18 +6,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from math import ceil, prod
+from math import prod
 
 import numpy as np
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.placement.map_axis import MAP, Axis, most_counts
 from joulepath.optimizer.placement.mounts import TILTS, about_z, mount_of, yaw_of
 from joulepath.optimizer.placement.moved_cycle import Offsets, composed, cycle_at, inverted
-from joulepath.optimizer.placement.placement import PLACEMENT_RANGES, Placement
+from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.region import (
     COORDINATES,
-    Coordinate,
     Group,
     Mount,
     Places,
@@ -27,62 +27,6 @@ from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.cycle import START, Cycle
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import members
-
-
-@dataclass(frozen=True)
-class MapSettings:
-    """Settings of the map."""
-
-    points: int = 100
-    """Most places of a map without a given resolution."""
-    most_points: int = 20_000
-    """Most places of any map, whose answer stays readable."""
-    lever: float = 0.15
-    """Yaw per length that a step of the map counts alike, as a lever [m]: the yaw of a base turns
-    the first joint alone, so a coarse step tells enough."""
-    fixed: float = 1e-9
-    """Length of a range up to which it is one value [m, rad]."""
-    inside: float = 1e-9
-    """Distance beyond a range that is rounding [m, rad]."""
-
-
-MAP = MapSettings()
-
-
-@dataclass(frozen=True)
-class Axis:
-    """A free coordinate of a body: its range and nominal value [m, rad]."""
-
-    body: int
-    name: Coordinate
-    low: float
-    high: float
-    nominal: float
-
-    @property
-    def scale(self) -> float:
-        """Change of the coordinate that counts as much as one metre [m, rad]."""
-        return 1 / MAP.lever if self.name == "yaw" else 1.0
-
-    def count(self, resolution: float) -> int:
-        """Number of values of a map that are no farther apart than the resolution [m]."""
-        steps = ceil((self.high - self.low) / (resolution * self.scale) - MAP.inside)
-        return max(steps if self.is_turn else steps + 1, 2)
-
-    def distance(self, count: int) -> float:
-        """Distance of neighbouring values of a map [m, rad]."""
-        return (self.high - self.low) / (count if self.is_turn else count - 1)
-
-    def values(self, count: int) -> Array:
-        """Values of a map, evenly spaced, shape (count,) [m, rad]."""
-        # the end of a full turn repeats its beginning
-        return np.linspace(self.low, self.high, count, endpoint=not self.is_turn)
-
-    @property
-    def is_turn(self) -> bool:
-        """Whether the range is a full turn."""
-        return self.name == "yaw" and abs(self.high - self.low - 2 * np.pi) < MAP.inside
-
 
 Key = tuple[tuple[int, ...], bytes]
 
@@ -282,26 +226,11 @@ class Space:
 
     @cached_property
     def _counts(self) -> list[int]:
-        """Number of values of every axis on the map.
-
-        Without a given resolution, the axis with the largest distance gets one more value as long
-        as the map has at most `MapSettings.points` places.
-        """
+        """Number of values of every axis on the map."""
         given = self.placement.resolution
         if given is not None:
             return [axis.count(given) for axis in self.axes]
-        counts, open_ = [2] * len(self.axes), set(range(len(self.axes)))
-
-        def distance(k: int) -> float:
-            return self.axes[k].distance(counts[k]) / self.axes[k].scale
-
-        while open_:
-            longest = max(open_, key=distance)
-            counts[longest] += 1
-            if self._size(counts) > MAP.points or distance(longest) < PLACEMENT_RANGES.finest:
-                counts[longest] -= 1
-                open_.remove(longest)
-        return counts
+        return most_counts(self.axes, len(self.choices))
 
 
 def _body(placement: Placement, k: int) -> Body:

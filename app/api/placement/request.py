@@ -12,9 +12,9 @@ from joulepath.app.schemas.common import IDENTITY, Pose, Request, described
 from joulepath.app.schemas.examples.values import OPTIMIZE, at
 from joulepath.app.settings import LONGEST_DEADLINE
 from joulepath.models.shape_sizes import SIZES
+from joulepath.optimizer.placement.map_axis import MAP
 from joulepath.optimizer.placement.placement import PLACEMENT_RANGES
 from joulepath.optimizer.placement.region import REGION_RANGES, Mount
-from joulepath.optimizer.placement.space import MAP
 from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 from joulepath.optimizer.problem.scene import SCENE_RANGES
 

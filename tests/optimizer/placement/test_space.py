@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath.optimizer.placement.map_axis import MAP
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
 from joulepath.optimizer.placement.region import Group, Moved, Places, Region
-from joulepath.optimizer.placement.space import MAP, Space
+from joulepath.optimizer.placement.space import Space
 from tests.optimizer.placement.cells import arm, at, floor, two_stops
 from tests.refusals import refusal_of
 
