@@ -1,8 +1,8 @@
 ARG BASE_IMAGE=debian:bookworm-slim
 
-# Builds the wheel as it is released: with the C library, the studio page and the pages of the documentation.
+# Builds the wheel in its released form: with the C library, the studio page and the documentation pages.
 FROM ${BASE_IMAGE} AS wheel
-# A package index other than PyPI: --build-arg PIP_INDEX_URL=…
+# For another package index than PyPI: --build-arg PIP_INDEX_URL=…
 ARG PIP_INDEX_URL
 RUN apt-get update \
     && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
@@ -11,7 +11,7 @@ COPY . /tmp/joulepath
 RUN python3 -m venv /tmp/pip \
     && /tmp/pip/bin/pip wheel --no-cache-dir --disable-pip-version-check --no-deps --wheel-dir /tmp /tmp/joulepath
 
-# Installs the locked dependencies and the wheel, leaves behind what only builds need, and compiles the kernels.
+# Installs the locked dependencies and the wheel, removes files for builds, and compiles the kernels.
 FROM ${BASE_IMAGE} AS build
 ARG PIP_INDEX_URL
 RUN apt-get update \
@@ -19,7 +19,7 @@ RUN apt-get update \
         binutils ca-certificates gcc libc6-dev libgomp1 python3-venv
 WORKDIR /opt/joulepath
 ENV PATH=/opt/joulepath/venv/bin:$PATH
-# requirements-cluster.lock has what JOULEPATH_CLUSTER needs, too
+# requirements-cluster.lock also has the packages for JOULEPATH_CLUSTER
 ARG LOCK=requirements.lock
 COPY ${LOCK} scripts/slim.py /tmp/
 RUN python3 -m venv venv \
@@ -27,7 +27,7 @@ RUN python3 -m venv venv \
         -r /tmp/${LOCK} \
     && python /tmp/slim.py venv
 COPY --from=wheel /tmp/*.whl /tmp/
-# Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
+# Importing every module proves that no needed file was removed, and writes the bytecode.
 COPY scripts/import_all.py /tmp/
 ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 RUN mkdir /opt/matplotlib \
@@ -44,9 +44,9 @@ RUN apt-get update \
     && install --directory --owner=joulepath /var/lib/joulepath
 WORKDIR /opt/joulepath
 COPY --from=build /opt/joulepath .
-# matplotlib, which toppra imports, keeps its cache only where it may write
+# toppra imports matplotlib, which needs a writable folder for its cache
 COPY --from=build --chown=joulepath /opt/matplotlib /opt/matplotlib
-# open: who reaches it is decided by the network of the container
+# JOULEPATH_OPEN: the network of the container decides which clients reach the service
 ENV PATH=/opt/joulepath/venv/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
@@ -56,9 +56,9 @@ ENV PATH=/opt/joulepath/venv/bin:$PATH \
     JOULEPATH_HOST=0.0.0.0 \
     JOULEPATH_OPEN=1 \
     PORT=8000
-# by number, so that an orchestrator can tell that it is not root
+# a number, so that an orchestrator can verify that the user is not root
 USER 10001
-# studies outlast the container where a volume is mounted here
+# studies survive the container if a volume is mounted here
 VOLUME /var/lib/joulepath
 EXPOSE 8000
 HEALTHCHECK --interval=10s --timeout=3s --start-period=30s --retries=3 \

@@ -1,16 +1,17 @@
-# Every target does its own set-up: nothing but Python 3.11 or newer and make has to be there.
+# Every target does its own set-up, and needs only make and Python 3.11 or newer.
 #   make serve      the service on http://HOST:PORT
 #   make test       every check: lint, types, architecture, tests
-#   make test-long  the same, and the long tests: fuzzing, the studio page in a browser, more cases of other tests
-#   make docs       the pages as a site, which the service sends at /help
+#   make test-long  every check and the long tests: fuzzing, the studio page in a browser, more cases of other tests
+#   make docs       the documentation site, which the service sends at /help
 #   make bench      the benchmarks
-#   make lock       renew the lockfiles
-#   make clean      remove what these made
+#   make lock       renews the lockfiles
+#   make clean      removes all generated files
 
 PYTHON ?= python3
 HOST ?= 127.0.0.1
 PORT ?= 8000
-# robots whose kernels are compiled before the service starts, separated by commas; others at their first request
+# robots with kernels that are compiled before the service starts, separated by commas; the kernels of other robots are
+# compiled at their first request
 JOULEPATH_ROBOTS ?= ur5e
 export JOULEPATH_ROBOTS
 VENV := .venv
@@ -27,8 +28,8 @@ HELP_SOURCES := $(shell find docs examples -type f -not -name '*.pyc') zensical.
 NATIVE := optimizer/native/libjoulepath.so.1
 SOURCES := app optimizer models tests benchmarks examples scripts
 
-# The optimiser's C library is compiled once, and its kernels once per robot. Where there is no C compiler, one comes as
-# a Python package.
+# The C library of the optimiser is compiled once, and its kernels once per robot. If the machine has no C compiler, one
+# is installed as a Python package.
 ifeq ($(shell command -v $${CC:-cc} || command -v gcc || command -v clang),)
 COMPILER := $(VENV)/bin/cc
 export CC := $(abspath $(COMPILER))
@@ -37,7 +38,7 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-# Two of these at once would install into one another's environment: the second one waits.
+# Two simultaneous set-ups would install into the same environment, so the second one waits.
 define SET_UP
 @flock --nonblock Makefile true || echo "Another make is setting up this folder: waiting for its end ..."
 @+flock Makefile $(MAKE) --no-print-directory $(1)
@@ -50,7 +51,7 @@ serve:
 	$(call SET_UP,service)
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m joulepath.app
 
-# what the tests need, side by side; bytecode, since they start many processes, even where those may write none
+# prepares the tests, with bytecode: the tests start many processes, which may be unable to write it
 ready:
 	$(call SET_UP,tools)
 
@@ -60,7 +61,7 @@ tools: $(VENV)/.runtime $(NATIVE)
 	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(VENV)/.package kernels $(ROS2)/.ready
 	@$(PY) -m compileall -q app optimizer models
 
-# The linters come first: they find in a minute what the tests find later. mypy takes as long as the others together.
+# The linters come first, because they are faster than the tests. mypy takes as long as the other checks together.
 test: ready
 	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest bytecode
 	@$(MAKE) --no-print-directory pytest
@@ -69,20 +70,20 @@ test-long: ready
 	@$(MAKE) --no-print-directory --jobs=2 mypy style types vitest bytecode
 	@$(MAKE) --no-print-directory pytest-long
 
-# Every process loads all tests: their bytecode is kept, even where Python may write none.
+# Every process loads all tests, so their bytecode is stored even if PYTHONDONTWRITEBYTECODE is set.
 bytecode pytest pytest-long: export PYTHONDONTWRITEBYTECODE :=
 
-# Each process would otherwise compile all tests, with what their assertions say when they fail. Tests that cannot be
-# loaded fail when they are run.
+# Without this target, every process would compile all tests with their rewritten assertions. Errors of loading are
+# ignored here, because the tests fail later.
 bytecode:
 	@$(PY) -m pytest --collect-only -q -p no:schemathesis > /dev/null || true
 
-# `worksteal`: a process that has run its share of the tests takes some of another one's. Only long tests need
-# schemathesis, which takes a second to load.
+# `worksteal`: a process without remaining tests takes tests of another process. Only long tests need schemathesis, and
+# loading it takes a second.
 pytest:
 	$(PY) -m pytest -n auto --dist worksteal -p no:schemathesis $(PYTEST_ARGS)
 
-# An empty marker expression takes back the deselection in pyproject.toml.
+# The empty marker expression replaces the expression in pyproject.toml, which deselects long tests.
 pytest-long:
 	$(PY) -m pytest -n auto --dist worksteal -m "" $(PYTEST_ARGS)
 
@@ -112,30 +113,30 @@ bench: $(VENV)/.benchmarks kernels
 kernels: $(VENV)/.runtime $(NATIVE)
 	@$(if $(JOULEPATH_ROBOTS),$(PY) -m joulepath.optimizer.dynamics.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
 
-# The dev lockfile holds the runtime one whole, at the same versions.
+# The lockfile of dev contains the packages of requirements.lock with the same versions.
 $(VENV)/.runtime: requirements.lock $(PY) $(MADE)
 	@$(INSTALL) $<
 	@$(PY) scripts/slim.py $(VENV)
 	@$(PY) scripts/link_libgomp.py
 	@touch $@
 
-# The package itself: `joulepath` and `import joulepath` work from any folder, with the sources of this one.
+# Installs the package: `joulepath` and `import joulepath` then work from any folder, with the sources in this folder.
 $(VENV)/.package: pyproject.toml scripts/build_hook.py $(VENV)/.runtime $(STUDIO)/index.html $(HELP)/index.html $(NATIVE)
 	@$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
-# The C library that all arms share. It is not compiled anew for a newer Python or compiler.
+# The common C library of all arms. It is not recompiled for a newer Python or compiler.
 $(NATIVE): $(wildcard optimizer/native/*.c) optimizer/native/build.py | $(PY) $(COMPILER)
 	@echo "Compiling $@ ..."
 	@$(PY) optimizer/native/build.py
 
-# The studio page. Node comes as a package where the machine has none.
+# The studio page. Without Node on the machine, the script installs it as a package.
 $(STUDIO)/index.html: $(STUDIO_SOURCES) scripts/build_studio.py $(PY)
 	@echo "Building the studio page into $(STUDIO) ..."
 	@$(PY) scripts/build_studio.py
 	@touch $@
 
-# The pages. What builds them comes as packages of an environment of its own.
+# The documentation site. The script installs its tools into a separate environment.
 $(HELP)/index.html: $(HELP_SOURCES) $(PY)
 	@echo "Building the pages into $(HELP) ..."
 	@$(PY) scripts/build_docs.py
@@ -145,8 +146,8 @@ $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
 	@$(INSTALL) $<
 	@touch $@
 
-# The node of ROS 2 is tested in an environment of its own, on top of the other one: a package of rclpy's starts every
-# Python of its environment a second time, with other library paths.
+# The ROS 2 node is tested in a separate environment on top of $(VENV), because a package of rclpy starts every Python
+# of its environment a second time with other library paths.
 $(ROS2)/.ready: requirements-ros2.lock $(VENV)/.dev
 	@$(PY) -m venv --clear --without-pip $(ROS2)
 	@$(PY) -c "import sysconfig; print('import site; site.addsitedir(%r)' % sysconfig.get_path('purelib'))" \
@@ -154,19 +155,19 @@ $(ROS2)/.ready: requirements-ros2.lock $(VENV)/.dev
 	@$(ROS2)/bin/python scripts/install.py $<
 	@touch $@
 
-# The other planners that the benchmarks compare with, on top of the runtime.
+# The other planners of the benchmarks, in the environment of the runtime.
 $(VENV)/.benchmarks: requirements-benchmarks.lock $(VENV)/.runtime
 	@$(INSTALL) $<
 	@touch $@
 
 $(VENV)/bin/cc: requirements-compiler.lock $(PY) $(MADE)
-	@echo "No C compiler on this machine: one comes as a package."
+	@echo "No C compiler on this machine: installing one as a package ..."
 	@$(INSTALL) $<
 	@printf '#!/bin/sh\nexec "$${0%%/*}/python" -m ziglang cc "$$@"\n' > $@
 	@chmod +x $@
 
-# An environment whose making was cut short has a Python, too, but no pip. So has one of an earlier Python of the system:
-# the new one, which takes its place, does not find the packages.
+# An incomplete environment has a Python, but no pip. The same is true after an update of the system's Python, because
+# the new Python does not find the packages of the old one. $(MADE) replaces both.
 $(PY): | $(MADE)
 	@test -x $@ || $(PYTHON) scripts/bootstrap.py $(VENV)
 
@@ -177,7 +178,8 @@ $(MADE):
 LOCK = $(VENV)/bin/uv pip compile --universal --generate-hashes --no-emit-index-url --quiet \
 	--custom-compile-command "make lock" $(LOCK_ARGS)
 
-# LOCK_ARGS=--upgrade takes the newest versions; without it, versions stay as far as pyproject.toml lets them.
+# With LOCK_ARGS=--upgrade, all packages get their newest versions; otherwise versions change only if pyproject.toml
+# requires it.
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml --output-file requirements.lock
 	$(LOCK) pyproject.toml --group dev --constraints requirements.lock --output-file requirements-dev.lock

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Copies the database of a service, which may run meanwhile: everything that was acknowledged before the copy began.
+# Copies the database of a service, which may run during the copy. The copy has every change that was acknowledged
+# before it began.
 #   backup.sh sqlite:////var/lib/joulepath/joulepath.db /backup/joulepath.db
 #   backup.sh postgresql://joulepath:PASSWORD@host/joulepath /backup/joulepath.dump
 set -eu
@@ -10,7 +11,7 @@ part=$file.part
 rm -f "$part"
 case $url in
 sqlite:///*)
-    # one transaction that reads, while others write: unlike a copy of the file, it has no half of a change
+    # VACUUM INTO reads in one transaction, so the copy has no partial change, unlike a copy of the file
     python3 -c '
 import os, pathlib, sqlite3, sys
 source, target = sys.argv[1:]
@@ -28,5 +29,5 @@ postgresql://*)
     exit 2
     ;;
 esac
-# a backup is there whole or not at all
+# the backup appears only when it is complete
 mv "$part" "$file"

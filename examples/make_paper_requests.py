@@ -1,16 +1,14 @@
-"""Writes the paper's requests: from the home of the UR5e paper
+"""Writes the requests of the paper, from its home configuration:
 
-- paper_pose_1.json to paper_pose_15.json: to each pose of its Table 1
-- paper_position_1.json to paper_position_3.json: to any of the five orientations of each position
-  of that table
-- paper_motion_1.json to paper_motion_15.json, for `POST /evaluate`: the paper's own motion to each
-  configuration of its
-  Table 2 and back, at constant joint speed
+- paper_pose_1.json to paper_pose_15.json: to the poses of Table 1
+- paper_position_1.json to paper_position_3.json: to a position of Table 1, with any of its five
+  orientations
+- paper_motion_1.json to paper_motion_15.json, for `POST /evaluate`: the motions of the paper at
+  constant joint speed, to the configurations of Table 2 and back
 
     .venv/bin/python examples/make_paper_requests.py
 
-`tests/reference/README.md` names the paper and tells what is known of its frames and joint
-convention.
+`tests/reference/README.md` names the paper, and describes its frames and joint convention.
 """
 
 from __future__ import annotations
@@ -25,10 +23,10 @@ from typing import Any
 FOLDER = Path(__file__).parent
 POSES = FOLDER.parent / "tests" / "reference" / "paper_table1_poses.csv"
 CONFIGURATIONS = POSES.with_name("paper_table2_configurations.csv")
-# The paper's home, all zeros, in Universal Robots' joint convention [deg].
 HOME = (0, -90, 90, -90, 180, 0)
-# Rows of the table that share a position.
+"""Home configuration of the paper, all zeros, in the joint convention of Universal Robots [deg]."""
 ORIENTATIONS = 5
+"""Number of consecutive rows of the table with the same position."""
 
 
 def requests() -> dict[str, dict[str, Any]]:
@@ -70,13 +68,13 @@ def motions() -> dict[str, dict[str, Any]]:
 
 
 def to_ur(degrees: list[float]) -> list[float]:
-    """Table 2's joint positions in Universal Robots' convention [deg]."""
+    """Joint positions of Table 2 in the convention of Universal Robots [deg]."""
     q1, q2, q3, q4, q5, q6 = degrees
     return [q1, q2 - 90, 90 - q3, -90 - q4, 180 - q5, q6]
 
 
 def text(request: dict[str, Any]) -> str:
-    """A request as it stands in its file: indented, but for lists of numbers."""
+    """The text of a request in its file: indented, with lists of numbers on one line."""
     indented = json.dumps(request, indent=2)
     return (
         re.sub(

@@ -1,12 +1,11 @@
 """Draws an answer: joint positions, speeds and motor torques, and the power drawn from the bus,
 over time.
 
-    .venv/bin/python examples/plot_answer.py examples/optimize/paper_pose_1.json   asks the service
-    and draws its answer
-    .venv/bin/python examples/plot_answer.py answer.json                           draws an answer
-    that was saved
+    .venv/bin/python examples/plot_answer.py examples/optimize/paper_pose_1.json
+    .venv/bin/python examples/plot_answer.py answer.json
 
-The service is asked for the robot's limits either way. Needs matplotlib.
+The first command sends a request to the service and draws the answer; the second one draws a saved
+answer. Both need the service, for the limits of the robot, and matplotlib.
 """
 
 from __future__ import annotations
@@ -23,13 +22,12 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart.
+# The palette of Okabe and Ito can be distinguished by colour-blind readers.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
 
 
 def call(url: str, body: bytes | None = None) -> dict[str, Any]:
-    """The JSON that the service answers; a refusal ends the program with the service's own
-    words."""
+    """The JSON of an answer of the service; a refusal ends the program with its message."""
     request = urllib.request.Request(url, body, {"Content-Type": "application/json"})
     try:
         with urllib.request.urlopen(request, timeout=120) as answer:
@@ -38,36 +36,36 @@ def call(url: str, body: bytes | None = None) -> dict[str, Any]:
         sys.exit(f"{url}: {error.code} {json.load(error).get('detail', error.reason)}")
     except urllib.error.URLError as error:
         sys.exit(
-            f"{url}: {error.reason}. Start the service with `make serve`, or name it with "
+            f"{url}: {error.reason}. Start the service with `make serve`, or give its address with "
             "--service."
         )
     return content
 
 
 def command(document: str | None, file: str) -> argparse.ArgumentParser:
-    """The command line of a program that draws what the service answers to a `file`."""
+    """The command line of a program that draws answers; `file` describes its first argument."""
     parser = argparse.ArgumentParser(
         description=document, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("file", type=Path, help=file)
     parser.add_argument(
-        "--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)"
+        "--service", default="http://127.0.0.1:8000", help="address of the service (%(default)s)"
     )
     parser.add_argument(
-        "--output", type=Path, help="the picture (default: the file's name with .png, here)"
+        "--output", type=Path, help="the picture (default: name of the file with .png)"
     )
     return parser
 
 
 def save(figure: Figure, given: argparse.Namespace, dpi: int) -> None:
-    """Write the picture where the command line wants it, and print where that is."""
+    """Writes the picture, and prints the name of its file."""
     output = given.output or Path(given.file.with_suffix(".png").name)
     figure.savefig(output, dpi=dpi)
     print(output)
 
 
 def limits_of(service: str, robot: str, request: dict[str, Any]) -> dict[str, list[float]]:
-    """Limit per joint on speed and torque: the robot's, or the request's where it tightens them."""
+    """Speed and torque limits per joint of the request, or else of the robot."""
     figures = call(f"{service}/robots/{robot}")["limits"]
     limits: dict[str, list[float]] = {}
     for name in ("velocity", "torque"):
@@ -93,7 +91,7 @@ def draw_joints(
 
 
 def draw_limit(axes: Axes, limit: float) -> None:
-    """A line at both ends of a symmetric limit."""
+    """Lines at a limit and at its negative value."""
     for value in (limit, -limit):
         axes.axhline(value, color="0.35", linestyle="--", linewidth=1)
     axes.annotate(
@@ -106,8 +104,8 @@ def draw_limit(axes: Axes, limit: float) -> None:
 
 
 def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
-    """The whole figure: one panel each for position, speed and power, one per group of joints of
-    equal torque limit.
+    """The figure, with panels for position, speed and power, and a panel for every group of joints
+    with the same torque limit.
     """
     motion, energy = answer["trajectory"], answer["energy"]
     t, joints = motion["t"], range(len(motion["q"][0]))
@@ -160,7 +158,7 @@ def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
 
 
 def main() -> None:
-    """Ask if need be, draw, save."""
+    """Sends the request, unless the file is an answer, and draws and saves the answer."""
     arguments = command(
         __doc__, "a request, which is sent to the service, or a saved answer"
     ).parse_args()

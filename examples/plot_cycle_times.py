@@ -1,10 +1,10 @@
-"""Draws the energy of a cycle over its time: one request for each of some times, and its baselines.
+"""Draws the energy of a cycle and of its baselines over the time of the cycle.
 
     .venv/bin/python -m examples.plot_cycle_times examples/cycle/pick_and_place.json --output
     cycle_times.png
 
-asks the service once without a time, then for each of `--ratios` of the duration of that answer,
-and draws the answers. Needs matplotlib.
+The command sends the request once without a time. It then sends requests with multiples of the
+duration of this answer as their times (`--ratios`), and draws all answers. It needs matplotlib.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ BASELINES = {
 
 
 def draw(answers: Sequence[dict[str, Any]]) -> Figure:
-    """Energy over duration: the answers', their lower bounds and their baselines; the first one
-    chose its time.
+    """Energies of the answers, of their lower bounds and of their baselines over the duration.
+
+    The first answer is the answer to the request without a time.
     """
     figure = Figure(figsize=(8, 4.2), layout="constrained")
     axes = figure.subplots()
@@ -74,10 +75,10 @@ def draw(answers: Sequence[dict[str, Any]]) -> Figure:
 
 
 def main() -> None:
-    """Ask, draw, save."""
+    """Sends the requests, and draws and saves the answers."""
     parser = command(__doc__, "a request for POST /cycle")
     parser.add_argument(
-        "--ratios", type=float, nargs="+", default=RATIOS, help="of the duration (%(default)s)"
+        "--ratios", type=float, nargs="+", default=RATIOS, help="times over the first duration"
     )
     arguments = parser.parse_args()
     asked: dict[str, Any] = json.loads(arguments.file.read_bytes())

@@ -1,9 +1,10 @@
-"""Draws the motors' torques of a motion, planned and played in MuJoCo, on the arm as planned and
-with more friction.
+"""Draws planned and simulated motor torques of a motion, for the planned arm and with more
+friction.
 
     .venv/bin/python -m examples.plot_replay docs/images/replay_torques.png
 
-The motion is that of `examples/replay/lift_with_payload.json`. Needs matplotlib and MuJoCo.
+The motion is the motion of `examples/replay/lift_with_payload.json`; MuJoCo simulates it. The
+command needs matplotlib and MuJoCo.
 """
 
 from __future__ import annotations
@@ -24,19 +25,20 @@ from joulepath.optimizer.replay.play import play
 from joulepath.optimizer.replay.reference import course_of, reference
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart
+# The palette of Okabe and Ito can be distinguished by colour-blind readers.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
-LOW, HOME = (
-    np.array([0.5, -2.57, 2.57, -1.07, -1.07, 0.5]),
-    np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]),
-)
-STEP, FRICTION = 2.5e-4, 1.3
-# simulated steps from one mark to the next
+LOW = np.array([0.5, -2.57, 2.57, -1.07, -1.07, 0.5])
+HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+STEP = 2.5e-4
+"""Step of the simulation [s]."""
+FRICTION = 1.3
+"""Friction of the second arm over the planned friction [1]."""
 MARKS = 120
+"""Number of simulated steps between two marks."""
 
 
 def main() -> None:
-    """Optimises the motion, plays it twice, and draws both."""
+    """Optimises the motion, simulates it twice, and draws both simulations."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -52,7 +54,7 @@ def main() -> None:
     rows = figure.subplots(2, 1, sharex=True)
     titles = (
         "The arm as planned",
-        f"Friction times {FRICTION:g}, which the controller does not know",
+        f"{FRICTION:g} times the friction, unknown to the controller",
     )
     for axes, title, factor in zip(rows, titles, (1.0, FRICTION), strict=True):
         simulated.use_figures(with_changes(arm, friction=factor))

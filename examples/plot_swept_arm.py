@@ -1,10 +1,11 @@
-"""Draws where an arm passes: its capsules at some instants of the motion, the scene, and the path
-of the TCP.
+"""Draws the volume that an arm sweeps: its capsules at some instants of the motion, the scene, and
+the path of the TCP.
 
     .venv/bin/python -m examples.plot_swept_arm examples/optimize/bin_to_shelf.json
     docs/images/bin_to_shelf.png
 
-Solves the request with the library, from the repository's folder. Needs matplotlib.
+The command solves the request with the library. Run it in the folder of the repository. It needs
+matplotlib.
 """
 
 from __future__ import annotations
@@ -28,18 +29,25 @@ from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import TOOL
 from joulepath.optimizer.problem.problem import Problem
 
-# Okabe and Ito's blue to orange, which colour-blind readers can tell apart
+# blue to orange of the palette of Okabe and Ito, which colour-blind readers can distinguish
 OVER_TIME = LinearSegmentedColormap.from_list(
     "over time", ["#0072B2", "#56B4E9", "#F0E442", "#E69F00", "#D55E00"]
 )
-OBSTACLE, LIGHT = "#9A9A9A", np.array([-0.4, -0.5, 0.77])
-AROUND, ALONG = 14, 4
-# what is drawn: its middle, and half its extent along x and y [m]
-MIDDLE, HALF = np.array([-0.3, -0.15]), np.array([0.62, 0.75])
+OBSTACLE = "#9A9A9A"
+LIGHT = np.array([-0.4, -0.5, 0.77])
+"""Direction of the light."""
+AROUND = 14
+"""Number of faces around a capsule."""
+ALONG = 4
+"""Number of rings of each half sphere of a capsule."""
+MIDDLE = np.array([-0.3, -0.15])
+"""Centre of the picture along x and y [m]."""
+HALF = np.array([0.62, 0.75])
+"""Half the extent of the picture along x and y [m]."""
 
 
 def capsule(a: Array, b: Array, radius: float) -> list[Array]:
-    """Polygons (4, 3) of a capsule's surface."""
+    """Polygons (4, 3) [m] of the surface of a capsule from a to b (3,) [m]."""
     along = b - a
     length = float(np.linalg.norm(along))
     z = along / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
@@ -64,8 +72,8 @@ def quads(rings: Array) -> list[Array]:
 
 
 def hull(points: Array) -> list[Array]:
-    """Triangles (3, 3) of a convex hull, each cut into smaller ones, so that they can be sorted by
-    depth.
+    """Triangles (3, 3) of a convex hull, divided into small triangles, so that they can be sorted
+    by depth.
     """
     triangles = list(points[ConvexHull(points).simplices])
     for _ in range(4):
@@ -77,7 +85,7 @@ def hull(points: Array) -> list[Array]:
 
 
 def quartered(t: Array) -> list[Array]:
-    """Four triangles that make up one."""
+    """The four triangles between the corners and the midpoints of the edges of a triangle."""
     ab, bc, ca = (t + np.roll(t, -1, axis=0)) / 2
     return [
         np.array(part) for part in ([t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca])
@@ -85,7 +93,7 @@ def quartered(t: Array) -> list[Array]:
 
 
 def surface(body: Body, T: Array) -> list[Array]:
-    """Polygons of a body whose link is at T (4, 4)."""
+    """Polygons of a body, with the frame of its link at T (4, 4)."""
     points = body.points @ T[:3, :3].T + T[:3, 3]
     if body.core.is_half_space:
         x, y = (np.linspace(m - h, m + h, 15) for m, h in zip(MIDDLE, HALF, strict=True))
@@ -105,7 +113,7 @@ def surface(body: Body, T: Array) -> list[Array]:
 
 
 def shaded(polygons: list[Array], colour: str, alpha: float) -> list[tuple[float, ...]]:
-    """A colour for every polygon, lighter the more it faces the light."""
+    """A colour for every polygon, lighter if the polygon faces the light."""
     colours = []
     for polygon in polygons:
         normal = np.cross(polygon[1] - polygon[0], polygon[2] - polygon[0])
@@ -123,9 +131,9 @@ def _surfaces(
     colours: list[tuple[float, ...]] = []
 
     def add(body: Body, T: Array, colour: str, alpha: float) -> None:
-        fresh = surface(body, T)
-        polygons.extend(fresh)
-        colours.extend(shaded(fresh, colour, alpha))
+        faces = surface(body, T)
+        polygons.extend(faces)
+        colours.extend(shaded(faces, colour, alpha))
 
     obstacles = {obstacle.name for obstacle in problem.arm.scene.obstacles}
     for body in model.bodies:
@@ -134,7 +142,7 @@ def _surfaces(
         if body.name in obstacles:
             add(body, np.eye(4), OBSTACLE, 0.18 if body.core.is_half_space else 0.4)
             continue
-        # what does not move is drawn once
+        # the base and the first link are drawn once, because they hardly move
         shown = range(instants) if body.link > 1 else [0]
         for k in shown:
             colour = "#666666" if body.link <= 1 else to_hex(OVER_TIME(k / (instants - 1)))
@@ -160,7 +168,7 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     for body in model.bodies:
         if body.cloud is not None:
-            # the centres of its parts
+            # a cloud is drawn by the centres of its parts
             centres = body.cloud.tree.centres[body.cloud.tree.parts(body.patch)]
             axes.scatter(
                 *(centres @ body.T_link_core[:3, :3].T + body.T_link_core[:3, 3]).T,
@@ -200,8 +208,8 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("request", type=Path, help="a request for POST /optimize")
-    parser.add_argument("picture", type=Path, help="where to write the picture")
-    parser.add_argument("--instants", type=int, default=10, help="how many arms to draw")
+    parser.add_argument("picture", type=Path, help="file for the picture")
+    parser.add_argument("--instants", type=int, default=10, help="number of drawn instants")
     parser.add_argument(
         "--view", type=float, nargs=2, default=(24.0, 160.0), help="elevation and azimuth [degrees]"
     )

@@ -1,18 +1,18 @@
 #!/bin/sh
-# The loop with a threshold, with nothing but curl and python3: a study, the motion as it is, then the best suggestion,
-# again and again, until the energy is low enough or nothing is left to gain.
+# Improves a motion step by step with curl and python3: it creates a study, evaluates the present motion, and repeats the
+# best suggestion until the energy is below the threshold, or until no suggestion saves energy.
 #   make serve, then in another terminal: sh examples/study_loop.sh [http://127.0.0.1:8000]
 set -eu
 url=${1:-http://127.0.0.1:8000}
 here=$(dirname "$0")
 
-# What a Python expression makes of the answer `a` on standard input.
+# Prints the value of a Python expression of the answer `a`, which is read from standard input.
 pick() { python3 -c "import json, sys; a = json.load(sys.stdin); print($1)"; }
 post() { curl --silent --show-error --fail-with-body --header 'Content-Type: application/json' --data "$2" "$url$1"; }
 
 study=$(post /studies "$(cat "$here/studies/paper_pose_1.json")" | pick 'a["id"]')
 echo "study $study"
-# to the paper's first configuration and back is two motions: here the way there, in its 1.5 s
+# the motion of the paper to its first configuration, in 1.5 s
 answer=$(post "/studies/$study/iterations" '{"evaluate": {"time_per_segment": 1.5, "configurations":
   [[0, -1.5708, 1.5708, -1.5708, 3.1416, 0], [-0.1243, -0.9639, 1.6165, -2.2211, 4.7124, 0.1251]]}}')
 while :; do

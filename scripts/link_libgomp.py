@@ -1,8 +1,7 @@
-"""Gives Pinocchio the OpenMP runtime that its wheel takes for granted.
+"""Provides Pinocchio with the OpenMP runtime libgomp.so.1.
 
-Pinocchio's wheel expects the system's libgomp.so.1, which a Debian without a compiler does not
-have. CasADi's wheel brings a copy under a name of its own: where the system has none, a link lets
-Pinocchio find that one.
+The wheel of Pinocchio expects the library on the system, but Debian without a compiler does not
+have it. The wheel of CasADi contains a copy under another name, so a link to this copy is created.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from pathlib import Path
 
 
 def main() -> None:
-    """Make the link, unless the system has the library."""
+    """Creates the link if the system does not have the library."""
     try:
         ctypes.CDLL("libgomp.so.1")
     except OSError:
         packages = Path(sysconfig.get_path("platlib"))
-        # this folder is on the search path that is built into Pinocchio's libraries
+        # the search path in Pinocchio's libraries contains this folder
         link = packages / "cmeel.prefix" / "lib" / "libgomp.so.1"
         link.unlink(missing_ok=True)
         link.symlink_to(next((packages / "casadi").glob("libgomp-*.so*")))

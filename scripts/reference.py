@@ -1,7 +1,7 @@
-"""Writes two pages from the OpenAPI document of the service: `docs/reference/fields.md` with every
-request and answer, and `docs/reference/errors.md` with every problem.
+"""Writes two pages from the OpenAPI document of the service: `docs/reference/fields.md` on requests
+and answers, and `docs/reference/errors.md` on problems.
 
-python -m scripts.reference
+    python -m scripts.reference
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ have the header `Retry-After` [s]. The library raises the same errors as excepti
 written by `python -m scripts.reference`.
 """
 _RANGES = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
-# fields of every problem
-_EVERY = {"type", "title", "status", "detail", "instance"}
+_COMMON = {"type", "title", "status", "detail", "instance"}
+"""Fields of all problems."""
 _LENGTHS = {"minItems": "at least", "maxItems": "at most"}
 
 
@@ -91,7 +91,7 @@ def _problem(schema: dict[str, Any]) -> str:
     fields = [
         f"- `{name}`: {_type(node, PAGE.name)}. {_cell(node['description'])}"
         for name, node in own.items()
-        if name not in _EVERY
+        if name not in _COMMON
     ]
     return "\n".join(
         [
@@ -147,13 +147,13 @@ def _type(node: dict[str, Any], page: str = "") -> str:
 
 
 def _names(node: dict[str, Any]) -> list[str]:
-    """Names of the schemas that a node is, or may be."""
+    """Names of the possible schemas of a node."""
     parts = (node, *node.get("oneOf", ()), *node.get("anyOf", ()))
     return [part["$ref"].rpartition("/")[2] for part in parts if "$ref" in part]
 
 
 def _limits(field: str, node: dict[str, Any], required: set[str]) -> str:
-    """What a value must keep to, and the default of a field that may be left out."""
+    """The range of a value, and the default of an optional field."""
     words = list(_words(node))
     if field not in required:
         words.append(
@@ -170,7 +170,7 @@ def _words(node: dict[str, Any]) -> Iterator[str]:
 
 def _cell(text: str) -> str:
     text = " ".join(text.split()).replace("|", "\\|")
-    # Markdown takes [sample][joint] and [x, y] [m] for links
+    # without backslashes, [sample][joint] and [x, y] [m] would be links in Markdown
     return re.sub(r"\](?= ?\[)", r"\\]", text)
 
 

@@ -1,9 +1,9 @@
-"""Removes from an environment what only builds and tests need, and puts links where wheels hold
-copies.
+"""Makes an environment smaller: removes files that only builds and tests need, and replaces copies
+by links.
 
-Wheels of C++ libraries carry headers, build files, static libraries and, since a wheel cannot hold
-links, every shared library under two or three names. Where binutils are there, libraries that
-nothing asks for and symbol tables go, too.
+Wheels of C++ libraries contain headers, build files and static libraries. They also contain every
+shared library under two or three names, because a wheel cannot contain links. If binutils are
+installed, unused libraries and symbol tables are removed as well.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-# Folders of the environment's site-packages that nothing reads at run time.
+# Folders in site-packages that are not used at run time.
 BUILD_FOLDERS = [
     "casadi/cbc",
     "casadi/clp",
@@ -49,14 +49,14 @@ BUILD_FILES = [
     "**/*.pxd",
     "**/*.hpp",
     "**/tests",
-    # its tests, its viewer, and many simulations at once
+    # tests and viewer of MuJoCo, and its batches of simulations
     "mujoco/*_test.py",
     "mujoco/_batch.*",
     "mujoco/_render_filament.*",
     "mujoco/_rollout.*",
     "mujoco/_simulate.*",
 ]
-# CasADi's plugins of these kinds are many and heavy, and loaded by name: these stay.
+# CasADi has many large plugins of these kinds, and loads them by name. Only CASADI_PLUGINS stay.
 CASADI_KINDS = ["archiver", "conic", "graphmodel", "modelicaparser", "nlpsol", "onnx"]
 CASADI_PLUGINS = [
     "conic_daqp",
@@ -66,8 +66,8 @@ CASADI_PLUGINS = [
     "nlpsol_qrsqp",
     "nlpsol_sqpmethod",
 ]
-# Libraries whose symbol tables weigh megabytes. Not all: stripping breaks those that wheel tools
-# have relocated.
+# Libraries with symbol tables of megabytes. Other libraries are not stripped, because this breaks
+# libraries that tools for wheels have relocated.
 SYMBOLS = [
     "cmeel.prefix/lib/libeigenpy.so",
     "cmeel.prefix/lib/python*/site-packages/*/*_pywrap*.so",
@@ -76,14 +76,14 @@ SYMBOLS = [
 
 
 def size(folder: Path) -> int:
-    """Disk space of a folder's regular files [MiB]."""
+    """Disk space of the regular files in a folder [MiB]."""
     return (
         sum(p.stat().st_size for p in folder.rglob("*") if p.is_file() and not p.is_symlink()) >> 20
     )
 
 
 def remove_build_files(packages: Path) -> None:
-    """Remove headers, build files, static libraries and tests."""
+    """Removes headers, build files, static libraries and tests."""
     doomed = [packages / folder for folder in BUILD_FOLDERS]
     doomed += [path for pattern in BUILD_FILES for path in packages.glob(pattern)]
     for path in doomed:
@@ -94,7 +94,7 @@ def remove_build_files(packages: Path) -> None:
 
 
 def link_copies(folder: Path) -> None:
-    """Put links in place of libraries that are equal but for their name."""
+    """Replaces libraries with equal content by links."""
     first: dict[str, Path] = {}
     for path in sorted(folder.glob("*.so*")):
         if not path.is_symlink():
@@ -105,7 +105,7 @@ def link_copies(folder: Path) -> None:
 
 
 def needed(library: Path) -> set[str]:
-    """Names of the shared libraries that one asks for."""
+    """Names of the shared libraries that a library needs."""
     listing = subprocess.run(
         ["readelf", "--dynamic", str(library)], capture_output=True, encoding="utf-8", check=True
     ).stdout
@@ -113,7 +113,7 @@ def needed(library: Path) -> set[str]:
 
 
 def remove_unreached(folder: Path, roots: set[Path]) -> None:
-    """Remove a folder's libraries that no root needs, directly or through another."""
+    """Removes the libraries of a folder that no root needs directly or indirectly."""
     reached, todo = set[Path](), {path.resolve() for path in roots}
     while todo:
         path = todo.pop()
@@ -127,7 +127,7 @@ def remove_unreached(folder: Path, roots: set[Path]) -> None:
 
 
 def main() -> None:
-    """Slim the environment and tell what it weighed before and after."""
+    """Makes the environment smaller, and prints its size before and after."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("environment", type=Path)
     (packages,) = parser.parse_args().environment.glob("lib/python*/site-packages")
@@ -144,7 +144,7 @@ def main() -> None:
         remove_unreached(casadi, {casadi / "_casadi.so", *casadi.glob("libcasadi_*.so")})
         remove_unreached(cmeel, set(cmeel.glob("python*/site-packages/*/*.so")))
         for library in (path for pattern in SYMBOLS for path in packages.glob(pattern)):
-            # not in place: a process that runs has mapped the file, and would crash
+            # not in place, because a running process that has mapped the file would crash
             stripped = library.with_suffix(".stripped")
             subprocess.run(["strip", "--strip-unneeded", "-o", stripped, library], check=True)
             stripped.replace(library)
