@@ -158,18 +158,6 @@ def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
     )
 
 
-def test_margin_is_taken_off() -> None:
-    spline = wander(1)
-    post = Obstacle("post", Sphere(0.1), at([0.3, 0.3, 0.6]))
-    near = proven_clearance(CollisionModel(Arm(robot=ROBOT, scene=Scene([post]))), spline)
-    kept = proven_clearance(
-        CollisionModel(Arm(robot=ROBOT, scene=Scene([replace(post, margin=0.5)]))), spline
-    )
-    assert near is not None and kept is not None
-    assert "post" in kept.pair
-    assert kept.sampled < near.sampled
-
-
 def test_standing_still() -> None:
     model = CollisionModel(Arm(robot=ROBOT))
     proof, (contact,) = proven_clearance(model, STILL), model.closest_pairs([AT])

@@ -10,9 +10,8 @@ import pytest
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bodies import Body
 from joulepath.optimizer.collision.cores import Core, box_corners
-from joulepath.optimizer.collision.pair_arrays import PairArrays
 from joulepath.optimizer.collision.pair_distance import PairGeometry
-from tests.optimizer.collision.numpy_distances import NumpyDistances
+from tests.optimizer.collision.separations import separation
 
 SEARCHED = 2e-10  # m; the search ends at a difference of 1e-10 between its bounds, and both round
 ON_DISC = 2e-8  # m; the root of the rounding of a squared cosine, times radii of up to a metre
@@ -51,10 +50,9 @@ def turned(rng: np.random.Generator, position: Array) -> Array:
     return T
 
 
-def of(first: list[Body], second: list[Body]) -> tuple[PairGeometry, NumpyDistances]:
-    bodies, k = [*first, *second], len(first)
-    pairs = np.column_stack([np.arange(k), np.arange(k, 2 * k)])
-    return PairGeometry(bodies, pairs, 1), NumpyDistances(PairArrays.of(bodies, pairs))
+def of(first: list[Body], second: list[Body]) -> PairGeometry:
+    k = len(first)
+    return PairGeometry([*first, *second], np.column_stack([np.arange(k), np.arange(k, 2 * k)]), 1)
 
 
 @pytest.mark.parametrize("kind", ["hull", "needle", "plate", "triangle", "cylinder", "box"])
@@ -68,17 +66,17 @@ def test_no_unit_vector_separates_by_more_and_the_normal_by_as_much(kind: str, o
         [Body("body", 0, core, turned(rng, 0.5 * rng.normal(size=3))) for core in each]
         for each in cores
     ]
-    geometry, by_numpy = of(*bodies)
+    geometry = of(*bodies)
     frames, none = np.tile(np.eye(4), (1, 2, 1, 1)), np.zeros(COUNT, dtype=np.intp)
     pair = np.arange(COUNT)
     found = geometry.witness_points(frames, none, pair)
-    separation = by_numpy.separation(frames, none, pair, found.normal)
     apart = geometry._compiled.witness_points(frames, none, pair)[0] > 1e-6
     assert apart.sum() > COUNT / 4
     tolerance = ON_DISC if "cylinder" in (kind, other) else SEARCHED
-    assert np.abs(found.distance - separation)[apart].max() < tolerance
     for k in np.flatnonzero(apart):
-        second = bodies[1][k]
+        first, second = bodies[0][k], bodies[1][k]
+        attained = separation(first, np.eye(4), second, np.eye(4), found.normal[k])
+        assert found.distance[k] == pytest.approx(attained, abs=tolerance)
         point = np.linalg.inv(second.T_link_core) @ [*found.point[k], 1.0]
         assert _outside(second.core, point[:3]) < WITNESS
 
@@ -98,7 +96,7 @@ def test_parallel_faces(gap: float, shift: float) -> None:
     size = np.array([0.1, 0.2, 0.3])
     T = np.eye(4)
     T[:3, 3] = [shift, 0.0, 0.3 + gap]
-    geometry, _ = of([Body("low", 0, box(size), np.eye(4))], [Body("high", 0, box(size), T)])
+    geometry = of([Body("low", 0, box(size), np.eye(4))], [Body("high", 0, box(size), T)])
     zero = np.zeros(1, dtype=np.intp)
     found = geometry.witness_points(np.tile(np.eye(4), (1, 2, 1, 1)), zero, zero)
     expected = np.hypot(max(shift - 0.1, 0.0), gap)
@@ -116,7 +114,7 @@ def test_the_depth_of_overlapping_cores(depth: float) -> None:
     T = np.eye(4)
     T[:3, 3] = [0.1, 0.2, 1.0 - depth]
     high = Body("high", 0, Core(box_corners(-np.full(3, 0.5), np.full(3, 0.5)), radius=0.01), T)
-    geometry, _ = of([low], [high])
+    geometry = of([low], [high])
     zero = np.zeros(1, dtype=np.intp)
     frames = np.tile(np.eye(4), (1, 2, 1, 1))
     assert np.isnan(geometry._compiled.witness_points(frames, zero, zero)[0])

@@ -11,7 +11,6 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from joulepath.models.meshes import link_surfaces
-from joulepath.optimizer.collision.clearance_proof import proven_clearance
 from joulepath.optimizer.collision.coal_distance import coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.collision.model import CollisionModel
@@ -21,7 +20,6 @@ from joulepath.optimizer.problem.scene import Attachment, Box, Obstacle, Scene, 
 from joulepath.optimizer.problem.tool import load_tool
 from tests.mesh_folders import meshes
 from tests.models.own_arm.arms import URDF, changed, robot
-from tests.optimizer.cells import wander
 from tests.optimizer.moves import ROBOT
 from tests.optimizer.placement.cells import at
 
@@ -135,14 +133,3 @@ def test_distances_are_those_of_the_meshes_or_a_little_less() -> None:
                 assert true - EXCESS <= distance[n, column] <= true + SEARCHED
                 compared += 1
     assert compared > 500
-
-
-def test_a_proven_clearance_is_below_every_sample() -> None:
-    """Of a motion whose closest pair is an obstacle and the hull of a link."""
-    model = CollisionModel(Arm(robot=ROBOT, scene=Scene([POST, BALL])))
-    line = wander(2, duration=1.5)
-    proven = proven_clearance(model, line)
-    assert proven is not None
-    sampled = model.pair_distances(model.frames(line.curve(np.linspace(0, 1.5, 15_001)))).distance
-    assert proven.min_clearance <= sampled.min() <= proven.min_clearance + 2e-3
-    assert proven.pair[0] in ("post", "ball")
