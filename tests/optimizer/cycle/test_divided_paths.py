@@ -19,7 +19,6 @@ from joulepath.optimizer.cycle.divided_paths import (
 from joulepath.optimizer.cycle.path_segments import PathSegment, path_segments
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cycle import Cycle
@@ -28,9 +27,6 @@ from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stop_path import StopPath
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.search.errors import PathInfeasible
-from tests.optimizer.cycle.cycles import PART
-from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.cycle.test_paths import FREE, a_cycle, down
 from tests.optimizer.moves import ROBOT
 
@@ -58,52 +54,6 @@ def glue(**given: Any) -> Stop:
 
 def divided(*stops: Stop, **given: Any) -> Cycle:
     return with_divided_paths(a_cycle(*stops, **{"arm": NARROW} | given))
-
-
-@pytest.mark.long
-def test_a_path_is_divided_where_a_joint_comes_to_its_end() -> None:
-    asked = a_cycle(glue(dwell=0.1, payload=PART), arm=NARROW)
-    with pytest.raises(PathInfeasible) as refusal:
-        plan_cycle(
-            replace(
-                asked,
-                stops=[replace(each, path=replace(BEAD, split=False)) for each in asked.stops],
-            )
-        )
-    assert all(
-        0 < each.followed < 1 and each.reason == "outside_limits" for each in refusal.value.attempts
-    )
-    found = plan_cycle(asked)
-    parts = with_divided_paths(asked)
-    assert_true(parts, found)
-    assert found.order == ["glue/1", "glue"] and found.status == "feasible"
-    assert [move.planned.kind for move in found.moves] == ["move", "path", "move", "path", "move"]
-    first, between, second = found.moves[1:4]
-    ends = [
-        pose_of(NARROW, move.solution.trajectory.spline.control_points[[0, -1]])
-        for move in (first, second)
-    ]
-    assert np.abs(ends[0][1] - ends[1][0]).max() < 1e-6, "it goes on where it left off"
-    assert (
-        np.abs(ends[0][0] - down(0.45, -0.1, 0.2).T).max() < 1e-6
-        and np.abs(ends[1][1] - BEAD.goal.T).max() < 1e-6
-    )
-    assert np.abs(between.solution.goal.q - between.solution.start.q).max() > 1.0
-    course = ToolCourse.of(ToolPath(), down(0.45, -0.1, 0.2).T, BEAD.goal.T)
-    q = np.vstack(
-        [_samples(first.solution.trajectory.spline), _samples(second.solution.trajectory.spline)]
-    )
-    position, rotation = course.deviation(pose_of(NARROW, q))
-    assert (
-        position.max() < ToolPath().position_tolerance
-        and rotation.max() < ToolPath().rotation_tolerance
-    )
-    assert [move.planned.arm.payload.mass for move in found.moves] == [0.0, 0.0, 0.0, 0.0, 2.0]
-    assert first.dwell_energy == 0 < second.dwell_energy
-
-
-def _samples(spline: Any) -> Array:
-    return np.asarray(spline.curve(np.linspace(0.0, spline.duration, 1500)))
 
 
 def test_a_path_that_can_be_followed_stays_whole() -> None:
@@ -192,12 +142,3 @@ def _brute(on: Array, cost: Array) -> tuple[float, int]:
                         following[key] = min(following.get(key, np.inf), total + cost[place, a, b])
         layer = following
     return np.inf, 0
-
-
-@pytest.mark.long
-def test_what_no_configuration_reaches_cannot_be_divided() -> None:
-    far = replace(BEAD, goal=down(0.2, 1.5, 0.2))
-    with pytest.raises(PathInfeasible) as refusal:
-        divided(glue(path=far))
-    assert "cannot be divided" in str(refusal.value) and refusal.value.path == "stops/glue"
-    assert {each.reason for each in refusal.value.attempts} <= {"unreachable", "outside_limits"}

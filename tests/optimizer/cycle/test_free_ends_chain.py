@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import LeastBound
-from joulepath.optimizer.cycle import free_ends_chain, tool_turns
+from joulepath.optimizer.cycle import tool_turns
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.free_ends_chain import FREE_ENDS, FreeEndsChain
+from joulepath.optimizer.cycle.free_ends_chain import FreeEndsChain
 from joulepath.optimizer.cycle.single_joint_bound import Boxes, SingleJointBound
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.kinematics.angles import wrapped
@@ -145,16 +145,6 @@ def test_no_chain_has_less(seed: int, robot: str) -> None:
     assert 0 < bound <= found + ROUNDING
     # and it is near: what it leaves open is little
     assert bound > 0.85 * found
-
-
-@pytest.mark.long
-def test_fewer_cycles_give_a_weaker_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked, bounds = _cycle(0), []
-    for cycles in (0, 6):
-        settings = replace(FREE_ENDS, most_iterations=cycles)
-        monkeypatch.setattr(free_ends_chain, "FREE_ENDS", settings)
-        bounds.append(_chain(asked).least(NEVER))
-    assert 0 < bounds[0] < bounds[1]
 
 
 def test_the_quick_bound_is_no_more_than_the_bound() -> None:

@@ -74,19 +74,6 @@ def _in(asked: Cycle, order: list[str]) -> list[Any]:
     return [by_name[name] for name in order]
 
 
-@pytest.mark.long
-def test_what_comes_before_and_together_is_kept() -> None:
-    free = plan_cycle(inspection(0, 4)).order
-    first, last = free[-1], free[0]
-    asked = inspection(0, 4, order=FreeOrder(before=[(first, last)], together=[(free[2], free[0])]))
-    found = plan_cycle(asked)
-    assert found.order.index(first) < found.order.index(last)
-    assert found.order.index(free[0]) == found.order.index(free[2]) + 1
-    assert found.energy.electrical.total >= plan_cycle(inspection(0, 4)).energy.electrical.total * (
-        1 - CONVERGED
-    )
-
-
 @pytest.mark.parametrize("lines", long_but([False], [False, True]))
 def test_parts_are_carried_from_pick_to_place_whatever_the_order(lines: bool) -> None:
     asked = pick_and_place(0, 4, windings=False)

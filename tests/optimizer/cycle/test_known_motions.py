@@ -87,16 +87,6 @@ def test_of_an_edited_cycle_only_the_moves_that_changed_are_solved() -> None:
 
 
 @pytest.mark.long
-def test_in_a_given_time_too() -> None:
-    own = searched()[0].duration
-    asked, motions = replace(ASKED, duration_min=1.3 * own, duration_max=1.3 * own), KnownMotions()
-    found = again(asked, motions)
-    other = again(asked, KnownMotions(motions.used))
-    assert solves(other) == 0 < solves(found)
-    assert_same(other, found)
-
-
-@pytest.mark.long
 def test_a_motion_that_is_not_certified_is_solved_for() -> None:
     _, motions = searched()
     wrong = {key: replace(each, spline=_twice_as_fast(each)) for key, each in motions.used.items()}

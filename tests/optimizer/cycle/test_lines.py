@@ -8,16 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.line import Line
 from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.errors import PathInfeasible, StopInCollision
@@ -72,48 +68,6 @@ def test_the_tool_comes_and_leaves_straight() -> None:
         move.planned.arm.payload.mass for move in found.moves if move.planned.start == "stop 0"
     }
     assert carried == 2.0, "what is taken up is lifted along the line"
-
-
-@pytest.mark.long
-def test_it_is_the_least_over_all_configurations_of_the_stop() -> None:
-    asked = one_stop(branch=BranchFilter(elbow="up"))
-    found = plan_cycle(asked)
-    layers, energies = list(layers_of(asked).values()), []
-    assert [layer.name for layer in layers] == [
-        "start",
-        "stops/stop 0/approach",
-        "stops/stop 0",
-        "stops/stop 0/retreat",
-    ]
-    for node in range(len(layers[2].q)):
-        ends = [HOME, *(layer.q[node] for layer in layers[1:]), HOME]
-        total = 0.0
-        for move, q_start, q_goal in zip(asked.moves, ends, ends[1:], strict=False):
-            path = move.tool_path
-            task = Problem(
-                arm=move.arm,
-                start=q_start,
-                goal=q_goal,
-                tool_path=path,
-                windings=False,
-                deadline=AMPLE,
-            )
-            total += optimize(task).energy.electrical.total
-        energies.append(total)
-    least = min(energies) + sum(move.dwell_energy for move in found.moves)
-    assert found.status == "optimal" and found.energy.electrical.total == pytest.approx(
-        least, rel=CONVERGED
-    )
-
-
-@pytest.mark.long
-def test_a_cycle_with_lines_takes_a_given_time() -> None:
-    asked = with_lines(pick_and_place(1, 2, windings=False))
-    duration = 1.3 * plan_cycle(asked).duration
-    timed = replace(asked, duration_min=duration, duration_max=duration)
-    found = planned(timed)
-    assert found.duration == pytest.approx(duration)
-    assert all(each.saving > 0 for each in found.baselines if each.within_limits)
 
 
 def test_what_is_grasped_is_no_obstacle_on_the_lines() -> None:

@@ -20,7 +20,6 @@ from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.free_order import FreeOrder
 from joulepath.optimizer.problem.problem import MethodName, Problem
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.moves import ROBOT
@@ -68,25 +67,6 @@ def test_the_cycle_is_true(time: float, method: MethodName) -> None:
         assert each.saving == pytest.approx(1 - work / each.mechanical)
         if each.duration == pytest.approx(time):
             assert each.saving >= -CONVERGED
-
-
-@pytest.mark.long
-def test_more_time_needs_no_more_work() -> None:
-    short, longer = found(TIME), found(2 * TIME)
-    assert longer.energy.mechanical.total <= short.energy.mechanical.total * (1 + CONVERGED)
-    assert longer.price_of_time <= short.price_of_time + ROUNDING
-
-
-@pytest.mark.long
-def test_it_works_less_than_the_cycle_of_least_electrical_energy() -> None:
-    """In the same time, over configurations that either chooses."""
-    electrical = plan_cycle(
-        replace(ASKED, objective="electrical", duration_max=TIME, duration_min=TIME)
-    )
-    ours = found(TIME)
-    assert ours.energy.mechanical.total < electrical.energy.mechanical.total
-    assert ours.lower_bound <= electrical.energy.mechanical.total
-    assert ours.energy.electrical.total >= electrical.energy.electrical.total * (1 - CONVERGED)
 
 
 def test_no_random_cycle_gets_below_the_bound() -> None:
@@ -140,16 +120,6 @@ def test_what_the_price_bounds_holds_for_every_duration() -> None:
             for duration in np.geomspace(shortest[k], 5.0, PRICED_WORK.cells):
                 work = prepared.energy(quintic_spline(start[k], goal[k], duration)).mechanical.total
                 assert bound[k] <= work + price * duration
-
-
-@pytest.mark.long
-def test_a_free_order_does_no_more_work() -> None:
-    free = replace(ASKED, order=FreeOrder(together=[[stop.name for stop in ASKED.stops]]))
-    ours = plan_cycle(free)
-    assert ours.lower_bound <= found(TIME).energy.mechanical.total * (1 + ROUNDING)
-    assert ours.energy.mechanical.total == pytest.approx(
-        found(TIME).energy.mechanical.total, rel=CONVERGED
-    )
 
 
 def test_it_needs_a_time_and_rests() -> None:

@@ -36,7 +36,7 @@ from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.errors import StopInCollision
 from tests.optimizer.clocks import CountingClock
-from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place, poses
+from tests.optimizer.cycle.cycles import HOME, pick_and_place, poses
 from tests.optimizer.moves import AMPLE, ROBOT, torques
 from tests.refusals import refusal_of
 from tests.selection import long_but
@@ -196,61 +196,6 @@ def test_the_part_is_carried_where_it_is_and_held_while_the_arm_dwells() -> None
         assert with_brakes.dwell_energy == pytest.approx(
             with_motors.dwell_energy / 3 + 5.0 * 0.2, rel=ROUNDING
         )
-
-
-def test_a_heavier_part_costs_more_and_an_open_cycle_less() -> None:
-    asked = pick_and_place(3, 2, windings=False)
-    heavy = replace(
-        asked, stops=[replace(asked.stops[0], payload=replace(PART, mass=4.0)), asked.stops[1]]
-    )
-    least, more, open_ = (
-        plan_cycle(each).energy.electrical.total
-        for each in (asked, heavy, replace(asked, closed=False))
-    )
-    assert open_ < least < more
-
-
-@pytest.mark.long
-def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> None:
-    first, *others = poses(4, 3)
-    stops = [Stop(name=str(k), target=pose) for k, pose in enumerate(others)]
-    asked = Cycle(
-        arm=Arm(robot=ROBOT, collisions=False),
-        start=first,
-        stops=stops,
-        windings=False,
-        deadline=AMPLE,
-    )
-    found = planned(asked)
-    for start in layers_of(asked)["start"].q:
-        fixed = plan_cycle(replace(asked, start=start))
-        assert found.energy.electrical.total <= fixed.energy.electrical.total * (1 + CONVERGED)
-        assert found.lower_bound <= fixed.lower_bound * (1 + ROUNDING)
-
-
-@pytest.mark.long
-def test_one_of_several_targets_is_chosen_for_the_whole_cycle() -> None:
-    near, far = poses(5, 2)
-    stops = [Stop(name="either", target=AnyOf((near, far))), Stop(name="then", target=far)]
-    asked = Cycle(
-        arm=Arm(robot=ROBOT, collisions=False),
-        start=HOME,
-        stops=stops,
-        windings=False,
-        deadline=AMPLE,
-    )
-    found = planned(asked)
-    singles = [
-        plan_cycle(
-            replace(asked, stops=[replace(stops[0], target=target), stops[1]])
-        ).energy.electrical.total
-        for target in (near, far)
-    ]
-    assert found.energy.electrical.total == pytest.approx(min(singles), rel=CONVERGED)
-    least = int(np.argmin(singles))
-    arrived, left = found.moves[0].solution.goal, found.moves[1].solution.start
-    assert (arrived.target, left.target) == (least, least) and (arrived.q == left.q).all()
-    assert least == 1  # the first one is what a motion between joint positions would tell
 
 
 @pytest.mark.long

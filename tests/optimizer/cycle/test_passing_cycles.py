@@ -14,9 +14,7 @@ import pytest
 
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
-from joulepath.optimizer.cycle.stopping_cycle import moves_from_stopping, solve_from_stopping
 from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -41,8 +39,6 @@ optimize_cycle_module = importlib.import_module("joulepath.optimizer.plan_cycle"
 ROUNDING = 1e-9
 # relative; a motion's energy from panels that are as long as a share of it
 QUADRATURE = 2e-5
-# relative; two solves that end where a step promises less than this
-PROGRESS = 5e-5
 # relative; two solves of one motion from different guesses, which may end in optima that differ by
 # as much
 GUESSES = 5e-4
@@ -184,35 +180,6 @@ def test_in_a_given_time_it_is_not_worse_either(factor: float) -> None:
         assert "stopping" not in against(found) and found.price_of_time >= 0
 
 
-@pytest.mark.long
-def test_a_time_that_even_passing_does_not_keep_is_too_short() -> None:
-    with pytest.raises(CycleTooShort) as caught:
-        plan_cycle(
-            of(*(Stop(name=f"{k}", target=q, via=True) for k, q in enumerate(Q)), duration_max=0.5)
-        )
-    assert 0.5 < caught.value.shortest < 4
-
-
-@pytest.mark.long
-def test_motions_that_stop_become_motions_that_pass_and_need_no_more() -> None:
-    """What stands in where the search finds nothing better than stopping."""
-    asked = of(*(Stop(name=f"{k}", target=q, via=k < 2) for k, q in enumerate(Q)))
-    theirs = plan_cycle(replace(asked, rests_at_passes=True))
-    search = CycleSearch(asked, clock=lambda: 0.0)
-    rested = solve_from_stopping(search, theirs)
-    assert rested.known.energy == pytest.approx(theirs.energy.electrical.total, rel=QUADRATURE)
-    motions, waits = moves_from_stopping(search, rested)
-    assert len(motions) == 2 and not waits and len(theirs.moves) == 4
-    first = sum(move.solution.duration for move in theirs.moves[:3])
-    assert (
-        motions[0].duration == pytest.approx(first) and motions[0].certificate.pass_error < ROUNDING
-    )
-    assert motions[0].energy.electrical.total <= sum(move.energy for move in theirs.moves[:3]) * (
-        1 + QUADRATURE
-    )
-    assert motions[1] is theirs.moves[3].solution
-
-
 def test_what_stops_is_the_answer_where_the_search_ends_too_early(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -312,19 +279,6 @@ def test_passes_at_the_same_place_are_one() -> None:
     assert found.energy.electrical.total == pytest.approx(
         plain.energy.electrical.total, rel=GUESSES
     )
-
-
-@pytest.mark.long
-def test_waiting_is_not_at_a_stop_that_is_passed() -> None:
-    """In much more time than the cycle takes: neither ours nor the one that stops rests there for
-    long.
-    """
-    stops = [Stop(name=f"{k}", target=q, via=k == 0) for k, q in enumerate(Q[:2])]
-    found = plan_cycle(
-        of(*stops, duration_min=12.0, duration_max=12.0, hold="brakes", brake_power=5.0)
-    )
-    assert found.duration == pytest.approx(12.0) and sum(move.wait for move in found.moves) > 1
-    assert against(found)["stopping"] >= -ROUNDING
 
 
 def test_a_pass_carries_what_its_motion_carries() -> None:

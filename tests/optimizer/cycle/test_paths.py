@@ -148,22 +148,6 @@ def test_each_of_several_targets_has_lines_of_its_own() -> None:
 
 
 @pytest.mark.long
-def test_a_path_that_no_branch_follows_says_how_far_each_gets() -> None:
-    far = replace(BEAD, goal=down(0.45, 1.2, 0.2), path=ToolPath())
-    with pytest.raises(PathInfeasible) as refusal:
-        plan_cycle(a_cycle(glue(path=far)))
-    error = refusal.value
-    assert error.path == "stops/glue" and error.length == pytest.approx(1.3)
-    assert len(error.attempts) == 8 and {each.reason for each in error.attempts} <= {
-        "unreachable",
-        "singular",
-    }
-    # a tenth of a metre less than the best one gets is followed
-    near = replace(far, goal=down(0.45, -0.2 + 1.3 * error.attempts[0].followed, 0.2))
-    assert layers_of(a_cycle(glue(path=near)))["glue"].q.size
-
-
-@pytest.mark.long
 def test_what_ends_a_path_is_told_of_each_branch() -> None:
     """A joint range is in the way of some, another line of the stop in that of others, an obstacle
     of the last.

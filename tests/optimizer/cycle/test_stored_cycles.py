@@ -84,13 +84,6 @@ def test_the_cycle_is_true(bus: Bus) -> None:
 
 
 @pytest.mark.long
-def test_more_room_saves_more() -> None:
-    large, small = (found(bus).energy.electrical.total for bus in (LARGE, SMALL))
-    plain = plan_cycle(HURRIED).energy.electrical.total
-    assert large < small <= plain * (1 + QUADRATURE)
-
-
-@pytest.mark.long
 def test_without_room_it_is_the_shared_bus_and_without_limits_the_recuperating_one() -> None:
     none = found(Bus("storage", 0.9, 0.0)).energy.electrical.total
     assert none == pytest.approx(plan_cycle(HURRIED).energy.electrical.total, rel=QUADRATURE)
@@ -100,14 +93,6 @@ def test_without_room_it_is_the_shared_bus_and_without_limits_the_recuperating_o
         other.energy.electrical.total, rel=QUADRATURE
     )
     assert boundless.status == other.status
-
-
-@pytest.mark.long
-def test_it_is_never_above_choosing_move_by_move() -> None:
-    own = plan_cycle(with_bus(ASKED, LARGE))
-    theirs = {each.name: each.electrical for each in own.baselines}
-    energy = own.energy.electrical.total * (1 - ROUNDING)
-    assert energy <= theirs["move_by_move"] and energy <= theirs["without_storage"]
 
 
 @pytest.mark.long

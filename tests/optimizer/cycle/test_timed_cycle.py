@@ -32,7 +32,7 @@ from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.stops import Stop
-from tests.optimizer.clocks import CountingClock, still
+from tests.optimizer.clocks import still
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned
 from tests.optimizer.moves import AMPLE, fixed, torques
@@ -145,53 +145,11 @@ def test_the_price_is_what_a_second_more_would_save() -> None:
     assert timed(1.3).price_of_time < 0
 
 
-@pytest.mark.long
-def test_brakes_make_waiting_cheap() -> None:
-    """Of a brake power below what the electronics draw, next to nothing is saved by slower
-    moves."""
-    asked = in_time(
-        replace(ASKED, hold="brakes", brake_delay=0.1, brake_power=1.0), 3.0 * free().duration
-    )
-    braked = planned(asked)
-    (waiting,) = (move for move in braked.moves if move.wait > 0)
-    # where it dwells on its brakes already, a wait draws nothing but their power
-    assert waiting.planned.dwell > 0.1 and waiting.wait_energy == pytest.approx(
-        1.0 * waiting.wait, rel=ROUNDING
-    )
-    assert braked.energy.electrical.total < 1.1 * free().energy.electrical.total
-    assert braked.price_of_time == pytest.approx(-1.0)
-
-
 def test_bounds_on_the_time_leave_a_cycle_alone_that_keeps_them() -> None:
     own = free().duration
     wide = plan_cycle(replace(ASKED, duration_min=0.9 * own, duration_max=1.1 * own))
     assert (
         wide.energy.electrical.total == free().energy.electrical.total and wide.price_of_time == 0
-    )
-
-
-@pytest.mark.long
-def test_a_greatest_time_is_as_good_as_this_time_where_it_is_short() -> None:
-    hurried = plan_cycle(replace(ASKED, duration_max=duration_of(0.4)))
-    assert hurried.duration == pytest.approx(duration_of(0.4))
-    assert hurried.energy.electrical.total == pytest.approx(
-        timed(0.4).energy.electrical.total, rel=CONVERGED
-    )
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("factor", long_but([0.5], [0.05, 0.5]))
-def test_too_little_time_says_how_much_the_fastest_cycle_takes(factor: float) -> None:
-    with pytest.raises(CycleTooShort) as refusal:
-        plan_cycle(in_time(ASKED, factor * free().duration))
-    assert refusal.value.shortest == pytest.approx(shortest(), rel=1e-3)
-    assert shortest() < free().duration and refusal.value.dwells == ASKED.dwell_time
-
-
-@pytest.mark.long
-def test_a_time_just_above_the_shortest_is_met() -> None:
-    assert plan_cycle(in_time(ASKED, 1.001 * shortest())).duration == pytest.approx(
-        1.001 * shortest()
     )
 
 
@@ -264,18 +222,6 @@ def test_a_least_time_is_bounded_for_longer_cycles_and_longer_moves_too(
     for durations in product([0.4 * least, 0.7 * least, 1.1 * least, 3.0 * least], repeat=2):
         waited = max(least - sum(durations), 0.0)
         assert bound <= sum(moving(k, t) for k, t in enumerate(durations)) + waiting * waited
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("readings", long_but([3000], [500, 3000, 10_000]))
-def test_a_deadline_gives_a_cycle_in_its_time_or_says_so(readings: int) -> None:
-    asked = replace(in_time(ASKED, 1.3 * free().duration), deadline=float(readings))
-    try:
-        found = plan_cycle(asked, clock=CountingClock())
-    except DeadlineExceeded:
-        return
-    assert_true(asked, found)
-    assert found.duration == pytest.approx(1.3 * free().duration)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,6 @@ from joulepath.optimizer.placement.box_bound import _CycleBoxes, _PlaceBoxBound,
 from joulepath.optimizer.placement.extents import Extents
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
 from joulepath.optimizer.placement.region import Group, Moved, Places, Region
-from joulepath.optimizer.placement.region_bound import region_bound
 from joulepath.optimizer.placement.rounds import ROUNDS
 from joulepath.optimizer.placement.space import Space
 from joulepath.optimizer.plan_cycle import plan_cycle
@@ -123,14 +122,6 @@ def test_no_cycle_needs_less_than_the_bound(region: str, robot: str) -> None:
         assert bound <= energy
         found += 1
     assert found
-
-
-@pytest.mark.long
-def test_it_is_far_above_the_bound_that_knows_no_configurations() -> None:
-    space = space_of(two_stops(), REGIONS["shifted"])
-    bound, plain = box_bound(space, NEVER), region_bound(space)
-    assert bound is not None and plain is not None
-    assert bound > 2 * plain
 
 
 def test_splitting_never_lowers_it() -> None:

@@ -12,14 +12,13 @@ from joulepath.optimizer.placement.errors import NoPlacement
 from joulepath.optimizer.placement.place import place, place_robot
 from joulepath.optimizer.placement.placement import Placement, WeightedCycle
 from joulepath.optimizer.placement.placement_solution import PlacementSolution
-from joulepath.optimizer.placement.region import Group, Moved, Places, Region
+from joulepath.optimizer.placement.region import Moved, Places, Region
 from joulepath.optimizer.placement.space import Space
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved
-from tests.optimizer.placement.cells import arm, at, down, floor, two_stops, wall
+from tests.optimizer.placement.cells import arm, at, floor, two_stops, wall
 
 AMPLE = 600.0
-ROUNDED = 1e-6  # relative scatter of solves of one motion whose targets differ by rounding
 SCATTER = 2e-3  # relative scatter of solves at places a few millimetres apart
 
 
@@ -64,42 +63,6 @@ def test_brute_force_finds_no_better_place() -> None:
 
 
 @pytest.mark.long
-def test_a_symmetric_cell_is_served_as_well_from_either_side() -> None:
-    """Turned by half a turn about the vertical through the middle of the stops, the cell is the
-    same: the base is as good on one side as on the other, and the first joint only turns.
-    """
-    cycle = two_stops()
-    turned = at(1.0, 0.0, 0.0, np.diag([-1.0, -1.0, 1.0]))
-    cycle = replace(cycle, start=down(0.5, 0.0, 0.35))
-    found = place(cycle, Places([turned]), deadline=AMPLE, progress=False)
-    check(found)
-    energies = [each.energy for each in found.map]
-    assert None not in energies
-    # the tool is turned by half a turn, too, which its last joint takes
-    assert energies[1] == pytest.approx(energies[0], rel=0.1)
-
-
-@pytest.mark.long
-def test_the_base_at_the_same_place_in_another_world_costs_the_same() -> None:
-    """All stops moved to one side are the base moved to the other."""
-    cycle = two_stops()
-    group = Group(stops=("start", "pick", "place"))
-    by_group = place(
-        cycle,
-        Region(x=(0.0, 0.02)),
-        moves=group,
-        resolution=0.1,
-        deadline=AMPLE,
-        progress=False,
-    )
-    by_base = place(cycle, Region(x=(-0.02, 0.0)), resolution=0.1, deadline=AMPLE, progress=False)
-    check(by_group)
-    energies = [[each.energy for each in found.map] for found in (by_group, by_base)]
-    assert energies[0] == pytest.approx(energies[1][::-1], rel=ROUNDED)
-    assert by_group.best.energy == pytest.approx(by_base.best.energy, rel=SCATTER)
-
-
-@pytest.mark.long
 def test_the_map_tells_why_there_is_no_cycle() -> None:
     cycle = two_stops([floor(), wall(-0.35)])
     places = [at(-3.0), at(-0.2)]
@@ -127,16 +90,6 @@ def test_a_bad_nominal_place_does_not_matter() -> None:
     assert found.nominal is None and found.nominal_reason == "reach"
     assert found.saving is None
     assert found.best.base.position == pytest.approx([-0.05, 0.0, 0.0])
-
-
-@pytest.mark.long
-def test_weights_count() -> None:
-    short = two_stops(stops=two_stops().stops[:1])
-    cycles = [WeightedCycle(two_stops(), 3.0), WeightedCycle(short)]
-    found = place(cycles, Places([at(-0.05)]), deadline=AMPLE, progress=False)
-    check(found)
-    first, second = (each.energy.electrical.total for each in found.best.solutions)
-    assert found.best.energy == pytest.approx(3 * first + second)
 
 
 @pytest.mark.long
