@@ -112,27 +112,11 @@ def test_compare() -> None:
     assert improved[-1] == min(energies.values())
 
 
-def test_compare_without_any_motion_raises_the_first_error() -> None:
-    with pytest.raises(joulepath.DurationTooShort):
-        joulepath.compare(replace(problem(), duration_max=0.05), ["uniform_scaling", "bspline"])
-
-
 @pytest.mark.parametrize("methods", [[], ["bspline", "bspline"], ["simplex"]])
 def test_compare_refuses_methods_that_are_none(methods: list[typing.Any]) -> None:
     with pytest.raises(joulepath.InvalidProblem, match="methods must name") as caught:
         joulepath.compare(problem(), methods)
     assert caught.value.field == "methods"
-
-
-@pytest.mark.long
-def test_pareto() -> None:
-    front = joulepath.pareto(replace(problem(), objective="mechanical", duration_max=2.0), 2)
-    durations, energies = zip(
-        *((each.duration, each.energy.mechanical.total) for each in front.points), strict=True
-    )
-    assert len(front.points) == 2
-    assert durations[0] == pytest.approx(front.shortest) and durations[0] < durations[1]
-    assert energies[0] > energies[1]
 
 
 def test_what_if() -> None:
@@ -175,15 +159,6 @@ def test_inverse_kinematics() -> None:
     assert all(each.nearest is None and not each.collides for each in unchecked)
 
 
-def test_inverse_kinematics_of_seven_joints_names_the_free_ones() -> None:
-    robot = joulepath.load_robot("iiwa14")
-    found = joulepath.inverse_kinematics(
-        robot, joulepath.Pose.from_rotvec([0.5, 0.1, 0.4], [np.pi, 0.0, 0.0])
-    )
-    assert found and all(each.free for each in found)
-    assert {joint for each in found for joint in each.free} <= set(robot.joint_names)
-
-
 def test_what_is_too_late_says_so() -> None:
     """By a clock whose every look is a second later than the last one."""
     late = {"clock": CountingClock()}
@@ -196,15 +171,6 @@ def test_what_is_too_late_says_so() -> None:
         joulepath.replay(solution(), deadline=0.5, problem=problem(), **late)
     with pytest.raises(joulepath.DeadlineExceeded):
         joulepath.compare(replace(problem(), deadline=0.5), ["uniform_scaling", "bspline"], **late)
-
-
-def test_inverse_kinematics_says_what_is_out_of_reach() -> None:
-    robot = joulepath.load_robot("ur5e")
-    with pytest.raises(joulepath.UnreachablePose) as caught:
-        joulepath.inverse_kinematics(
-            robot, joulepath.Pose.from_rotvec([3.0, 0.0, 0.0], [0.0, 0.0, 0.0])
-        )
-    assert caught.value.distance is not None and caught.value.distance > 1
 
 
 def test_replay() -> None:
@@ -335,11 +301,3 @@ def test_a_log_is_read_evaluated_and_identified(tmp_path: Path) -> None:
         for each in (robot, own)
     )
     assert abs(after - measured) < abs(before - measured)
-
-
-def test_robots_have_names() -> None:
-    assert "ur5e" in joulepath.robot_names()
-    for name in joulepath.robot_names():
-        assert joulepath.load_robot(name).name == name
-    with pytest.raises(LookupError, match="ur5e"):
-        joulepath.load_robot("r2d2")

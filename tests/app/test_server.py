@@ -20,7 +20,6 @@ import pytest
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.api.replay.task import ReplayAnswer
 from joulepath.app.exceptions.queue import Busy, ShuttingDown
 from joulepath.app.exceptions.transport import BodyTooLarge, MalformedHttp
 from joulepath.app.server import listen, told
@@ -94,22 +93,6 @@ def until_free(server: Server, before: list[int]) -> None:
     assert server.workers() == before
 
 
-@pytest.mark.long
-def test_an_answer_is_played_in_mujoco(server: Server) -> None:
-    """By its path alone: the payload is in the answer."""
-    found = server.post("/optimize", move(payload={"mass": 2.0, "com": [0.0, 0.0, 0.06]})).json()
-    answer = server.post(
-        "/replay", {"answer": found["answer"], "perturb": {"payload": 0.1}, "step": 1e-3}
-    )
-    content: Any = model_of(ReplayAnswer).model_validate_json(answer.content)
-    (motion,) = content.motions
-    assert motion.planned.electrical == found["energy"]["electrical"]["total"]
-    assert max(motion.runs[0].joint_error) < 3e-4 < max(motion.changes[0].joint_error)
-    assert not motion.runs[0].collides
-    refusal = server.post("/replay", {"answer": found | {"arm": {}}})
-    assert refusal.json()["type"] == "/problems/not-certified"
-
-
 def test_answers(server: Server) -> None:
     answer = server.post("/optimize", EXAMPLES["joint_to_pose"])
     assert answer.status_code == 200
@@ -138,13 +121,6 @@ def test_long_requests_hold_up_nobody(server: Server) -> None:
         assert server.post("/optimize", move()).status_code == 200
         assert not long.answered, "the other worker answered meanwhile"
     until_free(server, before)
-
-
-@pytest.mark.long
-def test_a_deadline_over_http_gives_what_was_found(server: Server) -> None:
-    answer = server.post("/optimize", long_search(deadline=6))
-    assert answer.status_code == 200
-    assert answer.json()["status"] == "feasible"
 
 
 def test_refuses_what_it_cannot_queue(server: Server) -> None:

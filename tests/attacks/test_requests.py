@@ -4,57 +4,18 @@ payloads.
 
 from __future__ import annotations
 
-import json
 import re
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-from tests.app.job_clients import ended
-from tests.app.live import ROOT
 from tests.app.requests import HOME, NEAR, PATIENT
-
-EXAMPLES = ROOT / "examples"
-# relative: two solves that differ in their samples of the free angle
-SAMPLED = 2e-2
 
 
 def pose(position: list[float]) -> dict[str, Any]:
     """A pose that is not turned."""
     return {"position": position, "quaternion": [0.0, 0.0, 0.0, 1.0]}
-
-
-def example(name: str) -> dict[str, Any]:
-    """The body of a shipped example."""
-    return json.loads((EXAMPLES / f"{name}.json").read_text())
-
-
-def free_about(end: dict[str, Any], axis: list[float] | None) -> dict[str, Any]:
-    """An end of the seam with its rotation about an axis of the tool free, or given."""
-    orientation = end["pose"]["orientation"]
-    if axis is None:
-        return {
-            "pose": {"position": end["pose"]["position"], "quaternion": orientation["quaternion"]}
-        }
-    return {"pose": {**end["pose"], "orientation": {**orientation, "free_about": axis}}}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("free", [("start",), ("start", "goal"), ("goal",)], ids="+".join)
-def test_a_seam_with_free_ends_is_answered(client: TestClient, free: tuple[str, ...]) -> None:
-    """Where the tool is beside the last axis, a nozzle turned about it is another place for the
-    wrist.
-    """
-    asked = example("optimize/seam_any_turn")
-    given = asked | {end: free_about(asked[end], None) for end in ("start", "goal")}
-    part = given | {end: asked[end] for end in free}
-    pinned, found = (client.post("/optimize", json=body) for body in (given, part))
-    assert pinned.status_code == found.status_code == 200, found.text
-    needs, least = (each.json()["energy"]["electrical"]["total"] for each in (pinned, found))
-    assert least <= needs * (1 + SAMPLED), "what may be chosen may stay as it was given"
-    assert 0 <= found.json()["energy"]["lower_bound"] <= least
-    assert max(found.json()["certificate"]["worst_ratio"].values()) <= 1 + 1e-6
 
 
 TABLE = {"obstacles": [{"name": "table", "shape": "half_space", "pose": pose([0.0, 0.0, -0.02])}]}
@@ -163,44 +124,6 @@ def test_a_payload_without_mass_needs_no_centre(client: TestClient) -> None:
         "/whatif", json={"optimize": asked, "changes": [{"name": "empty", "arm": arm}], **PATIENT}
     )
     assert changed.status_code == 200, changed.text
-
-
-def kept_answers(client: TestClient) -> list[dict[str, Any]]:
-    """One answer of each path whose answers, or whose parts, are kept: the answers that are."""
-    asked = {"start": {"q": HOME}, "goal": {"q": NEAR}, **PATIENT}
-    motion = {"configurations": [HOME, NEAR], "time_per_segment": 1.5, "sample_period": 0.02}
-    optimized = client.post("/optimize", json=asked).json()
-    a_cycle = client.post(
-        "/cycle", json={"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], **PATIENT}
-    ).json()
-    front = client.post("/pareto", json=asked | {"points": 2}).json()
-    empty = {"name": "empty", "arm": {"payload": None}}
-    changed = client.post(
-        "/whatif", json={"evaluate": motion, "changes": [empty], **PATIENT}
-    ).json()
-    sent = client.post("/jobs", json={"requests": [{"optimize": asked}, {"evaluate": motion}]})
-    job = ended(client, sent.headers["location"])
-    study = client.post("/studies", json={"name": "ids", "threshold": 1.0}).headers["location"]
-    step = client.post(f"{study}/iterations", json={"evaluate": motion}).json()
-    paths = [
-        *(leg["answer"] for leg in a_cycle["legs"] if leg["answer"]),
-        *(point["answer"] for point in front["points"]),
-        changed["base"]["answer"],
-        *(each["answer"] for each in job["requests"]),
-        f"/answers/{step['answer']}",
-    ]
-    return [optimized, a_cycle, *(client.get(path).json()["answer"] for path in paths)]
-
-
-@pytest.mark.long
-def test_the_id_in_an_answer_is_that_of_the_kept_answer(client: TestClient) -> None:
-    for answer in kept_answers(client):
-        stored = client.get(f"/answers/{answer['id']}")
-        assert stored.status_code == 200, stored.text
-        assert stored.json()["id"] == answer["id"] and stored.json()["answer"] == answer
-        exported = client.post("/export/csv", json={"answer": answer["id"]})
-        assert exported.status_code == 200, exported.text
-        assert answer.get("answer", f"/answers/{answer['id']}") == f"/answers/{answer['id']}"
 
 
 def test_an_id_of_the_caller_is_no_id_of_an_answer(client: TestClient) -> None:

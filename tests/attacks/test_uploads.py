@@ -210,11 +210,6 @@ def test_a_glb_of_many_copies_is_refused(primitives: int, nodes: list[dict[str, 
         mesh("glb", one_triangle(primitives, nodes))
 
 
-def test_a_plain_glb_is_read() -> None:
-    nodes = [{"children": [1]}, {"children": [2], "mesh": 0}, {"mesh": 0, "translation": [0, 0, 1]}]
-    assert len(mesh("glb", one_triangle(2, nodes)).corners) == 4
-
-
 def test_corners_that_count_back_are_those_above_the_face() -> None:
     """Of the whole file, the last three would be the second triangle's, twice."""
     content = (
@@ -354,27 +349,6 @@ def test_the_worker_answers_and_lives_on(client: TestClient, change: dict[str, A
     )["errors"]
     assert errors[0]["loc"] in (["body", "urdf"], ["body", "meshes"])
     assert sorted(client.app.state.engine.worker_pids) == workers  # type: ignore[attr-defined]
-
-
-@pytest.mark.long
-def test_a_scene_of_40000_groups_is_an_obstacle(client: TestClient) -> None:
-    pose = {"position": [0.6, 0.6, 0.0], "rpy": [0, 0, 0]}
-    bin_ = {
-        "name": "bin",
-        "shape": "mesh_file",
-        "format": "obj",
-        "data": base64.b64encode(GROUPS).decode(),
-    }
-    move = {
-        "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
-        "goal": {"q": [1.0, -1.2, 1.8, -2.0, -1.3, 0.5]},
-    }
-    answer = client.post(
-        "/optimize", json={**move, "scene": {"obstacles": [{**bin_, "pose": pose}]}}
-    )
-    assert (
-        answer.status_code == 200 and answer.json()["certificate"]["clearance"]["min_clearance"] > 0
-    )
 
 
 def test_a_body_that_unpacks_to_more_than_the_limit_is_refused(client: TestClient) -> None:

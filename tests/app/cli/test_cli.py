@@ -11,14 +11,12 @@ from pathlib import Path
 import pytest
 
 from joulepath.app.answers.declared import model_of
-from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.evaluate.task import EvaluateAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.cli.main import main
-from joulepath.app.schemas.examples.files import body_examples
 from joulepath.app.settings import Settings
 from tests.app.cli.console import CSV, CSV_OPTIONS, ROOT, Here, request, run
-from tests.app.requests import HOME, NEAR, PATIENT
+from tests.app.requests import NEAR
 
 
 def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
@@ -29,30 +27,6 @@ def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
     answer = model_of(OptimizeAnswer).model_validate_json(finished.stdout)
     assert answer.status == "optimal"
     assert answer.trajectory.q[-1] == pytest.approx(NEAR)
-
-
-@pytest.mark.long
-def test_cycle_answers_as_the_service_does() -> None:
-    stops = [
-        {"name": "there", "target": {"q": NEAR}, "payload": {"mass": 1.0, "com": [0.0, 0.0, 0.05]}}
-    ]
-    finished = run(
-        "cycle", "-", stdin=json.dumps({"start": {"q": HOME}, "stops": stops, **PATIENT})
-    )
-    assert (finished.returncode, finished.stderr) == (0, b"")
-    answer = model_of(CycleAnswer).model_validate_json(finished.stdout)
-    assert [leg.payload_mass for leg in answer.legs] == [0.0, 1.0]
-    assert answer.legs[0].goal.q == pytest.approx(NEAR) and answer.legs[1].goal.q == pytest.approx(
-        HOME
-    )
-
-
-@pytest.mark.long
-def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None:
-    output = tmp_path / "answer.json"
-    finished = run("optimize", "-", "--output", str(output), stdin=request())
-    assert (finished.returncode, finished.stdout, finished.stderr) == (0, b"", b"")
-    model_of(OptimizeAnswer).model_validate_json(output.read_bytes())
 
 
 @pytest.mark.parametrize(
@@ -101,14 +75,6 @@ def test_an_output_that_cannot_be_written_is_wrong_usage(here: Here, tmp_path: P
     assert (code, out) == (2, b"")
     assert b"answer.json" in err
     assert b"Traceback" not in err
-
-
-@pytest.mark.long
-def test_evaluate_answers_as_the_service_does() -> None:
-    example = next(iter(body_examples("/evaluate")["application/json"].values()))["value"]
-    finished = run("evaluate", "-", stdin=json.dumps(example))
-    assert (finished.returncode, finished.stderr) == (0, b"")
-    model_of(EvaluateAnswer).model_validate_json(finished.stdout)
 
 
 def test_evaluate_takes_a_csv_with_options_and_settings(here: Here, tmp_path: Path) -> None:
@@ -238,9 +204,3 @@ def test_an_installation_has_the_command() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     (command,) = project["scripts"].items()
     assert EntryPoint(*command, group="console_scripts").load() is main
-
-
-def test_a_port_beyond_the_range_is_wrong_usage(here: Here) -> None:
-    code, _, err = here.run("serve", "--port", "65536")
-    assert code == 2
-    assert b"65536" in err

@@ -12,8 +12,7 @@ from joulepath.app.answers.declared import model_of
 from joulepath.app.api.identifications.answer import IdentificationResult
 from joulepath.app.cli.identify import moves_of, summary_of
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.identify.errors import MethodNotApplicable, NoPowerChannel, NothingHeldOut
-from joulepath.optimizer.problem.arm import Payload
+from joulepath.optimizer.identify.errors import NoPowerChannel, NothingHeldOut
 from tests.app.cli.console import Here
 from tests.app.problems import checked
 from tests.identification_logs import csv_of, recorded, truth_of
@@ -112,52 +111,12 @@ def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path
     }
 
 
-@pytest.mark.long
-def test_a_payload_is_that_of_the_last_log(here: Here, tmp_path: Path) -> None:
-    files = list[str]()
-    for name, carried in (
-        ("empty", None),
-        ("loaded", Payload(mass=2.0, com=np.array([0.0, 0.0, 0.06]))),
-    ):
-        file = tmp_path / f"{name}.csv"
-        truth = truth_of(ROBOT, payload=carried)
-        file.write_bytes(csv_of(recorded(ROBOT, truth, moves=8, seed=len(name)), without="P"))
-        files.append(str(file))
-    output = tmp_path / "figures.json"
-    assert (
-        here.run("identify", *files, "--fit", "payload", "--payload", "0", "-o", str(output))[0]
-        == 0
-    )
-    payload = RESULT.model_validate_json(output.read_bytes()).payload
-    assert payload is not None and payload.log == 1
-    assert abs(payload.mass - 2.0) <= 4 * payload.mass_sd < 0.2
-    assert summary_of(json.loads(output.read_bytes()))["payload"].startswith(
-        f"{payload.mass:.3g} kg"
-    )
-
-
 def test_power_is_refused_of_logs_without(here: Here, tmp_path: Path) -> None:
     file = tmp_path / "still.csv"
     file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3), without="P"))
     code, content = here.problem("identify", str(file), "--fit", "power", "--payload", "0")
     assert code == 1
     checked(NoPowerChannel, content)
-
-
-@pytest.mark.long
-def test_a_method_is_asked_for_by_its_name(here: Here, logs: list[str], tmp_path: Path) -> None:
-    output = tmp_path / "figures.json"
-    command = ("identify", logs[0], "--payload", "0", "--term", "coulomb", "--term", "viscous")
-    assert here.run(*command, "--method", "base_parameters", "-o", str(output))[0] == 0
-    result = RESULT.model_validate_json(output.read_bytes())
-    assert any("·" in each.figure for each in result.parameters)
-    assert result.physical is None and result.structure.excited == result.structure.base
-    assert "inertials" not in result.document
-    code, content = here.problem(
-        *command, "--method", "periodic", "--period", "5", "--validate", logs[1]
-    )
-    assert code == 1
-    assert checked(MethodNotApplicable, content).method == "periodic"
 
 
 def test_a_log_of_one_motion_is_a_problem(here: Here, tmp_path: Path) -> None:

@@ -5,12 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pytest
-
-from joulepath.models.registry import load_robot
 from tests.app.cli.console import Here, run
 from tests.app.requests import move
-from tests.identification_logs import csv_of, recorded, truth_of
 
 
 def test_a_report_is_written_and_checked(tmp_path: Path) -> None:
@@ -25,19 +21,6 @@ def test_a_report_is_written_and_checked(tmp_path: Path) -> None:
     page.write_text(page.read_text().replace("460 shifts", "46 shifts"))
     changed = run("check", str(page), "--no-answer")
     assert changed.returncode == 1 and b"DIFFERS  page" in changed.stdout
-
-
-@pytest.mark.long
-def test_a_log_as_csv_is_reported_on_and_checked(tmp_path: Path) -> None:
-    log, settings, pdf = (tmp_path / name for name in ("run.csv", "settings.json", "run.html"))
-    robot = load_robot("ur5e")
-    log.write_bytes(csv_of(recorded(robot, truth_of(robot), moves=2)))
-    settings.write_text('{"payload": {"mass": 1.5, "com": [0, 0, 0.05]}}')
-    written = run("report", str(log), "--settings", str(settings), "--output", str(pdf))
-    assert written.returncode == 0, written.stderr
-    assert "<h1>run</h1>" in pdf.read_text() and "Payload 1.5 kg" in pdf.read_text()
-    whole = run("check", str(pdf))
-    assert whole.returncode == 0 and b"measured by power, anew" in whole.stdout, whole.stderr
 
 
 def test_other_files_are_refused(here: Here, tmp_path: Path) -> None:

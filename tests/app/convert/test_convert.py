@@ -6,29 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
-from joulepath.app.convert.pose import to_matrix
 from joulepath.app.convert.request import to_problem
-from joulepath.app.schemas.common import Pose
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from tests.app.requests import move
-
-# of a rotation computed in double precision in two ways
-ROUNDING = 1e-14
-ANGLES = [
-    [0.0, 0.0, 0.0],
-    [0.3, -0.8, 2.1],
-    [np.pi, 0.0, 0.0],
-    [1e-12, 0.0, 1e-9],
-    [-3.0, 1.5707963, 7.0],
-]
-
-
-def matrix(**pose: Any) -> np.ndarray:
-    return to_matrix(TypeAdapter(Pose).validate_python({"position": [0.1, 0.2, 0.3], **pose}))
 
 
 def problem(**fields: Any) -> Any:

@@ -112,16 +112,6 @@ def test_a_lighter_tool_has_half_of_the_mass(client: TestClient) -> None:
 
 
 @pytest.mark.long
-def test_only_the_changes_that_are_asked_for_are_computed(client: TestClient) -> None:
-    asked = {"optimize": move(payload=PART), "period": 6.0}
-    both = advised(client, **asked)
-    wait = advised(client, **asked, changes=[])
-    assert wait["advice"] == [] and wait["waiting"] == pytest.approx(both["waiting"], rel=CLOSE)
-    (brakes,) = advised(client, **asked, changes=["brakes"])["advice"]
-    assert brakes["energy"] == pytest.approx(by_name(both)["brakes"]["energy"], rel=CLOSE)
-
-
-@pytest.mark.long
 def test_a_task_with_its_own_time_or_another_objective_gets_no_wait(client: TestClient) -> None:
     own = advised(client, optimize=move(dwell={"time": 4.0}), period=9.0)
     assert own["waiting"] == 0 and set(by_name(own)) <= {"brakes"}

@@ -8,7 +8,6 @@ import json
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 from starlette.testclient import TestClient
@@ -25,14 +24,11 @@ from joulepath.optimizer.search.errors import (
     StartInCollision,
 )
 from tests.app.requests import EXAMPLES, HOME, move
-from tests.app.routes.test_examples import EXAMPLES as FILES
 from tests.app.routes.test_problems import DOWN, refused
 from tests.optimizer.moves import ROBOT
 
 # forearm folded onto the upper arm
 FOLDED = [0.3, -1.4, 3.0, -1.5, -1.57, 0.2]
-# every method but the one that takes seconds
-FAST = ["bspline", "time_scaling", "lagrange", "uniform_scaling"]
 CONE = {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.1}
 
 
@@ -77,12 +73,6 @@ def test_goes_around_a_post(client: TestClient) -> None:
     assert content["energy"]["electrical"]["total"] > through["energy"]["electrical"]["total"]
 
 
-def test_out_of_a_bin_onto_a_shelf(client: TestClient) -> None:
-    request = json.loads((FILES / "optimize" / "bin_to_shelf.json").read_text())
-    content = answered(client, request)
-    assert least_distance(request, content["trajectory"]["spline"]) >= 0
-
-
 def test_start_and_goal_in_collision(client: TestClient) -> None:
     start = refused(client.post("/optimize", json=move(start={"q": FOLDED})), StartInCollision)
     goal = refused(client.post("/optimize", json=move(goal={"q": FOLDED})), GoalInCollision)
@@ -108,15 +98,6 @@ def test_every_branch_in_collision_is_listed(client: TestClient) -> None:
     depths = [branch["depth"] for branch in content["branches"]]
     assert depths == sorted(depths) and content["depth"] == depths[0] > 0
     assert content["pair"] == content["branches"][0]["pair"]
-
-
-def test_margin_counts_at_the_ends(client: TestClient) -> None:
-    lowest = answered(client, move(scene=floor(-0.1)))
-    assert lowest["certificate"]["clearance"]["min_clearance"] > 0
-    content = refused(
-        client.post("/optimize", json=move(scene=floor(-0.1, margin=0.9))), StartInCollision
-    )
-    assert content["pair"][0] == "floor" and 0.5 < content["depth"] < 0.9
 
 
 def test_some_branches_in_collision_are_candidates_ruled_out(client: TestClient) -> None:
@@ -159,78 +140,6 @@ def test_no_way(client: TestClient) -> None:
         and "post and" in content["candidates"][0]["reason"]
     )
     assert content["start"] == content["candidates"][0]["start"]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("methods", [["uniform_scaling"], FAST])
-def test_a_scan_voxels_and_a_mesh_file_are_obstacles(
-    client: TestClient, methods: list[str]
-) -> None:
-    """All three at once, by a free and by a fixed path; Pinocchio's replay keeps off every
-    point."""
-    request = EXAMPLES["past_a_scan"]
-    rows = answered(
-        client, request | {"methods": methods, "answers": True, "deadline": 60.0}, "/compare"
-    )["methods"]
-    free = answered(client, request | {"collisions": False})
-    assert [row["valid"] for row in rows] == [True] * len(methods)
-    scan = request["scene"]["obstacles"][0]
-    for answer in (*(row["answer"] for row in rows), free):
-        spline = answer["trajectory"]["spline"]
-        curve = BSpline(spline["knots"], spline["control_points"], spline["degree"])
-        gap = least_gap(
-            curve(np.linspace(0.0, spline["knots"][-1], 2000)), np.array(scan["points"])
-        )
-        kept = gap >= scan["radius"] + scan["margin"]
-        assert kept == (answer is not free)
-    assert rows[0]["electrical"] > free["energy"]["electrical"]["total"]
-
-
-def least_gap(q: np.ndarray, points: np.ndarray) -> float:
-    """Least distance [m] of points (m, 3) from the capsules of the moving links, by Pinocchio and a
-    plain formula.
-    """
-    model, least = ROBOT.model, np.inf
-    data = model.createData()
-    for each in q:
-        pin.forwardKinematics(model, data, each)
-        for capsule in ROBOT.capsules:
-            if capsule.link == 0:
-                continue
-            a, b = (
-                data.oMi[capsule.link].act(np.asarray(end))
-                for end in np.asarray(capsule.axis)[[0, -1]]
-            )
-            share = np.clip((points - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-12), 0.0, 1.0)
-            least = min(
-                least,
-                np.linalg.norm(points - a - share[:, None] * (b - a), axis=1).min()
-                - capsule.radius,
-            )
-    return float(least)
-
-
-@pytest.mark.long
-def test_many_points_are_answered_and_warned_of(client: TestClient) -> None:
-    """A wall of 20,000 points; the warning names the obstacle, as of any other shape."""
-    y, z = np.meshgrid(np.linspace(-0.8, 0.8, 200), np.linspace(0.0, 1.2, 100))
-    wall = np.stack([np.full(y.size, 0.35), y.ravel(), z.ravel()], axis=1).round(4)
-    request = move(
-        scene={
-            "obstacles": [
-                {"name": "wall", "shape": "points", "points": wall.tolist(), "radius": 0.01}
-            ]
-        }
-    )
-    content = answered(client, request)
-    assert content["certificate"]["clearance"]["min_clearance"] >= 0
-    nearest = answered(
-        client,
-        {"configurations": [request["start"]["q"]] * 2, "time_per_segment": 1.0}
-        | {"scene": request["scene"]},
-        "/evaluate",
-    )["nearest"]
-    assert nearest["distance"] > 0
 
 
 def test_ends_outside_the_cone(client: TestClient) -> None:
@@ -289,22 +198,6 @@ def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[
         assert errors[0]["loc"][: len(where)] == where
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("methods", [FAST[:3], [*FAST, "polynomial_ga"]])
-def test_compare_and_pareto_keep_clear_too(client: TestClient, methods: list[str]) -> None:
-    """Also the methods whose straight line hits the post."""
-    request = EXAMPLES["over_a_post"]
-    compared = answered(client, request | {"methods": methods, "deadline": 60.0}, "/compare")[
-        "methods"
-    ]
-    assert len(compared) == len(methods) and all(
-        row["valid"] and row["problem"] is None for row in compared
-    )
-    front = answered(client, request | {"points": 2, "duration": {"max": 1.5}}, "/pareto")
-    kept = client.get(front["points"][0]["answer"]).json()["answer"]
-    assert kept["certificate"]["clearance"]["min_clearance"] >= 0
-
-
 def test_evaluate_tells_what_comes_nearest(client: TestClient) -> None:
     request = EXAMPLES["over_a_post"]
     through = answered(client, request | {"collisions": False})
@@ -317,21 +210,6 @@ def test_evaluate_tells_what_comes_nearest(client: TestClient) -> None:
     assert held["tcp_speed"] is False and "elbow_speed" not in held and "tool_cone" in held
     off = answered(client, {"trajectory": log, **cell, "collisions": False}, "/evaluate")
     assert off["collides"] is off["nearest"] is None
-
-
-def test_evaluate_samples_the_least_distance(client: TestClient) -> None:
-    request = move(
-        scene=floor(0.02), goal={"q": [1.0, -1.0, 1.9, -1.57, -1.57, 0.0]}, collisions=False
-    )
-    spline = (trajectory := answered(client, request)["trajectory"])["spline"]
-    given = {
-        "trajectory": {name: trajectory[name] for name in ("t", "q")},
-        "scene": request["scene"],
-    }
-    nearest = answered(client, given, "/evaluate")["nearest"]
-    assert nearest["spacing"] <= 0.01
-    # the arm moves at two metres per second at most: half a spacing is a centimetre
-    assert nearest["distance"] == pytest.approx(least_distance(request, spline), abs=0.01)
 
 
 def test_evaluate_takes_a_scene_as_a_query(client: TestClient) -> None:

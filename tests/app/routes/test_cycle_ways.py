@@ -9,7 +9,6 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.cycle.task import CycleAnswer
-from joulepath.app.api.optimize.task import OptimizeAnswer
 from tests.app.routes.test_cycle import a_cycle, down
 
 LINES = {
@@ -23,26 +22,6 @@ def with_lines(**fields: Any) -> dict[str, Any]:
     content = a_cycle()
     content["stops"][0] |= LINES | fields
     return content
-
-
-@pytest.mark.long
-def test_lines_are_legs_of_their_own(client: TestClient) -> None:
-    reply = client.post("/cycle", json=with_lines())
-    assert reply.status_code == 200, reply.text
-    model_of(CycleAnswer).model_validate_json(reply.content)
-    content = reply.json()
-    assert [(leg["kind"], leg["goal"]["stop"]) for leg in content["legs"]][:4] == [
-        ("move", "pick/approach"),
-        ("line", "pick"),
-        ("dwell", "pick"),
-        ("line", "pick/retreat"),
-    ]
-    worst = content["certificate"]["worst_ratio"]
-    assert 0 < worst["path_position"] <= 1 and 0.9 < worst["tcp_speed"] <= 1 + 1e-6
-    line = model_of(OptimizeAnswer).model_validate(
-        client.get(content["legs"][3]["answer"]).json()["answer"]
-    )
-    assert line.certificate.worst_ratio.path_rotation is not None
 
 
 @pytest.mark.parametrize(

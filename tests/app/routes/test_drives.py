@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from tests.app.requests import EXAMPLES, move
+from tests.app.requests import move
 
 BALANCE = 1e-4  # relative; quadrature of the corners of power
 PARTS = (
@@ -24,7 +24,6 @@ PARTS = (
     "storage_loss",
     "dwell",
 )
-DOWN = EXAMPLES["storage_on_the_bus"]
 
 
 def answered(client: TestClient, body: dict[str, Any]) -> dict[str, Any]:
@@ -41,34 +40,6 @@ def answered(client: TestClient, body: dict[str, Any]) -> dict[str, Any]:
 
 def total(content: dict[str, Any]) -> float:
     return content["energy"]["electrical"]["total"]
-
-
-@pytest.mark.long
-def test_every_bus_is_answered(client: TestClient) -> None:
-    answers = {
-        name: answered(client, DOWN | {"bus": bus})
-        for name, bus in {
-            "shared": {"mode": "shared"},
-            "isolated": {"mode": "isolated"},
-            "recuperating": {"mode": "recuperating", "efficiency": 0.8},
-            "storage": DOWN["bus"],
-            "no power limit": {"mode": "storage", "capacity": 5.0},
-        }.items()
-    }
-    totals = {name: total(answer) for name, answer in answers.items()}
-    assert totals["storage"] <= totals["shared"] < totals["isolated"]
-    assert totals["recuperating"] < totals["shared"]
-    for name in ("shared", "isolated", "recuperating"):
-        assert answers[name]["energy"]["storage"] is None
-        assert answers[name]["trajectory"]["charge"] is None
-    stored = answers["storage"]
-    charge = stored["trajectory"]["charge"]
-    assert len(charge) == len(stored["trajectory"]["t"])
-    assert 0 <= min(charge) < max(charge) <= DOWN["bus"]["capacity"]
-    assert stored["energy"]["storage"]["charged"] > 0
-    # bus absent is the bus shared
-    without = {name: value for name, value in DOWN.items() if name != "bus"}
-    assert total(answered(client, without)) == pytest.approx(totals["shared"], rel=1e-9)
 
 
 def test_figures_of_the_drives_and_links_reach_the_optimiser(client: TestClient) -> None:

@@ -285,17 +285,6 @@ def test_the_table_has_the_measured_energies(client: TestClient, recording: Reco
 
 
 @pytest.mark.long
-def test_the_command_sets_measured_against_predicted(recording: Recording, tmp_path: Path) -> None:
-    file = tmp_path / "log.csv"
-    file.write_bytes(rtde(recording))
-    found = run("evaluate", str(file), "--format", "moves")
-    assert found.returncode == 0, found.stderr
-    head, *rows = found.stdout.decode().splitlines()
-    assert head.split()[0] == "move" and len(rows) == len(recording.moves) + 1
-    assert rows[-1].startswith("total") and all("power" in row and "%" in row for row in rows)
-
-
-@pytest.mark.long
 def test_a_log_that_repeats_has_cycles(client: TestClient, tmp_path: Path) -> None:
     repeated = recorded(ROBOT, TRUTH, moves=4, seed=2, closed=True, cycles=3)
     answer = client.post("/evaluate", content=rtde(repeated), headers=CSV)

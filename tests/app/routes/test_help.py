@@ -14,10 +14,8 @@ from joulepath.app.exceptions.error_types import types_of_error
 from joulepath.app.exceptions.transport import NotFound, PagesNotBuilt
 from joulepath.app.http.problems import path_of
 from joulepath.app.main import create_app
-from tests.app.live import LOCAL, ROOT
+from tests.app.live import LOCAL
 from tests.app.routes.test_problems import refused
-
-SITE = ROOT / "app" / "static" / "help"
 
 
 @pytest.fixture(scope="module")

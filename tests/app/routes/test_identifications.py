@@ -21,7 +21,6 @@ from joulepath.app.api.identifications.route import completed
 from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.dynamics.link_regressor import base_wrench_regressor, body_parameters
 from joulepath.optimizer.exceptions import DeclaredError
 from joulepath.optimizer.identify.errors import (
     MethodNotApplicable,
@@ -286,27 +285,6 @@ def test_a_method_that_the_log_does_not_fit_is_a_problem(
     found = ended(client, logs=[log], method=method, period=5.0)
     assert found.problem is not None
     assert checked(MethodNotApplicable, found.problem).method == method
-
-
-@pytest.mark.long
-def test_links_from_a_log_with_the_wrench_beneath_the_base(client: TestClient) -> None:
-    recording = recorded(ROBOT, TRUTH, moves=8)
-    state = (recording.exact_q, recording.exact_v, recording.a)
-    wrench = base_wrench_regressor(ROBOT.model, *state) @ body_parameters(ROBOT.model)
-    lines = csv_of(recording, without="iP").decode().splitlines()
-    cells = [",".join(f"{each:.6g}" for each in row) for row in wrench]
-    body = "\n".join(f"{a},{b}" for a, b in zip(lines, ["fx,fy,fz,mx,my,mz", *cells], strict=True))
-    answer = client.post("/logs", content=body, params=NOTHING, headers=CSV)
-    assert answer.status_code == 201, answer.text
-    assert "wrench6" in {each["name"] for each in answer.json()["channels"]}
-    result = done(client, logs=[answer.json()["id"]], method="base_wrench")
-    assert result.physical is not None and result.physical.consistent
-    mass = result.document["inertials"]["mass"]["value"]
-    own = [each.mass for each in list(ROBOT.model.inertias)[1:]]
-    assert mass == pytest.approx(own, rel=0.2)
-    links = [each for each in result.parameters if each.sd > 0]
-    assert len(links) == 60
-    assert all(abs(each.value - each.previous) <= FAR * each.sd for each in links)
 
 
 @pytest.mark.long

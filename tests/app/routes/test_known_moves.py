@@ -7,7 +7,6 @@ from __future__ import annotations
 from typing import Any
 
 import orjson
-import pytest
 from starlette.testclient import TestClient
 
 from tests.app.job_clients import ended
@@ -61,15 +60,6 @@ def test_a_cycle_of_which_one_stop_changed_solves_only_the_moves_to_and_from_it(
     fresh = sent(client, a_cycle(0.111, NEAR, other), **{"Cache-Control": "no-cache"})
     assert all(solves(client, fresh))
     assert without_times(edited) == without_times(fresh)
-
-
-@pytest.mark.long
-def test_another_arm_or_cell_has_none_of_them(client: TestClient) -> None:
-    first = sent(client, a_cycle(0.112, NEAR))
-    assert all(solves(client, sent(client, a_cycle(0.113, NEAR))))
-    assert all(solves(client, sent(client, a_cycle(0.112, NEAR, gravity=[0.0, 1.0, -9.7]))))
-    assert not any(solves(client, sent(client, a_cycle(0.112, NEAR))))
-    assert all(solves(client, first))
 
 
 def test_cycles_of_jobs_share_them_with_those_that_are_answered_at_once(client: TestClient) -> None:

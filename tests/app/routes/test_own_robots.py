@@ -12,7 +12,6 @@ from uuid import uuid4
 import mujoco
 import numpy as np
 import pytest
-import yaml
 from starlette.testclient import TestClient
 
 from joulepath.app.api.robots.models import RobotDetail, RobotList
@@ -21,7 +20,6 @@ from joulepath.app.exceptions.stored import RobotExists, TooManyRobots
 from joulepath.app.schemas.examples.own_arm import ARM
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.joint_limits.errors import NoJointLimits
 from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from tests.app.recorded import recorded_service
@@ -72,24 +70,6 @@ def test_the_mjcf_of_a_robot(mine: TestClient) -> None:
         assert named == (joints or list(load_robot(name).joint_names))
         assert (model.dof_armature > 0).all()
     refused(mine.get("/robots/nobody/mjcf"), UnknownRobot)
-
-
-@pytest.mark.long
-def test_the_joint_limits_of_a_robot(mine: TestClient) -> None:
-    """Of an added robot and a bundled one; a lighter payload leaves more."""
-    for name, joint in (("mine", "elbow"), ("ur5e", "elbow_joint")):
-        answer = mine.get(f"/robots/{name}/joint_limits", params={"prefix": "left_"})
-        assert (answer.status_code, answer.headers["content-type"]) == (200, "application/yaml")
-        light = mine.get(f"/robots/{name}/joint_limits", params={"mass": 0.5, "prefix": "left_"})
-        own, lighter = (
-            yaml.safe_load(each.text)["joint_limits"]["left_" + joint] for each in (answer, light)
-        )
-        assert 0 < own["max_acceleration"] <= lighter["max_acceleration"]
-    refused(mine.get("/robots/nobody/joint_limits"), UnknownRobot)
-    error = refused(mine.get("/robots/gen3/joint_limits"), NoJointLimits)
-    assert error["joint"] == "joint_2" and error["torque"] > error["limit"]
-    for wrong in ({"mass": 50}, {"mass": -1}, {"distance": "nan"}, {"prefix": "a b"}, {"other": 1}):
-        refused(mine.get("/robots/ur5e/joint_limits", params=wrong), InvalidRequest)
 
 
 def test_the_robots_of_the_service_stay(client: TestClient) -> None:

@@ -17,13 +17,11 @@ from joulepath.app.api.placement.task import PlacementAnswer
 from joulepath.optimizer.placement.moved_cycle import cycle_at
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
-from tests.app.job_clients import ended, sent
 from tests.app.requests import HOME, PATIENT
 
 Json = dict[str, Any]
 DOWN = [0.0, 1.0, 0.0, 0.0]
 ROUNDING = 1e-12
-ROUNDED = 1e-5
 """Relative scatter of solves of one motion whose targets differ by rounding."""
 
 
@@ -66,27 +64,6 @@ def placed(client: TestClient, body: Json) -> Json:
 def found(client: TestClient) -> Json:
     """What `ASKED` comes to."""
     return placed(client, ASKED)
-
-
-@pytest.mark.long
-def test_a_place_is_accepted_by_its_own_request(client: TestClient, found: Json) -> None:
-    assert found["nominal"] is not None
-    for place in (found["best"], found["nominal"]):
-        (cycle,) = place["cycles"]
-        kept = client.get(cycle["answer"]).json()
-        assert kept["kind"] == "cycle"
-        total = kept["answer"]["energy"]["electrical"]["total"]
-        assert total == pytest.approx(place["energy"], rel=ROUNDED)
-        move = client.get(kept["answer"]["legs"][0]["answer"]).json()
-        assert move["kind"] == "optimize"
-        again = client.post("/cycle", json=cycle["request"] | PATIENT).json()
-        assert again["energy"]["electrical"]["total"] == pytest.approx(total, rel=ROUNDED)
-    listed = client.get("/answers", params={"whole": True, "search": "placement"}).json()
-    own = next(each for each in listed["answers"] if each["id"] == found["id"])
-    assert own["energy"] == pytest.approx(found["best"]["energy"])
-    assert found["saving"] == pytest.approx(
-        1 - found["best"]["energy"] / found["nominal"]["energy"]
-    )
 
 
 def test_a_request_at_a_place_is_the_cycle_at_this_place() -> None:
@@ -202,18 +179,6 @@ def test_no_place_is_a_problem(client: TestClient) -> None:
     problem = answer.json()
     assert problem["type"] == "/problems/no-placement"
     assert problem["reasons"]["reach"] == 2
-
-
-@pytest.mark.long
-def test_a_job_answers_as_the_endpoint_does(client: TestClient, found: Json) -> None:
-    job = ended(client, sent(client, [{"placement": ASKED}]))
-    (request,) = job["requests"]
-    assert request["state"] == "done", request
-    assert request["energy"] == pytest.approx(found["best"]["energy"], rel=ROUNDED)
-    kept = client.get(request["answer"]).json()
-    assert kept["kind"] == "placement"
-    cycle = client.get(kept["answer"]["best"]["cycles"][0]["answer"]).json()
-    assert cycle["kind"] == "cycle"
 
 
 @pytest.mark.long

@@ -22,7 +22,6 @@ from tests.app.requests import move
 from tests.app.routes.test_report import CYCLE
 from tests.identification_logs import csv_of, recorded, truth_of
 
-Json = dict[str, Any]
 ROBOT = load_robot("ur5e")
 # places are written with one digit
 ROUNDING = 0.11

@@ -118,30 +118,6 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
 
 
 @pytest.mark.long
-def test_the_best_motion_to_a_pose_is_hard_to_beat(client: TestClient) -> None:
-    path = begin(client, threshold=10.0)
-    added(client, path, {"optimize": move(duration=4.0)})
-    pose = {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
-    added(client, path, {"optimize": move(goal=pose)})
-    last = suggested(client, path, base="last")
-    assert last["base"]["number"] == 2
-    assert suggested(client, path)["base"]["number"] == 1 + (
-        last["base"]["energy"] < suggested_energy(client, path, 1)
-    )
-    # all branches and durations were open: neither another branch nor another duration can save
-    # more than the gap
-    for entry in steps(last, "branch") + steps(last, "duration"):
-        assert entry["gain"] < 0.01 * last["base"]["energy"]
-    assert len(steps(last, "branch")) == 2
-    assert steps(last, "method") == steps(last, "payload") == []
-    assert not any(entry["threshold_met"] for entry in last["suggestions"])
-
-
-def suggested_energy(client: TestClient, path: str, number: int) -> float:
-    return client.get(f"{path}/iterations/{number}").json()["energy"]
-
-
-@pytest.mark.long
 def test_a_branch_that_was_asked_for_is_opened(client: TestClient) -> None:
     path = begin(client)
     pose = {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
@@ -185,19 +161,6 @@ def test_a_motion_without_two_ends_gets_none(client: TestClient, configurations:
     added(client, path, {"evaluate": {"configurations": configurations, "time_per_segment": 1.0}})
     content = suggested(client, path)
     assert content["suggestions"] == content["not_computed"] == []
-
-
-@pytest.mark.long
-def test_a_long_trajectory_is_taken(client: TestClient) -> None:
-    t = np.linspace(0.0, 3.0, 2000)
-    q = np.array(HOME) + np.multiply.outer(
-        0.5 - 0.5 * np.cos(np.pi * t / 3.0), np.subtract(NEAR, HOME)
-    )
-    path = begin(client, objective="mechanical")
-    step = added(client, path, {"evaluate": {"trajectory": {"t": t.tolist(), "q": q.tolist()}}})
-    assert step["energy"] == step["mechanical"]
-    for entry in steps(suggested(client, path), "method"):
-        assert entry["request"]["optimize"]["duration"] == pytest.approx(3.0)
 
 
 def test_what_there_is_no_time_for_is_listed(client: TestClient, slow: Any) -> None:
