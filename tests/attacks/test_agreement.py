@@ -10,16 +10,12 @@ import numpy as np
 import orjson
 import pytest
 
-from benchmarks.agreement import MOST, request
-from benchmarks.tasks import as_pose, flange
+from benchmarks.agreement import request
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.tightened_limits import WITHIN_TIGHTER
@@ -41,24 +37,11 @@ ISOLATED: Json = {
     "bus": {"mode": "isolated"},
     "collisions": False,
 }
-LIFT: Json = {
-    "start": {"q": [1.27, -1.343, -1.54, -1.797, -0.339, -1.678]},
-    "goal": {"q": [1.75, -1.621, -1.878, -2.295, -0.426, -3.045]},
-    "payload": {"mass": 3, "com": [0, 0, 0.1]},
-    "collisions": False,
-}
 SLOW_TOOL: Json = {
     "start": {"q": [1.386, -2.806, 1.791, -1.512, -0.177, -0.054]},
     "goal": {"q": [-2.052, -2.357, -1.561, -0.231, -2.324, 0.231]},
     "tcp": {"position": [-0.136, 0.036, -0.11], "rpy": [0.998, 0.2, -0.771]},
     "limits": {"tcp_speed": 0.127, "elbow_speed": 0.251},
-    "collisions": False,
-}
-NEAR_A_STRETCHED_SHOULDER = [0.57244, 0.00264, -2.87612, -1.45547, -0.40888, 2.9146, 0.92274]
-REDUNDANT: Json = {
-    "robot": "fr3",
-    "start": {"q": [1.78826, -1.00437, -2.16259, -1.98522, -0.02407, 2.11598, 1.34053]},
-    "payload": {"mass": 1.5, "com": [0.02, 0, 0.06]},
     "collisions": False,
 }
 
@@ -77,25 +60,6 @@ def test_on_an_isolated_bus_no_fixed_duration_needs_less_than_a_free_one() -> No
     assert energy(free) < 148.47  # J: the motion of 1.8677 s that was found before
     for duration in (1.8677, free.duration):
         assert energy(solved(ISOLATED, duration=duration)) > (1 - AGREED) * energy(free)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("index", "known"), long_but([(48, 188.948)], [(39, 386.322), (48, 188.948)])
-)
-def test_sharp_corners_hold_no_motion_in_a_poor_optimum(index: int, known: float) -> None:
-    """On an isolated bus, against the energy [J] known from a fixed duration."""
-    _, body = request(0, index)
-    assert energy(solved(body)) <= known * (1 + MOST)
-
-
-@pytest.mark.long
-def test_near_the_fastest_motion_knots_follow_the_switches_of_jerk() -> None:
-    """On an isolated bus, a move that ends 0.15 % slower than its fastest motion: a front found
-    769.52 J.
-    """
-    _, body = request(0, 69)
-    assert energy(solved(body)) <= 769.52 * (1 + 2 * AGREED)
 
 
 @pytest.mark.parametrize("index", long_but([95], [5, 13, 21, 64, 95]))
@@ -127,21 +91,6 @@ def test_a_cycle_of_one_stop_gives_the_same_energy(index: int) -> None:
     assert found.energy.electrical.total == pytest.approx(energy(solved(body)), rel=AGREED)
 
 
-def test_a_front_ends_with_the_answer_of_optimize() -> None:
-    least = energy(solved(LIFT))
-    front = pareto(to_problem(OptimizeRequest.model_validate(LIFT), DEADLINE), 4)
-    assert (1 - AGREED) * least <= energy(front.points[-1]) <= least
-    # J: that of the fastest motion, which a free duration was kept from coming near to
-    assert least < 29.63
-
-
-@pytest.mark.long
-def test_short_peaks_of_the_tools_speed_are_no_refusal() -> None:
-    found = solved(SLOW_TOOL)
-    assert found.certificate.valid
-    assert energy(found) < (1 + AGREED) * energy(solved(SLOW_TOOL, method="lagrange"))
-
-
 @pytest.mark.long
 def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_limits(
     monkeypatch: pytest.MonkeyPatch,
@@ -150,24 +99,6 @@ def test_a_motion_that_the_certificate_rejects_is_solved_again_within_tighter_li
     found = solved(SLOW_TOOL)
     assert [each.reason for each in found.candidates] == [WITHIN_TIGHTER]
     assert found.certificate.valid and found.certificate.worst_ratio["tcp_speed"] <= 1
-
-
-@pytest.mark.long
-def test_what_is_rejected_twice_is_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sqp_stages, "path_excess", lambda *_: np.zeros(2))
-    monkeypatch.setattr("joulepath.optimizer.search.tightened_limits.LIMIT_RESERVE", -0.02)
-    try:
-        answer = solved(SLOW_TOOL)
-    except (NoTrajectory, DeadlineExceeded):
-        return
-    # the fastest motion, which does not come from these solves
-    assert answer.certificate.valid and answer.status == "feasible"
-
-
-def test_a_pose_needs_no_more_than_a_posture_that_reaches_it() -> None:
-    pose = as_pose(flange(load_robot("fr3"), np.array(NEAR_A_STRETCHED_SHOULDER)))
-    to_posture = solved(REDUNDANT, goal={"q": NEAR_A_STRETCHED_SHOULDER})
-    assert energy(solved(REDUNDANT, goal={"pose": pose})) < (1 + AGREED) * energy(to_posture)
 
 
 @pytest.mark.long

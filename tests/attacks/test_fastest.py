@@ -4,7 +4,6 @@ it is asked for.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 from typing import Any
 
@@ -13,17 +12,10 @@ import pytest
 
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Robot
-from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import pareto
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
+from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import DURATIONS, MethodName, Problem
-from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.solve.methods.fastest_motion import FastestSettings
 from tests.optimizer.clocks import CountingClock
@@ -42,23 +34,14 @@ from tests.selection import long_but
 
 # a move whose minimum-time solve from one start ends at four times the fastest motion
 LOCAL = [-1.477, -1.808, 1.483, 1.913, 0.829, -1.357], [-0.341, -2.823, 1.001, 1.472, 0.493, -2.509]
-# a move that lasts as long as joint 6 needs at 0.05 rad/s
-SLOW = [0.5, -0.3, 0.4, -1.2, -1.1, 0.0], [-0.5, -0.3, -0.4, -1.2, -1.1, 2.0]
 # relative; what counts as the fastest motion may exceed the fastest one by this
 PROVEN = FastestSettings().proven
-ROUNDING = 1e-9
 # a time in which no arm gets anywhere [s]
 TOO_SHORT = 0.05
 
 
 def local(**given: Any) -> Problem:
     return problem(*map(np.array, LOCAL), **given)
-
-
-def slow() -> Problem:
-    v_max = ROBOT.limits.v_max.copy()
-    v_max[5] = 0.05
-    return problem(*map(np.array, SLOW), limits=replace(ROBOT.limits, v_max=v_max))
 
 
 def refused(asked: Problem, duration: float = TOO_SHORT) -> DurationTooShort:
@@ -100,43 +83,6 @@ def test_one_bad_local_optimum_is_not_the_shortest_duration() -> None:
     assert exact.certificate.valid
     # it stands as it was found, and is not sold as the optimum
     assert exact.status == "feasible"
-
-
-@pytest.mark.long
-def test_a_baseline_within_the_limits_is_no_faster_than_the_shortest_duration() -> None:
-    asked = slow()
-    ruckig = next(each for each in optimize(asked).baselines if each.name == "ruckig")
-    assert ruckig.within_limits and ruckig.duration == pytest.approx(40.03, abs=0.01)
-    error = refused(asked, 39.0)
-    assert error.proven and named(error) <= ruckig.duration * (1 + PROVEN)
-    answer = optimize(replace(asked, duration_max=41.0))
-    assert answer.certificate.valid and answer.duration <= 41.0
-    assert_answered(asked, error)
-
-
-@pytest.mark.long
-def test_a_front_begins_at_the_fastest_motion() -> None:
-    front = pareto(local(), 5)
-    assert front.status == "optimal"
-    assert front.shortest <= 0.7311 and front.points[0].duration == front.shortest
-    # the optimum of this duration, not just a motion of it
-    assert front.points[0].energy.electrical.total == pytest.approx(76.74, rel=1e-3)
-    assert len(front.points) == 5
-
-
-@pytest.mark.long
-def test_a_cycle_takes_any_time_from_the_fastest_one_on() -> None:
-    start, goal = map(np.array, LOCAL)
-    arm = Arm(robot=ROBOT, collisions=False)
-    asked = Cycle(arm=arm, start=start, stops=[Stop(name="there", target=goal)])
-    with pytest.raises(CycleTooShort) as caught:
-        plan_cycle(replace(asked, **fixed(1.4)))
-    shortest = caught.value.shortest
-    assert shortest <= 2 * 0.7311
-    for duration in (shortest, 1.65):
-        found = plan_cycle(replace(asked, **fixed(duration)))
-        assert found.duration == pytest.approx(duration, rel=ROUNDING)
-        assert all(move.solution.certificate.valid for move in found.moves)
 
 
 @pytest.mark.long
@@ -187,37 +133,6 @@ MOVES: dict[str, Problem] = {
 @pytest.mark.parametrize("name", long_but(["lagrange", "uniform_scaling"], MOVES))
 def test_what_is_named_is_answered(name: str) -> None:
     assert_answered(MOVES[name], refused(MOVES[name]))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name", long_but(["panda"], ["panda", "ur20", "kr10_r1100", "xarm7", "ur3e", "fr3"])
-)
-def test_other_robots(name: str) -> None:
-    robot = load_robot(name)
-    rng = np.random.default_rng(5)
-    start, goal = rng.uniform(*_ranges(robot), (2, robot.nq))
-    payload = Payload(0.9 * robot.rated_payload, np.array([0.0, 0.0, 0.08]))
-    asked = Problem(
-        arm=Arm(robot=robot, collisions=False, payload=payload),
-        start=start,
-        goal=goal,
-        deadline=300.0,
-    )
-    error = refused(asked)
-    # these moves are as fast as the joints alone, or hardly slower
-    assert named(error) <= 1.003 * error.bound
-    assert_answered(asked, error)
-
-
-def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Ranges of joint positions (nq,) [rad] within ±2.5 rad; where a joint's range has none of
-    that, its own.
-    """
-    lower, upper = np.maximum(robot.limits.q_min, -2.5), np.minimum(robot.limits.q_max, 2.5)
-    return np.where(lower < upper, lower, robot.limits.q_min), np.where(
-        lower < upper, upper, robot.limits.q_max
-    )
 
 
 def test_equal_ends_take_the_least_duration() -> None:
@@ -330,9 +245,3 @@ def test_the_words_of_a_refusal_are_enough() -> None:
     words = str(refused(asked))
     told = float(next(each for each in words.split() if each[0].isdigit()))
     assert optimize(replace(asked, **fixed(told))).certificate.valid
-
-
-@pytest.mark.long
-def test_a_refusal_is_the_same_whatever_was_asked_for() -> None:
-    errors = [refused(local(), duration) for duration in (0.1, 0.3, 0.7301)]
-    assert all(a.shortest == b.shortest for a, b in itertools.pairwise(errors))

@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.slow_moves import MOST_EXCESS, NEAR, compare, other_searches, slow_problem
+from benchmarks.slow_moves import MOST_EXCESS, compare, slow_problem
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.solution import Solution
 from tests.compilers import with_compiler
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
+from tests.optimizer.moves import GOAL, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but
 
 # a move of which joint 6 is limited to so many rad/s, and the least energies [J] that are known of
@@ -64,17 +63,6 @@ def test_a_slow_joint_ramps_as_fast_as_it_can(speed: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("index", long_but([1], range(3)))
-def test_no_duration_near_the_answers_needs_less(index: int) -> None:
-    """One move of each kind: all joints slow, one joint slow, a tenth of all limits of speed."""
-    _, task = slow_problem(0, index)
-    found = optimize(task)
-    others = dict(other_searches(task, found.duration))
-    assert {f"{factor:g} T" for factor in NEAR if factor > 1} < set(others)
-    assert energy(found) < min(others.values()) * (1 + MOST_EXCESS)
-
-
-@pytest.mark.long
 def test_the_excess_of_slow_moves_is_small() -> None:
     assert compare(seed=1, count=30, json=None) == 0
 
@@ -100,25 +88,6 @@ def test_much_more_time_than_a_move_needs_is_used(
     assert energy(optimize(problem(START, goal, **fixed(duration)))) < least * (1 + MOST_EXCESS)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", long_but(["panda"], ["panda", "ur20"]))
-def test_other_robots_ramp_as_fast_as_they_can(name: str) -> None:
-    robot = load_robot(name)
-    lower, upper = np.maximum(robot.limits.q_min, -2.0), np.minimum(robot.limits.q_max, 2.0)
-    start, goal = np.random.default_rng(0).uniform(lower, upper, (2, robot.nq))
-    task = problem(
-        start, goal, robot=robot, limits=replace(robot.limits, v_max=np.full(robot.nq, 0.25))
-    )
-    found = optimize(task)
-    assert found.status == "optimal"
-    assert found.duration < shortest(task) * (1 + RAMPS)
-
-
-def test_a_payload_is_moved_slowly() -> None:
-    found = optimize(problem(START, GOAL, payload=PAYLOAD, limits=limits(v_max=0.1)))
-    assert energy(found) < 449.3 * (1 + MOST_EXCESS)
-
-
 @pytest.mark.parametrize(
     "bus",
     long_but(
@@ -133,22 +102,6 @@ def test_other_buses_ramp_as_fast(bus: Bus) -> None:
     task = slow(0.1, bus=bus)
     found = optimize(task)
     assert found.duration < shortest(task) * (1 + RAMPS)
-
-
-@pytest.mark.long
-def test_a_cycle_that_leaves_no_time_to_wait() -> None:
-    task = slow(0.1)
-    found = optimize(replace(task, dwell=Dwell(time=1.0005 * shortest(task))))
-    assert energy(found) < LEAST_KNOWN[0.1] * (1 + MOST_EXCESS)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("index", long_but([0], [0, 2]))
-def test_a_longest_duration_beyond_the_answers_changes_little(index: int) -> None:
-    _, task = slow_problem(2, index)
-    found = optimize(task)
-    again = optimize(replace(task, duration_max=1.02 * found.duration))
-    assert energy(again) == pytest.approx(energy(found), rel=MOST_EXCESS)
 
 
 @pytest.mark.parametrize(

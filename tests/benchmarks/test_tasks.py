@@ -12,7 +12,6 @@ from joulepath.models.robot import Robot
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 
 POSE_ERROR = 1e-12  # rounding of a few products of rotations
-TORQUE_ERROR = 1e-9  # N·m
 
 
 @pytest.fixture

@@ -33,7 +33,6 @@ BALANCE = 1e-3  # of the total: the identity of energy that is promised
 # relative; the two energies are sums over panels of their own, with corners of |x| inside (see
 # QUADRATURE in test_baselines); a motion that is its own baseline differs by 1e-5 from itself
 NOT_BEATEN = 5e-5
-ONE_PERCENT = 0.01  # by which a B-spline may exceed the time-scaled motion in the same duration
 SYMMETRY = (
     2e-3  # relative; two runs whose optima are mirror images, reached along ways that are not
 )

@@ -37,7 +37,6 @@ from joulepath.optimizer.problem.scene import Mesh, Obstacle, Scene
 from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.finishing_time import finishing_time
-from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
@@ -150,30 +149,6 @@ def test_a_front_does_not_overrun(clock: WorkClock, kind: str) -> None:
     assert 0 < clock.now < 1.0 + OVERRUN
 
 
-@pytest.mark.long
-def test_a_change_does_not_overrun(clock: WorkClock) -> None:
-    """Two minutes of motion, certified on the changed arm and optimised for it, in a second of
-    work.
-    """
-    base = optimize(due(HARD["slow joints"], 60.0), clock)
-    began = clock.now
-    with suppress(DeadlineExceeded):
-        what_if(base, due(HARD["slow joints"], 0.2), clock)
-    assert clock.now - began < 0.2 + OVERRUN
-
-
-@pytest.mark.long
-def test_what_was_verified_by_then_is_answered(clock: WorkClock) -> None:
-    """Many candidates, of which the time is enough for some."""
-    whole = optimize(due(HARD["mechanical"], 1e6), clock)
-    needed = clock.now
-    answer = optimize(due(HARD["mechanical"], needed / 4), clock)
-    assert answer.status == "feasible" and answer.certificate.valid
-    assert any(each.status == "unvisited" for each in answer.candidates)
-    assert answer.energy.mechanical.total >= whole.energy.mechanical.total * (1 - 1e-9)
-    assert clock.now - needed < needed / 4 + OVERRUN
-
-
 def test_what_the_deadline_left_coarse_is_not_optimal() -> None:
     """The motion with few control points is found and proven best of all branches, but its
     refinement is cut short.
@@ -186,23 +161,6 @@ def test_what_the_deadline_left_coarse_is_not_optimal() -> None:
     optimal = [each.energy.electrical.total for each in found if each.status == "optimal"]
     assert len(optimal) and len(optimal) < len(found)
     assert max(optimal) == pytest.approx(least, rel=ROUNDING)
-
-
-@pytest.mark.long
-def test_the_request_that_was_killed_is_answered(clock: WorkClock) -> None:
-    """A TCP at 1 mm/s: three minutes of motion, certified at 180,000 instants, within two seconds
-    of work.
-    """
-    asked = problem(
-        start=np.array([0, -1.57, 1.57, -1.57, -1.57, 0]),
-        goal=np.array([0.3, -1.4, 1.4, -1.5, -1.57, 0.2]),
-        tcp_speed=1e-3,
-        sample_period=0.01,
-        deadline=2.0,
-    )
-    answer = optimize(asked, clock)
-    assert answer.certificate.valid and answer.duration > 100
-    assert clock.now < 2.0 + OVERRUN
 
 
 def test_a_quadratic_program_gets_no_more_than_the_time_left(

@@ -71,19 +71,6 @@ def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
         assert least * (1 - ROUNDING) <= refusal.value.shortest < 1.02 * least
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("less", "more"), [(0.8, 2.0), (0.8, 1.2), (1.2, 2.0)])
-def test_more_time_is_never_dearer_without_a_price_of_time(less: float, more: float) -> None:
-    """The mechanical objective, which a longer duration can only help: up to 2 s is no worse than
-    up to 1 s.
-    """
-    fast, slow = (
-        solved(problem(objective="mechanical", duration_max=T)).energy.mechanical.total
-        for T in (less, more)
-    )
-    assert slow <= fast * (1 + CONVERGED)
-
-
 def test_no_time_at_all_is_a_deadline_exceeded() -> None:
     clock = CountingClock()
     with pytest.raises(DeadlineExceeded) as refusal:
@@ -123,16 +110,6 @@ def test_a_load_that_cannot_be_held_is_told() -> None:
         (ROBOT.joint_names[1], needed, 0.9 * needed)
     )
     assert "lighten the payload" in str(error)
-
-
-def test_an_arm_without_a_payload_is_not_told_to_lighten_it() -> None:
-    stretched = np.array([0.0, 0.0, 0.0, 0.0, -1.57, 0.0])
-    weak = problem(
-        START, stretched, payload=Payload(0.0), limits=limits(tau_max=[150, 20, 150, 28, 28, 28])
-    )
-    with pytest.raises(TorqueInfeasible, match="without a payload: relax") as refusal:
-        optimize(weak)
-    assert "lighten" not in str(refusal.value)
 
 
 def test_a_payload_beyond_the_rating_is_refused() -> None:

@@ -151,14 +151,6 @@ def test_relaxing_limits_never_costs_energy(duration: float | None) -> None:
         ), name
 
 
-def test_heavier_loads_cost_more() -> None:
-    totals = [
-        solved(problem(payload=Payload(mass, np.array([0, 0, 0.1])))).energy.electrical.total
-        for mass in (0.0, 2.0, 5.0)
-    ]
-    assert totals[0] < totals[1] < totals[2]
-
-
 def test_friction_laws_are_told_apart() -> None:
     """Plain and curved friction have different coefficients; the answer is of the law that was
     asked for.

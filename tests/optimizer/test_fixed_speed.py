@@ -12,15 +12,10 @@ import pytest
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.stop_path import StopPath
-from joulepath.optimizer.problem.stops import Stop
 from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
 from joulepath.optimizer.result.solution import Solution
-from tests.optimizer.moves import AMPLE
-from tests.optimizer.test_tool_path import ARM, HOME, poses_of
+from tests.optimizer.test_tool_path import ARM, poses_of
 from tests.optimizer.tool_paths import along, moved
 from tests.refusals import refusal_of
 from tests.selection import long_but
@@ -117,23 +112,6 @@ def test_a_speed_beyond_the_joints_says_what_to_do() -> None:
     with pytest.raises(NoTrajectory) as refusal:
         optimize(replace(CORNER, tool_path=replace(path_of(CORNER), fixed_speed=0.6)))
     assert "lower speed" in refusal.value.candidates[0].reason
-
-
-@pytest.mark.long
-def test_a_cycle_holds_it_in_a_given_time() -> None:
-    bead = StopPath(goal=moved([0.0, 0.25, 0.0]), path=ToolPath(fixed_speed=0.1, ramp=RAMP))
-    stop = Stop(name="bead", target=moved([0.0, 0.05, 0.0]), path=bead)
-    asked = Cycle(arm=ARM, start=HOME, stops=[stop], windings=False, deadline=AMPLE)
-    own = plan_cycle(asked)
-    time = own.duration + 0.5
-    found = plan_cycle(replace(asked, duration_min=time, duration_max=time))
-    assert found.duration == pytest.approx(time)
-    for round_ in (own, found):
-        (path,) = (move for move in round_.moves if move.planned.kind == "path")
-        assert (
-            path.solution.certificate.valid
-            and path.solution.certificate.worst_ratio["path_speed"] <= 1
-        )
 
 
 @pytest.mark.parametrize(

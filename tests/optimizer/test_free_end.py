@@ -24,16 +24,14 @@ from joulepath.optimizer.kinematics.tool_path.turning_grid import (
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.errors import PathInfeasible
 from joulepath.optimizer.solve.methods.end_angle import try_angles
 from tests.optimizer.moves import ROBOT, tcp_pose
-from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base
+from tests.optimizer.test_turning_path import Z, down
 from tests.optimizer.tool_paths import HOME, along, moved
 from tests.refusals import refusal_of
 from tests.selection import long_but
@@ -45,35 +43,6 @@ def free(pose: Pose) -> ConeOrientedPose:
 
 def turned_as_little_as_may_be(goal: Pose, before: Pose) -> Pose:
     return free(goal).with_orientation(nearest_orientation(free(goal), before.T[:3, :3]))
-
-
-def outwards(goal: Any) -> Problem:
-    """A line away from the base, with a nozzle that points back at it in the beginning."""
-    return over_the_base(
-        start=down(0.45, -0.12, 0.25), goal=goal, branch=BranchFilter("right", "up", "flip")
-    )
-
-
-@pytest.fixture(scope="module")
-def stretched() -> Solution:
-    return optimize(outwards(free(down(0.8, -0.12, 0.25))))
-
-
-@pytest.mark.long
-def test_a_goal_out_of_reach_is_reached_with_a_turn(stretched: Solution) -> None:
-    with pytest.raises(PathInfeasible):
-        optimize(outwards(down(0.8, -0.12, 0.25)))
-    assert (
-        stretched.certificate.valid and stretched.lower_bound <= stretched.energy.electrical.total
-    )
-    T = pose_of(ARM, stretched.goal.q[None])[0]
-    assert np.abs(T[:3, 3] - [0.8, -0.12, 0.25]).max() < 1e-6 and T[2, 2] == pytest.approx(
-        -1.0, abs=1e-9
-    )
-    assert abs(Rotation.from_matrix(down(0, 0, 0).T[:3, :3].T @ T[:3, :3]).magnitude()) > 0.2, (
-        "the tool has turned"
-    )
-    assert np.array_equal(stretched.goal.q, stretched.trajectory.spline.control_points[-1])
 
 
 @pytest.mark.long
@@ -99,19 +68,6 @@ def test_a_free_end_never_needs_more_than_the_one_without_a_turn(seed: int) -> N
         start, way = T[0, :3, 3], T[-1, :3, 3] - T[0, :3, 3]
         off = T[:, :3, 3] - start - np.outer((T[:, :3, 3] - start) @ way / (way @ way), way)
         assert np.linalg.norm(off, axis=1).max() < path.position_tolerance
-
-
-@pytest.mark.long
-def test_past_a_corner_the_free_end_is_no_worse_than_a_given_one() -> None:
-    """Angles are compared by motions of the same fineness: once, a coarse one at a better angle
-    lost to a fine one.
-    """
-    rng = np.random.default_rng(1)
-    turn = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3))
-    goal, via = moved(rng.uniform(-0.2, 0.2, 3), turn), moved(rng.uniform(-0.2, 0.2, 3))
-    path = ToolPath(via=[via], blend=0.02, about=Z)
-    given = optimize(along(goal, path=path)).energy.electrical.total
-    assert optimize(along(free(goal), path=path)).energy.electrical.total <= given * (1 + 2e-3)
 
 
 @pytest.mark.long

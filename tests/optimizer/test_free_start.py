@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from joulepath.optimizer.bounds.free_ends_bound import bound_between_free_ends
 from joulepath.optimizer.deadline import NEVER
-from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError, UnreachablePose
-from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
+from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.branches import BranchFilter
@@ -47,25 +46,6 @@ def inwards(start: Any) -> Problem:
 @pytest.fixture(scope="module")
 def retracted() -> Solution:
     return optimize(inwards(free(FAR_AWAY)))
-
-
-@pytest.mark.long
-def test_a_start_out_of_reach_is_left_with_a_turn(retracted: Solution) -> None:
-    with pytest.raises(UnreachablePose):
-        optimize(inwards(FAR_AWAY))
-    assert (
-        retracted.certificate.valid
-        and 0 < retracted.lower_bound <= retracted.energy.electrical.total
-    )
-    first, last = pose_of(ARM, np.array([retracted.start.q, retracted.goal.q]))
-    assert np.abs(first[:3, 3] - FAR_AWAY.T[:3, 3]).max() < 1e-6 and first[2, 2] == pytest.approx(
-        -1.0, abs=1e-9
-    )
-    assert abs(Rotation.from_matrix(FAR_AWAY.T[:3, :3].T @ first[:3, :3]).magnitude()) > 0.2, (
-        "the tool is turned"
-    )
-    assert np.abs(last - down(0.45, -0.12, 0.25).T).max() < 1e-6, "and turned back at the end"
-    assert np.array_equal(retracted.start.q, retracted.trajectory.spline.control_points[0])
 
 
 @pytest.mark.long

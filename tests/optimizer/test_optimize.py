@@ -5,8 +5,6 @@ what others do.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import replace
 from itertools import cycle, product
 from typing import Any
 
@@ -16,18 +14,14 @@ import pytest
 from scipy.interpolate import BSpline
 
 from joulepath.optimizer.exceptions import JoulepathError
-from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
+from joulepath.optimizer.search.errors import TorqueInfeasible
 from tests.optimizer.answers import (
     CONDITIONS,
     CONVERGED,
-    ONE_PERCENT,
     ROUNDING,
     shortest,
     solved,
-    total,
 )
 from tests.optimizer.moves import (
     GOAL,
@@ -102,33 +96,6 @@ def test_short_moves_are_not_beaten(name: str) -> None:
         )
 
 
-def pairs(objective: str) -> Iterator[tuple[Problem, Problem]]:
-    """Problems that differ in the method only, the second in the first's duration and between the
-    same joints.
-    """
-    for k, (start, goal) in enumerate(random_moves(42, 6)):
-        given = list(CONDITIONS.values())[k]
-        longest = None if objective == "electrical" else 1.6 * shortest(start, goal, **given)
-        free = problem(start, goal, objective=objective, duration_max=longest, **given)
-        yield free, replace(free, method="time_scaling")
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("objective", long_but(["electrical"], ["electrical", "mechanical"]))
-def test_a_bspline_spends_no_more_than_a_time_scaled_motion(objective: str) -> None:
-    """In the same duration: the straight line is one of its choices."""
-    compared = 0
-    for free, line in pairs(objective):
-        ours = solved(free)
-        try:
-            theirs = solved(replace(line, **fixed(ours.duration)))
-        except DurationTooShort:
-            continue  # along the line there may be no motion as fast
-        assert total(ours, free) <= total(theirs, line) * (1 + ONE_PERCENT)
-        compared += 1
-    assert compared >= 4
-
-
 def test_the_trajectory_is_that_of_the_spline() -> None:
     """Samples from SciPy's spline, torques from Pinocchio, power from the definition; Σ P Δt is the
     energy.
@@ -163,30 +130,6 @@ def test_the_trajectory_is_that_of_the_spline() -> None:
     assert solution.energy.mean_power == pytest.approx(
         electrical.total / solution.duration, rel=ROUNDING
     )
-
-
-@pytest.mark.long
-def test_regeneration_gives_energy_back() -> None:
-    """A load let down by a metre: what is recovered is negative and lowers the total; more of it
-    lowers it more.
-    """
-    high, low = (
-        np.array([0.0, -1.9, 0.9, -1.0, -1.57, 0.0]),
-        np.array([0.0, -0.6, 0.9, -1.0, -1.57, 0.0]),
-    )
-    totals = []
-    for regeneration in (0.0, 0.4, 1.0):
-        robot = replace(
-            ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0, regeneration=regeneration)
-        )
-        electrical = solved(
-            problem(high, low, robot=robot, payload=Payload(mass=5.0))
-        ).energy.electrical
-        assert electrical.recovered == pytest.approx(
-            -regeneration * electrical.braking, rel=ROUNDING, abs=0
-        )
-        totals.append(electrical.total)
-    assert totals[0] > totals[1] > totals[2]
 
 
 @pytest.mark.parametrize(

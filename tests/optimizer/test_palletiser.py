@@ -21,12 +21,10 @@ from joulepath import (
     Stop,
     ToolPath,
     evaluate,
-    export,
     identify,
     inverse_kinematics,
     optimize,
     place,
-    plan_cycle,
 )
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import collision_model
@@ -128,17 +126,6 @@ def test_boxes_keep_the_configurations_of_a_pose(arm: Arm) -> None:
         inside = centre + rng.uniform(-1, 1, (20, 4)) * half
         least = boxes.least_potential(centre[None], half[None])[0]
         assert least <= min(plant.potential(each) for each in inside)
-
-
-@pytest.mark.long
-def test_a_cycle_is_planned_and_exported(arm: Arm) -> None:
-    pick = Stop(name="pick", target=Pose(tcp_pose(arm, START)))
-    place = Stop(name="place", target=ConeOrientedPose(tcp_pose(arm, GOAL)[:3, 3]))
-    planned = plan_cycle(
-        Cycle(arm=arm, start=START, stops=(pick, place), deadline=20.0), progress=False
-    )
-    assert 0 <= planned.lower_bound <= planned.energies.of("electrical")
-    assert b"a4" in export(planned, "ros2").content
 
 
 def test_derivatives_are_those_of_finite_differences(arm: Arm) -> None:

@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.pareto import PARETO, pareto
-from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.dwell import Dwell
@@ -155,20 +154,6 @@ def test_what_lies_between_passes_within_the_rectangles(
 
 
 @pytest.mark.long
-def test_ends_at_the_longest_duration_where_that_costs_least() -> None:
-    """Mechanical work has no idle power: the smoothed cost must not end it early."""
-    asked = replace(mechanical(), method="time_scaling")
-    longest = optimize(replace(asked, **fixed(3.0)))
-    assert objective(asked, longest) < 0.97 * objective(
-        asked, optimize(replace(asked, **fixed(1.65)))
-    )
-    assert objective(asked, optimize(asked)) <= objective(asked, longest) * (1 + LOCAL)
-    assert objective(asked, pareto(asked, 3, still).points[-1]) <= objective(asked, longest) * (
-        1 + LOCAL
-    )
-
-
-@pytest.mark.long
 def test_jumps_are_found_where_they_are() -> None:
     """A candidate that is slower to reach and far cheaper takes over at its own fastest motion."""
     front = pareto(jumping(), 12, still)
@@ -192,35 +177,6 @@ def test_keeps_to_the_range_asked_for() -> None:
 def test_no_front_where_every_motion_takes_longer() -> None:
     with pytest.raises(DurationTooShort):
         pareto(replace(joints(), duration_max=0.1), 3)
-
-
-# between these the minimum-time solve finds no motion, though there are some
-HARD = problem(
-    np.array([0, -1.57, 1.57, -1.57, -1.57, 0]), np.array([1.2, -0.9, 1.3, -1.9, -1.57, 0.4])
-)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"limits": limits(tau_max=[45, 45, 45, 20, 20, 20])},
-        pytest.param(
-            {"payload": Payload(mass=5.0, com=np.array([0.0, 0.0, 2.8]))}, marks=pytest.mark.long
-        ),
-    ],
-    ids=["weak", "far"],
-)
-def test_a_front_where_the_fastest_motion_is_not_found_at_once(given: dict[str, Any]) -> None:
-    """Where there is an answer there is a front, and it ends with a motion as good as the
-    answer."""
-    asked = changed(HARD, **given)
-    front = pareto(asked, 2, still)
-    assert all(point.certificate.valid for point in front.points)
-    answer = optimize(asked)
-    assert front.points[-1].energy.electrical.total <= answer.energy.electrical.total * (1 + LOCAL)
-    assert front.shortest <= answer.duration * (1 + SAME)
-    assert front.points[0].duration == pytest.approx(front.shortest, rel=SAME)
 
 
 @pytest.mark.parametrize(("fields", "n"), [({}, 1), ({}, 101), (fixed(2.0), 5)])
@@ -314,17 +270,6 @@ def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
                 pareto(replace(asked, deadline=float(readings)), 100, CountingClock()).status
                 == "feasible"
             )
-
-
-@pytest.mark.long
-def test_a_front_whose_fastest_motion_was_cut_short_is_not_optimal() -> None:
-    """The first search has but a share of the time."""
-    asked = problem(HOME, HOME + np.array([0.9, 0.4, -0.5, 0.3, 0.2, -0.6]))
-    whole = pareto(asked, 4, still)
-    for readings in range(200, 280, 8):
-        with suppress(DeadlineExceeded):
-            front = pareto(replace(asked, deadline=float(readings)), 4, CountingClock())
-            assert front.status == "feasible" or len(front.points) == len(whole.points)
 
 
 @pytest.mark.parametrize("readings", [3, 10, 100, 400])

@@ -94,18 +94,6 @@ def test_a_cycle_ends_with_its_answer() -> None:
     )
 
 
-@pytest.mark.long
-def test_a_cycle_of_another_time_tells_none_of_its_own() -> None:
-    """In its own time it needs less than in the time that is asked for: that is no answer."""
-    longer = 1.5 * plan_cycle(pick_and_place(1, 2, method="time_scaling")).duration
-    events: list[Event] = []
-    asked = pick_and_place(1, 2, method="time_scaling", duration_min=longer, duration_max=longer)
-    found = plan_cycle(asked, tell=events.append)
-    assert [each.energy for each in goes_forward(events)] == [
-        pytest.approx(sum(each.energy for each in found.moves))
-    ]
-
-
 def test_a_front_tells_its_durations() -> None:
     events: list[Event] = []
     front = pareto(problem(HOME, GOAL, method="time_scaling"), 4, tell=events.append)

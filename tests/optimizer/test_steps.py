@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 
 import joulepath
-from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
-from joulepath.optimizer.excitation.excite import excite
 from joulepath.optimizer.identify.logs.log import Log
 from tests.identification_logs import csv_of, recorded, truth_of
 from tests.selection import long_but
@@ -120,10 +118,3 @@ def test_an_identification_tells_its_fits() -> None:
 def read(content: bytes, robot: joulepath.Robot) -> Log:
     options = joulepath.LogOptions(payload=joulepath.Payload())
     return joulepath.read_log(content, robot, options).log
-
-
-@pytest.mark.long
-def test_an_excitation_tells_its_starts(arm: joulepath.Arm) -> None:
-    asked = ExcitationProblem(arm=arm, starts=2, deadline=100.0, period=5.0, harmonics=2)
-    events = told(lambda tell: excite(asked, tell))
-    assert [each.done for each in events] == [0, 1, 2] and events[0].total == 2

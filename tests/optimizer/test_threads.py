@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,19 +16,9 @@ from threadpoolctl import threadpool_limits
 
 from joulepath.optimizer.collision.planner import path_planner
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.solve.methods import polynomial_ga
 from tests.optimizer.concurrent_work import Work, all_work, behind_a_post, fingerprint
 
 THREADS = 8
-# work for every thread, half a second in all, and work for one thread each
-QUICK = (
-    "out of reach",
-    "replay with storage",
-    "replayed log",
-    "inverse kinematics 1",
-)
-SLOW = ("post", "lower post", "genetic algorithm", "lighter load")
-FEW_GENERATIONS = 20
 # s: ample for a machine that is busy with other things; a quiet one needs a tenth
 PATIENCE = 1200.0
 
@@ -83,19 +72,6 @@ def assert_as_alone(shares: Sequence[Sequence[Work]]) -> None:
 
 def shuffled(works: Sequence[Work], seed: int) -> list[Work]:
     return random.Random(seed).sample(list(works), len(works))
-
-
-@pytest.mark.long
-@pytest.mark.timeout(2 * PATIENCE)
-def test_threads_give_what_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every thread does the same quick work; the rest goes round. Two threads plan paths at the
-    same time.
-    """
-    settings = replace(polynomial_ga.POLYNOMIAL_GA, generations=FEW_GENERATIONS)
-    monkeypatch.setattr(polynomial_ga, "POLYNOMIAL_GA", settings)
-    works = {each.name: each for each in all_work()}
-    quick = [works[name] for name in QUICK]
-    assert_as_alone([[works[name], *shuffled(quick, k)] for k, name in enumerate(SLOW)])
 
 
 @pytest.mark.long

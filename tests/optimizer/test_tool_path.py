@@ -137,22 +137,6 @@ def test_three_poses_on_a_line_are_no_arc() -> None:
             optimize(along(moved([0.0, 0.2, 0.0]), path=path))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("corners", [5, 10])
-def test_many_tight_corners_are_followed(corners: int) -> None:
-    """A zigzag of lines of 0.1 m and more, with corners of 5 mm."""
-    turns = [
-        moved([-0.1 * (1 - k % 2), 0.4 * (k + 1) / (corners + 1), 0.0]) for k in range(corners + 1)
-    ]
-    found = optimize(along(turns[-1], path=ToolPath(via=turns[:-1], blend=0.005)))
-    assert found.certificate.valid and found.certificate.worst_ratio["path_position"] <= 1
-    for corner in turns[:-1]:
-        assert np.linalg.norm(poses_of(found)[:, :3, 3] - corner.T[:3, 3], axis=1).min() < 0.005
-    even = found.baselines[0]
-    less = 1 - found.energy.electrical.total / even.electrical
-    assert less > 0.1, "an even speed is as slow everywhere as the corners need"
-
-
 def test_a_pose_finds_the_best_branch() -> None:
     start, goal = moved([0.0, 0.0, 0.0]), moved([0.0, 0.0, -0.1])
     found, given = optimize(along(goal, start)), optimize(along(goal))
@@ -256,21 +240,6 @@ def test_seven_joints_follow_a_line() -> None:
     assert found.certificate.valid and found.certificate.worst_ratio["path_position"] < 1
 
 
-@pytest.mark.long
-def test_what_is_out_of_reach_says_how_far_each_branch_gets() -> None:
-    with pytest.raises(PathInfeasible) as refusal:
-        optimize(along(moved([0.0, -1.0, 0.0]), moved([0.0, 0.0, 0.0])))
-    error = refusal.value
-    assert len(error.attempts) == 8 and {each.reason for each in error.attempts} == {"unreachable"}
-    followed = [each.followed for each in error.attempts]
-    assert followed == sorted(followed, reverse=True)
-    assert error.length == pytest.approx(1.0)
-    # a little less is followed
-    assert optimize(
-        along(moved([0.0, 0.02 - followed[0], 0.0]), moved([0.0, 0.0, 0.0]))
-    ).certificate.valid
-
-
 def test_a_joint_range_in_the_way_is_named() -> None:
     bounds = limits(q_min=HOME - 0.3, q_max=HOME + 0.3)
     with pytest.raises(PathInfeasible) as refusal:
@@ -351,14 +320,6 @@ def test_random_lines_are_followed_or_refused(seed: int) -> None:
         found.certificate.worst_ratio["path_position"] <= 1
         and found.certificate.worst_ratio["path_rotation"] <= 1
     )
-
-
-@pytest.mark.long
-def test_work_without_friction_takes_the_longest_time() -> None:
-    given = {"objective": "mechanical", "duration_max": 2.0}
-    assert optimize(
-        along(moved([0.0, 0.3, -0.1]), **given)
-    ).trajectory.spline.duration == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("duration", long_but([60.0], [20.0, 60.0, 300.0]))

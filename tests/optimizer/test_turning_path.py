@@ -147,21 +147,6 @@ def test_a_turning_is_the_shortest_of_all_on_its_sheet() -> None:
     )
 
 
-@pytest.mark.long
-def test_what_no_turning_reaches_says_how_far_it_gets() -> None:
-    with pytest.raises(PathInfeasible) as refusal:
-        optimize(over_the_base(goal=down(-1.4, 0.12, 0.25)))
-    (fixed,) = _attempts(ToolPath())
-    (turned,) = refusal.value.attempts
-    assert fixed.followed < 0.5 < turned.followed < 0.9
-
-
-def _attempts(path: ToolPath) -> list[Any]:
-    with pytest.raises(PathInfeasible) as refusal:
-        optimize(over_the_base(goal=down(-1.4, 0.12, 0.25), path=path))
-    return refusal.value.attempts
-
-
 @pytest.mark.parametrize("about", [(0.0, 0.0, 0.0), (np.nan, 0.0, 1.0), (1.0, 0.0)])
 def test_a_wrong_axis_is_refused(about: Any) -> None:
     with refusal_of("path.tolerance.about"):

@@ -31,13 +31,6 @@ class Convention:
         return np.asarray(self.senses * (q - self.zeros))
 
 
-def any_convention(nq: int, rng: np.random.Generator) -> Convention:
-    """Any senses, zero positions and axes of the links' frames; the base keeps its axes."""
-    frames = [np.eye(3), *(pin.exp3(rng.normal(size=3)) for _ in range(nq))]
-    zeros = rng.uniform(-np.pi, np.pi, nq)
-    return Convention(rng.choice([-1.0, 1.0], nq), zeros, np.array(frames))
-
-
 def right_angled(nq: int, rng: np.random.Generator) -> Convention:
     """As a designer draws it: zero positions and frames at quarter turns."""
     frames = [np.eye(3), *(_quarters(rng) for _ in range(nq))]

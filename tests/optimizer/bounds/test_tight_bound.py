@@ -22,12 +22,9 @@ from tests.optimizer.moves import (
     fixed,
     limits,
     problem,
-    random_moves,
-    tcp_pose,
 )
 from tests.selection import long_but
 
-SEED, MOVES = 17, 4
 CASES: dict[str, dict[str, Any]] = {
     "as it comes": {},
     "loaded": {"payload": PAYLOAD},
@@ -93,11 +90,3 @@ def test_the_plain_bound_stays_where_the_dual_one_does_not_help(name: str) -> No
     assert plain.lower_bound <= tight.lower_bound <= tight.energy.of(asked.objective)
     if name.startswith(("mechanical", "friction")):
         assert tight.lower_bound == plain.lower_bound
-
-
-@pytest.mark.long
-def test_it_is_never_below_the_plain_one() -> None:
-    """Of random moves to poses, in the whole of the search."""
-    for start, goal in random_moves(SEED, MOVES):
-        plain, tight = both(problem(start, tcp_pose(goal)))
-        assert plain.lower_bound <= tight.lower_bound <= tight.energy.electrical.total

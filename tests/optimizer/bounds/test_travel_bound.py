@@ -18,8 +18,7 @@ from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.search.run import Run
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem
+from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem
 from tests.selection import long_but
 
 # relative; energies are quadratures, and a true bound may lie below a motion by nothing but that
@@ -90,20 +89,6 @@ def test_no_motion_draws_less_however_it_is_cut(name: str) -> None:
             assert least <= energy.total + QUADRATURE * scale
             nearest = max(nearest, (least - energy.total) / scale)
     assert nearest > -0.3, "the attack does not come near"
-
-
-@pytest.mark.long
-def test_the_search_does_not_find_less_either() -> None:
-    """The least energy through passes, searched over all their times, speeds and durations."""
-    rng, closest = np.random.default_rng(3), 0.0
-    for k in range(6):
-        given: dict[str, Any] = [{}, CONDITIONS["all recovered"], CONDITIONS["hardly idle"]][k % 3]
-        q = START + np.linspace(0, 1, 5)[:, None] * (GOAL - START) + rng.uniform(-0.2, 0.2, (5, 6))
-        asked = problem(q[0], q[-1], passes=q[1:-1], **given)
-        found, prepared = Run(asked).solution(), PreparedProblem.of(asked)
-        assert bounds(prepared, q).sum() <= found.lower_bound <= found.energy.electrical.total
-        closest = max(closest, found.lower_bound / found.energy.electrical.total)
-    assert closest > 0.6
 
 
 def test_bounds_from_rest_to_rest_do_not_hold_where_the_arm_passes() -> None:

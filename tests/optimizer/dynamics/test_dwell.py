@@ -142,14 +142,6 @@ def test_braking_early_pays_where_holding_is_dear() -> None:
     assert brakes.energy.electrical.total < 0.8 * motors.energy.electrical.total
 
 
-@pytest.mark.long
-def test_motors_are_never_better_than_cheaper_brakes() -> None:
-    for delay in (0.0, 2.9):
-        for power in (None, hold()):
-            brakes = solved(Dwell(3.0, "brakes", delay, power)).energy.electrical.total
-            assert brakes <= solved(Dwell(3.0)).energy.electrical.total * (1 + SCAN)
-
-
 def test_baselines_wait_too() -> None:
     """Each in the time that it leaves; without the wait they are what they were."""
     dwell = DWELLS["cheap brakes"]

@@ -274,13 +274,6 @@ def test_what_the_request_gives_is_known() -> None:
     assert interval is not None and interval.shares["inverter_linear"] == 0.0
 
 
-@pytest.mark.long
-def test_mechanical_work_has_no_interval_of_its_saving() -> None:
-    found = optimize(problem(objective="mechanical", duration_max=2.0))
-    assert found.energy.electrical.interval is not None
-    assert {each.saving_interval for each in found.baselines} == {None}
-
-
 def test_a_replayed_motion_has_the_interval_of_its_answer() -> None:
     """In one block, and in many."""
     found = optimize(problem(payload=PAYLOAD, sample_period=0.001))

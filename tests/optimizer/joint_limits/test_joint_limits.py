@@ -125,16 +125,6 @@ def test_no_attack_exceeds_a_torque_limit_of_any_robot(name: str) -> None:
     assert ratio <= 1
 
 
-@pytest.mark.long
-def test_narrower_ranges_leave_more() -> None:
-    arm = loaded("ur5e")
-    most = arm.active_limits
-    low, high = most.q_min.copy(), most.q_max.copy()
-    low[1:3], high[1:3] = (-2.0, 1.2), (-1.2, 2.4)
-    narrow = replace(arm, limits=most.tightened(q_min=low, q_max=high))
-    assert joint_limits(narrow).a[1] > 1.2 * joint_limits(arm).a[1]
-
-
 @pytest.mark.parametrize("name", HEAVY)
 def test_a_payload_that_gravity_makes_too_heavy(name: str) -> None:
     with pytest.raises(NoJointLimits) as raised:

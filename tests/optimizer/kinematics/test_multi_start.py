@@ -99,9 +99,3 @@ def test_an_answer_over_branches_that_may_be_missing_is_not_optimal() -> None:
     assert status == "feasible" and not complete
     # The bound holds for every configuration of the goal, not for the candidates alone.
     assert bound <= energy
-
-
-@pytest.mark.long
-def test_nor_is_one_from_a_pose() -> None:
-    bound, energy, status, complete = answered(CHAIN, from_pose=True)
-    assert status == "feasible" and not complete and bound <= energy

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath import Arm, Pose, Problem, optimize
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
@@ -19,7 +18,6 @@ from joulepath.optimizer.kinematics.seven.nearby_arm import NearbyArm
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm
 from joulepath.optimizer.kinematics.seven.seed_table import SeedTable
 from joulepath.optimizer.kinematics.seven.traced_arm import TracedArm
-from tests.optimizer.chains import move
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, inside
 from tests.optimizer.kinematics.traced import CHAIN, GEN3, PANDA, away
 from tests.selection import long_but
@@ -71,8 +69,6 @@ BESIDE_ANOTHER = np.array(
 # configuration of an arm stretched beyond the reach of the simple arm; their axes differ by 0.35 mm
 # [rad]
 STRETCHED = np.array([-5.237985, 0.035838, 1.066330, -0.002736, -4.184650, -1.781755, -3.956364])
-# deadline that no search comes near, however busy the machine [s]
-AMPLE = 300.0
 
 
 @pytest.fixture(params=long_but(["chain"], ["gen3", "chain"]), scope="module")
@@ -254,29 +250,6 @@ def test_an_upright_arm_is_refused_as_singular() -> None:
     with pytest.raises(SingularPose):
         required_inverse_kinematics(GEN3, "goal").solve(flange(GEN3, np.zeros(7)))
     assert str(required_inverse_kinematics(GEN3, "goal").label(np.zeros(7))) == "branch 1"
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("from_pose", long_but((False,), (False, True)))
-def test_an_answer_over_curves_that_may_be_missing_is_not_optimal(from_pose: bool) -> None:
-    start, goal = move(7)
-    problem = Problem(
-        arm=Arm(robot=replace(CHAIN, default_motion=None)),
-        start=Pose(flange(CHAIN, start)) if from_pose else start,
-        goal=Pose(flange(CHAIN, goal)),
-        deadline=AMPLE,
-    )
-    found = optimize(problem)
-    assert found.certificate.valid and found.status == "feasible" and not found.complete
-    # the bus gives energy back, so that the bound of any two configurations may be negative
-    assert found.lower_bound <= found.energy.electrical.total
-    assert from_pose or found.lower_bound >= 0
-    to_joints = optimize(replace(problem, goal=goal)) if not from_pose else None
-    # With a free configuration of the goal pose, the energy is at most that of the given one.
-    assert (
-        to_joints is None
-        or found.energy.electrical.total <= 1.001 * to_joints.energy.electrical.total
-    )
 
 
 def test_seeds_of_the_simple_arm_are_near_the_pose() -> None:

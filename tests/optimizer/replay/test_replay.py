@@ -23,7 +23,6 @@ from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.dwell import Dwell
 from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import TIME_GRID, course_of, reference
@@ -228,16 +227,6 @@ def test_a_joint_at_its_limit_saturates() -> None:
     assert (as_planned.saturated == 0).all() and (lighter.saturated == 0).all()
     assert heavier.saturated.max() > 0
     assert heavier.limit_ratio.max() == pytest.approx(1.0)
-
-
-@pytest.mark.long
-def test_waiting_counts_in_savings() -> None:
-    """A baseline that is faster waits longer, and what it draws then is in its planned energy."""
-    found = optimize(problem(payload=PAYLOAD, dwell=Dwell(4.0)))
-    plan = planned_motion(found, ARM, "electrical")
-    assert next(each.waiting for each in plan.baselines if each.name == "ruckig") > 10
-    for each in replay(plan, ("feed_forward",), FAST, {"payload": 0.1}).savings:
-        assert each.simulated == pytest.approx(each.planned, abs=POINT)
 
 
 def test_a_velocity_step_is_not_followed() -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from joulepath.optimizer.exceptions import UnreachablePose, UnreachableTargets
-from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import pareto
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.problem.bus import Bus
@@ -22,12 +19,11 @@ from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.finishing_time import FINISHING
 from joulepath.optimizer.search.sampled_ends import SAMPLES
-from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
+from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import (
     GOAL,
     HOME,
     PAYLOAD,
-    ROBOT,
     START,
     TILTED,
     fixed,
@@ -36,7 +32,7 @@ from tests.optimizer.moves import (
     tcp_pose,
 )
 from tests.optimizer.search.runs import prepared
-from tests.optimizer.search.test_free_goal import TOOL, angle, rotations
+from tests.optimizer.search.test_free_goal import TOOL, angle
 from tests.refusals import refusal_of
 from tests.selection import long_but
 
@@ -74,19 +70,6 @@ def test_what_is_freer_costs_no_more(number: int) -> None:
     assert energy(free) <= energy(cone) * (1 + FOUND) <= energy(about) * (1 + FOUND) ** 2
     assert energy(about) <= energy(full) * (1 + FOUND)
     assert energy(free) <= energy(five) * (1 + FOUND)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("number", range(2))
-def test_free_is_no_worse_than_any_orientation_sampled(number: int) -> None:
-    """Twelve orientations that the search has not seen, each solved as a request of its own."""
-    pose = ConeOrientedPose(POSITIONS[number].T[:3, 3])
-    free = optimize(problem(HOME, pose))
-    tried = [pose.with_orientation(R) for R in rotations(3 + number, 12)]
-    reachable = [each for each in tried if inverse_kinematics_for(ROBOT).branches(each.T)]
-    assert len(reachable) > 4
-    best = min(energy(optimize(problem(HOME, each))) for each in reachable)
-    assert energy(free) <= best * (1 + FOUND)
 
 
 CONDITIONS: dict[str, dict[str, Any]] = {
@@ -192,24 +175,6 @@ def test_respects_the_deadline() -> None:
     assert solution.certificate.valid and solution.status == "feasible"
     assert readings - FINISHING.least < solution.solver.wall_time < readings + LAST_READINGS
     assert any(each.status == "unvisited" for each in solution.candidates)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("count", [2, 3, 4])
-def test_a_front_follows_a_goal_that_turns(count: int) -> None:
-    """Every point of a front goes where its own duration is cheapest: none is beaten by a longer
-    one's motion.
-    """
-    # with little idle power, time costs little: slower motions need less energy
-    robot = replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0))
-    front = pareto(
-        problem(goal=ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), robot=robot), count, still
-    )
-    energies = [energy(point) for point in front.points]
-    assert len(energies) >= 2 and energies == sorted(energies, reverse=True)
-    assert all(
-        point.certificate.valid and point.lower_bound <= energy(point) for point in front.points
-    )
 
 
 @pytest.mark.parametrize(

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.least_duration_ends import with_shorter_duration
 from joulepath.optimizer.search.sampled_ends import fastest_samples
-from tests.optimizer.moves import AMPLE, fixed
+from tests.optimizer.moves import AMPLE
 from tests.optimizer.search.runs import prepared
 
 # m, rad: what the certificate allows at an end
@@ -60,22 +56,6 @@ def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
                 assert isinstance(problem.goal, ConeOrientedPose)
                 assert np.abs(T[:3, 3] - problem.goal.position).max() < REACHED
     assert helped > 3
-
-
-@pytest.mark.long
-def test_a_free_posture_is_no_slower_than_the_answer_of_least_energy() -> None:
-    """By samples alone it was 1.9 % slower than this answer."""
-    arm = Arm(robot=load_robot("panda"), collisions=False)
-    limits = arm.robot.limits
-    lower, upper = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
-    q_start, q_goal = np.random.default_rng([77, 1]).uniform(lower, upper, (2, 7))
-    problem = Problem(arm=arm, start=q_start, goal=Pose(tcp_pose(arm, q_goal)), deadline=AMPLE)
-    free = optimize(problem)
-    with pytest.raises(DurationTooShort) as caught:
-        optimize(replace(problem, **fixed(0.05)))
-    assert caught.value.shortest is not None and caught.value.shortest <= free.duration
-    again = optimize(replace(problem, **fixed(caught.value.shortest)))
-    assert again.certificate.valid
 
 
 def test_few_samples_are_tried_also_where_many_are_open() -> None:

@@ -193,14 +193,3 @@ def test_a_curve_whose_angles_pass_half_a_turn_is_raised_too(
     plain, held = plain_and_held(posed, monkeypatch)
     assert held / plain - 1 > PASSING_RAISED
     assert optimize(posed).energy.electrical.total >= held
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["panda", "iiwa14"])
-def test_between_two_poses(name: str) -> None:
-    robot = load_robot(name)
-    for start, goal in tasks(name, 3):
-        answer = optimize(asked(robot, pose_of(robot, start), pose_of(robot, goal)))
-        assert answer.certificate.valid
-        fixed = optimize(asked(robot, start, goal)).energy.electrical.total
-        assert answer.lower_bound <= answer.energy.electrical.total <= fixed * (1 + REFINED)

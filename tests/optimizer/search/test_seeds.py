@@ -193,15 +193,3 @@ def test_an_end_may_slide_onto_a_joint_limit() -> None:
     on_limit = np.minimum(answer.goal.q - limits.q_min, limits.q_max - answer.goal.q)
     assert 0 <= on_limit.min() < 1e-9
     assert answer.certificate.valid and max(answer.certificate.goal_error) < HELD
-
-
-@pytest.mark.long
-def test_an_answer_between_poses_holds_both() -> None:
-    answer = optimize(problem_of("panda", 6, both=True))
-    assert answer.certificate.valid
-    for end in (answer.certificate.start_error, answer.certificate.goal_error):
-        assert max(end) < HELD
-    fixed = optimize(
-        Problem(arm=Arm(robot=load_robot("panda")), start=answer.start.q, goal=answer.goal.q)
-    )
-    assert answer.energy.electrical.total <= fixed.energy.electrical.total * (1 + 1e-3)

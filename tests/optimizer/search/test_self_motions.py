@@ -15,9 +15,7 @@ from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import ROBOT, problem, tcp_pose
 from tests.selection import long_but
@@ -30,8 +28,6 @@ UPRIGHT = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])  # shoulder, el
 REFINED = 1e-3
 # relative difference of the energies of neighbouring poses
 CONTINUOUS = 0.01
-# relative
-ROUNDING = 1e-12
 
 
 def solved(start: Any, goal: Any, **given: Any) -> Solution:
@@ -105,13 +101,6 @@ def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None
         assert on_it >= min(beside) * (1 - CONTINUOUS)
 
 
-@pytest.mark.long
-def test_between_two_curves() -> None:
-    other = STRETCHED + np.array([-0.8, 0.3, -0.5, 0.2, 0.0, 0.1])
-    answer = solved(tcp_pose(STRETCHED), tcp_pose(other), windings=False)
-    assert energy(answer) <= energy(solved(STRETCHED, other)) * (1 + REFINED)
-
-
 def test_a_branch_may_be_asked_for_on_its_singularity() -> None:
     both = [
         energy(
@@ -127,20 +116,6 @@ def test_a_branch_may_be_asked_for_on_its_singularity() -> None:
     assert min(both) == pytest.approx(
         energy(solved(START, tcp_pose(STRAIGHT), windings=False)), rel=REFINED
     )
-
-
-@pytest.mark.long
-def test_one_of_several_targets_and_a_store() -> None:
-    """A store's answer is found again among the candidates, whose samples do not hold it."""
-    targets = AnyOf((tcp_pose(STRETCHED), tcp_pose(STRAIGHT)))
-    plain = solved(START, targets, windings=False)
-    stored = solved(
-        START,
-        targets,
-        windings=False,
-        bus=Bus(mode="storage", capacity=50.0, power=200.0, efficiency=0.9),
-    )
-    assert energy(stored) <= energy(plain) * (1 + REFINED)
 
 
 def test_a_free_turn_about_the_last_axis_may_meet_a_stretched_wrist() -> None:

@@ -94,16 +94,6 @@ def test_nothing_is_solved_again_without_corners_or_even_spacing(given: dict[str
     assert best.spline is spline and state.solves == solves
 
 
-@pytest.mark.long
-def test_longest_duration_of_mechanical_work() -> None:
-    """Rest costs nothing: a motion that may take longer takes all of the time."""
-    state = explored(objective="mechanical", duration_max=2.0)
-    best = state.best()
-    assert best is not None
-    sharpen(state, best)
-    assert best.duration == pytest.approx(2.0, rel=1e-12)
-
-
 def test_no_time_is_left() -> None:
     """The motion stays as it is."""
     state = explored(objective="mechanical", duration_max=1.5)

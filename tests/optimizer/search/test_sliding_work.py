@@ -88,20 +88,3 @@ def test_ends_slide_while_corners_become_sharper() -> None:
     assert best is not None and best.energy is not None and best.energy < work
     assert best.q_goal == pytest.approx(best.spline.control_points[-1], abs=ROUNDING)
     assert np.abs(best.q_goal - goal).max() > MOVED
-
-
-@pytest.mark.long
-@pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"objective": "electrical"},
-        {"method": "time_scaling"},
-        {"duration_min": None},
-        {"deadline": 2.0},
-    ],
-)
-def test_others_are_explored_as_before(given: dict[str, Any]) -> None:
-    state = prepared(problem(**given)).state
-    assert not explore_sliding_work(state)
-    assert state.best() is None

@@ -100,16 +100,6 @@ def test_short_moves_have_finite_ways_or_none(displacement: float) -> None:
         assert way.within_limits and 0 < way.electrical < 100 and 0 < way.duration < 1
 
 
-@pytest.mark.long
-def test_a_cycle_that_stands_at_a_stop_keeps_its_ways() -> None:
-    """The way back from the last stop, at which the arm begins, is none."""
-    task = example("over_a_post")
-    stops = [Stop(name="there", target=task.goal), Stop(name="here", target=task.start)]
-    cycle = Cycle(arm=task.arm, start=task.start, stops=stops, deadline=AMPLE)
-    names = {each.name for each in plan_cycle(cycle, progress=False).baselines}
-    assert {"waypoints", "blended"} <= names
-
-
 def test_legs_in_a_row_rest_at_every_waypoint() -> None:
     legs = [straight(LIMITS, a, b) for a, b in pairwise(CORNERS)]
     motion = in_a_row(legs)

@@ -16,7 +16,6 @@ from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
 from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.bus import Bus
 from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
@@ -230,14 +229,6 @@ def test_the_genetic_algorithm_solves_a_few_candidates_and_says_so_of_the_others
         for some in (solved_ones, left)
     )
     assert not left or max(first) <= min(last)
-
-
-@pytest.mark.long
-def test_the_genetic_algorithm_is_never_optimal_with_energy_storage_either() -> None:
-    """With a store, the answer may be the motion found without the store."""
-    store = Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9)
-    solution = optimize(problem(method="polynomial_ga", bus=store))
-    assert solution.certificate.valid and solution.status == "feasible"
 
 
 @pytest.mark.parametrize("cost", [5.0, -5.0])

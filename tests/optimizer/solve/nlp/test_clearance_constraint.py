@@ -84,13 +84,6 @@ def test_a_post_in_the_way_is_passed() -> None:
     assert around.energy.electrical.total > free.energy.electrical.total
 
 
-@pytest.mark.long
-def test_a_margin_is_kept_and_costs() -> None:
-    near, far = solved(low_post()), solved(low_post(margin=0.03))
-    assert least_distance(far, low_post()) >= 0.03
-    assert far.energy.electrical.total > near.energy.electrical.total
-
-
 def test_what_is_far_away_changes_nothing() -> None:
     ball = Obstacle("ball", Sphere(0.1), at(-0.5, 0.8, 1.2))
     with_ball, without = (
