@@ -11,13 +11,11 @@ import orjson
 import pytest
 
 from benchmarks.agreement import request
+from joulepath import Solution, optimize, plan_cycle
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.tightened_limits import WITHIN_TIGHTER
 from joulepath.optimizer.solve.methods import sqp_stages
 from tests.selection import long_but

@@ -7,15 +7,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Pose, UnreachablePose, load_robot, optimize
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.reach import REACH
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.search.answer import OPTIMALITY
 from tests.optimizer.moves import ROBOT, problem
 from tests.selection import long_but

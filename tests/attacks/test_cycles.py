@@ -17,23 +17,26 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from joulepath import (
+    Arm,
+    Cycle,
+    CycleSolution,
+    CycleTooShort,
+    DeadlineExceeded,
+    FreeOrder,
+    Payload,
+    Problem,
+    Stop,
+    optimize,
+    plan_cycle,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.feasible_cycles import simple_cycles
 from joulepath.optimizer.cycle.order_search import OrderSearch
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.free_order import FreeOrder
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.moves import AMPLE, ROBOT, fixed

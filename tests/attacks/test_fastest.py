@@ -10,13 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Bus, DurationTooShort, Payload, Problem, optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.problem import DURATIONS, MethodName, Problem
-from joulepath.optimizer.search.errors import DurationTooShort
+from joulepath.optimizer.problem.problem import DURATIONS, MethodName
 from joulepath.optimizer.solve.methods.fastest_motion import FastestSettings
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import (

@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks.slow_moves import MOST_EXCESS, compare, slow_problem
-from joulepath.models.registry import load_robot
+from joulepath import Bus, Problem, Solution, load_robot, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.solution import Solution
 from tests.compilers import with_compiler
 from tests.optimizer.moves import GOAL, ROBOT, START, fixed, limits, problem
 from tests.selection import long_but

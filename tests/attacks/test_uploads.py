@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import DeadlineExceeded, InvalidArm, InvalidProblem, InvalidRequest, load_robot
 from joulepath.app.api.evaluate.task import EvaluateTask
 from joulepath.app.api.identifications.request import IdentifyRequest
 from joulepath.app.api.identifications.task import IdentifyTask
@@ -27,16 +28,12 @@ from joulepath.app.api.robots.task import OwnRobotTask
 from joulepath.app.convert.mesh_file import mesh_from_file
 from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.convert.request import to_problem
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.schemas.examples.own_arm import ARM, URDF
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.own_arm.description import InvalidArm
 from joulepath.models.own_arm.figures import own_figures
-from joulepath.models.registry import load_robot
 from joulepath.models.uploads.limits import LIMITS
 from joulepath.optimizer.deadline import Deadline, DeadlinePassed, watch
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import csv_of, recorded, truth_of
 from tests.models.own_arm.arms import BLOCK, PLAIN, SHAPE, changed, meshed, obj

@@ -12,13 +12,12 @@ import pytest
 from benchmarks.checks import allowed, beats, errors_found, refusal_errors
 from benchmarks.motion import SplineMotion, replay
 from benchmarks.tasks import RequestTask, request_task
+from joulepath import load_robot, optimize
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.convert.arm import arm_fields
 from joulepath.app.convert.request import to_problem
 from joulepath.app.engine.result import json_document
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.optimize import optimize
 
 Json = dict[str, Any]
 ENERGY_ERROR = 1e-4  # relative, between Simpson's rule on 1 ms and the optimiser's quadrature

@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.collision_replay import collisions, mesh_collisions
+from joulepath import Arm, Obstacle, Scene, Sphere, capsule_between, load_robot, load_tool
 from joulepath.models.meshes import link_surfaces
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere, capsule_between
-from joulepath.optimizer.problem.tool import load_tool
 from tests.mesh_folders import meshes
 from tests.optimizer.cells import wander
 

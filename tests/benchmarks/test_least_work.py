@@ -7,12 +7,9 @@ import pinocchio as pin
 import pytest
 
 from benchmarks.least_work import Works, rigid, summary, work
-from joulepath import optimize
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Payload, Problem, load_robot, optimize
 from joulepath.optimizer.motion.quintic import PEAKS
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import Problem
 
 COM = np.array([0.0, 0.0, 0.1])
 SAMPLED = 1e-4  # relative error of the trapezoidal rule

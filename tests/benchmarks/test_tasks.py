@@ -5,10 +5,9 @@ import pytest
 
 from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, flange, move, moves, request_task, request_tasks
+from joulepath import Robot, load_robot
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Robot
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 
 POSE_ERROR = 1e-12  # rounding of a few products of rotations

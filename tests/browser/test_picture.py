@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Pose, load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
 from tests.app.live import Server
 from tests.app.requests import move
 from tests.browser.pages import (

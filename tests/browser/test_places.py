@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from joulepath import ConeOrientedPose, Cycle, Pose
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.report.bundle import attached_to
 from joulepath.app.api.report.check import checked
 from joulepath.optimizer.placement.mounts import about_z
 from joulepath.optimizer.placement.moved_cycle import cycle_at
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.targets import members
 from tests.app.live import ROOT, Server
 from tests.browser.pages import (

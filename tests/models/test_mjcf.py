@@ -9,11 +9,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath import load_robot, mjcf
+from joulepath import Arm, Robot, load_robot, mjcf
 from joulepath.models.possible_inertia import nearest_possible_inertia
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.problem.arm import Arm
 from tests.by_pinocchio import flange
 from tests.models.own_arm.arms import RICH_ARM, URDF, changed, robot
 from tests.selection import long_but

@@ -10,16 +10,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot, robot_names
-from joulepath.models.tools.registry import FIGURES, HULL_FIGURES, tool_figures, tool_names
+from joulepath import (
+    Arm,
+    Box,
+    Obstacle,
+    Payload,
+    Points,
+    Pose,
+    Scene,
+    Sphere,
+    UnknownTool,
+    load_robot,
+    load_tool,
+    robot_names,
+    tool_names,
+)
+from joulepath.models.tools.registry import FIGURES, HULL_FIGURES, tool_figures
 from joulepath.models.trust import TRUST
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.exceptions import UnknownTool
-from joulepath.optimizer.problem.arm import TOOL, Arm, Payload
-from joulepath.optimizer.problem.clouds import Points
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
-from joulepath.optimizer.problem.tool import load_tool
+from joulepath.optimizer.problem.arm import TOOL
 
 # of sums of a few numbers in double precision
 ROUNDING = 1e-12

@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Payload, Problem, Solution, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.losses import saving
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import (
     CEILING,
     GOAL,

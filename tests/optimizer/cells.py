@@ -7,10 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.scene import (
+from joulepath import (
+    Arm,
     Attachment,
     Box,
     Capsule,
@@ -18,11 +16,14 @@ from joulepath.optimizer.problem.scene import (
     HalfSpace,
     Mesh,
     Obstacle,
+    Payload,
     Scene,
-    Shape,
     Sphere,
+    Spline,
     capsule_between,
 )
+from joulepath.models.robot import Array
+from joulepath.optimizer.problem.scene import Shape
 from tests.optimizer.moves import ROBOT
 
 LOADS: tuple[Shape, ...] = (

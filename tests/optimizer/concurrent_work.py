@@ -16,36 +16,38 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
+from joulepath import (
+    AnyOf,
+    Arm,
+    Attachment,
+    Box,
+    BranchFilter,
+    Bus,
+    ConeOrientedPose,
+    Cylinder,
+    Dwell,
+    HalfSpace,
+    JoulepathError,
+    Obstacle,
+    Payload,
+    Problem,
+    Recording,
+    Scene,
+    ToolCone,
+    Waypoints,
+    capsule_between,
+    evaluate,
+    optimize,
+    pareto,
+    what_if,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Recording, Waypoints
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tool_path.path_following import follow
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import pareto
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import (
-    Attachment,
-    Box,
-    Cylinder,
-    HalfSpace,
-    Obstacle,
-    Scene,
-    Shape,
-    capsule_between,
-)
-from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.what_if import what_if
+from joulepath.optimizer.problem.scene import Shape
 from tests.optimizer.cells import arm_in_cell, at, wander
 from tests.optimizer.moves import (
     CEILING,

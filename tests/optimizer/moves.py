@@ -13,11 +13,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, Limits
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
+from joulepath import Arm, Limits, Payload, Pose, Problem, load_robot
+from joulepath.models.robot import Array
 from tests.by_pinocchio import flange, torques_of
 
 ROBOT = load_robot("ur5e")

@@ -8,13 +8,23 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from joulepath.optimizer.export.program import Move, Program, Rest
+from joulepath import (
+    Arm,
+    Attachment,
+    Box,
+    Cylinder,
+    HalfSpace,
+    Move,
+    Obstacle,
+    Payload,
+    Program,
+    Rest,
+    Scene,
+)
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.time_scalings import quintic_spline
 from joulepath.optimizer.picture.cell_picture import cell_picture, stops_of
 from joulepath.optimizer.picture.view import PictureSettings
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.scene import Attachment, Box, Cylinder, HalfSpace, Obstacle, Scene
 from tests.optimizer.moves import GOAL, ROBOT, START
 from tests.optimizer.placement.cells import at
 

@@ -9,15 +9,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import Certificate, Clearance, Energy, Payload, Pose, Problem, Spline
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.dynamics.losses import breakdown
-from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.certificate import Certificate, Clearance
-from joulepath.optimizer.result.energy import Energy
 from tests.by_pinocchio import flange
 from tests.optimizer.moves import GOAL, ROBOT, START, problem_with
 

@@ -15,7 +15,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath import optimize, pareto
+from joulepath import (
+    Arm,
+    CandidateStatus,
+    DeadlineExceeded,
+    Mesh,
+    Obstacle,
+    Problem,
+    Scene,
+    optimize,
+    pareto,
+)
 from joulepath.optimizer.collision import coal_distance
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.deadline import (
@@ -30,11 +40,6 @@ from joulepath.optimizer.deadline import (
     watched_time_left,
 )
 from joulepath.optimizer.dynamics.kernel_functions import Evaluation
-from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Mesh, Obstacle, Scene
-from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.finishing_time import finishing_time
 from tests.optimizer.cells import at

@@ -9,12 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import (
+    Certificate,
+    DeadlineExceeded,
+    DurationTooShort,
+    InvalidProblem,
+    NoTrajectory,
+    Payload,
+    TorqueInfeasible,
+    optimize,
+)
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.result.certificate import Certificate
-from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
 from joulepath.optimizer.search.finishing_time import FINISHING
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, assert_true, shortest, solved
 from tests.optimizer.clocks import LAST_READINGS, CountingClock

@@ -7,9 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath import Arm, Pose, Problem, optimize
-from joulepath.models.registry import load_robot, robot_names
-from joulepath.models.robot import Robot
+from joulepath import Arm, Pose, Problem, Robot, load_robot, optimize, robot_names
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.kinematics.angles import nearest_turn

@@ -9,12 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import NoTrajectory, Problem, Solution, ToolPath, optimize
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import NoTrajectory
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.tool_path import TOOL_PATH, ToolPath
-from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.problem.tool_path import TOOL_PATH
 from tests.optimizer.test_tool_path import ARM, poses_of
 from tests.optimizer.tool_paths import along, moved
 from tests.refusals import refusal_of

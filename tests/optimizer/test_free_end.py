@@ -11,8 +11,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath import (
+    Arm,
+    ConeOrientedPose,
+    JoulepathError,
+    PathInfeasible,
+    Pose,
+    Problem,
+    ToolPath,
+    optimize,
+)
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.course_tracing import chain_of
@@ -21,14 +30,7 @@ from joulepath.optimizer.kinematics.tool_path.turning_grid import (
     shortest,
     turning_through,
 )
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.search.errors import PathInfeasible
 from joulepath.optimizer.solve.methods.end_angle import try_angles
 from tests.optimizer.moves import ROBOT, tcp_pose
 from tests.optimizer.test_turning_path import Z, down

@@ -12,19 +12,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath import (
+    BranchFilter,
+    InvalidProblem,
+    JoulepathError,
+    PathInfeasible,
+    Pose,
+    Problem,
+    Solution,
+    ToolPath,
+    optimize,
+)
 from joulepath.optimizer.bounds.free_ends_bound import bound_between_free_ends
 from joulepath.optimizer.deadline import NEVER
-from joulepath.optimizer.exceptions import InvalidProblem, JoulepathError
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends_of
-from joulepath.optimizer.search.errors import PathInfeasible
 from joulepath.optimizer.search.path_ends import bound_beside, path_candidates
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.moves import AMPLE, tcp_pose

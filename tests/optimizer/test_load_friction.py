@@ -10,20 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Payload, RecordedRows, Recording, Robot, evaluate, load_robot, optimize
 from joulepath.models.from_figures import robot_of
-from joulepath.models.registry import load_figures, load_robot
-from joulepath.models.robot import Array, Robot
+from joulepath.models.registry import load_figures
+from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.dynamics.kernel import Kernel
 from joulepath.optimizer.dynamics.kernel_expressions import build
 from joulepath.optimizer.dynamics.kernel_functions import Interpreted
 from joulepath.optimizer.dynamics.limited_torque import greatest_smooth_part, limited_torque
 from joulepath.optimizer.dynamics.losses import drawn_power, power_flow
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Payload
 from tests.by_pinocchio import torques_of
 from tests.optimizer.dynamics.kernel_states import LOSSY, TORQUE, left_out, places, states
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem, torques

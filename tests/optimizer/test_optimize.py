@@ -13,9 +13,7 @@ import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 
-from joulepath.optimizer.exceptions import JoulepathError
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.search.errors import TorqueInfeasible
+from joulepath import BranchFilter, JoulepathError, TorqueInfeasible
 from tests.optimizer.answers import (
     CONDITIONS,
     CONVERGED,

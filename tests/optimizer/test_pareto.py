@@ -13,17 +13,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import PARETO, pareto
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.front import Front
-from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.errors import DurationTooShort
+from joulepath import (
+    Bus,
+    ConeOrientedPose,
+    DeadlineExceeded,
+    DurationTooShort,
+    Dwell,
+    Front,
+    InvalidProblem,
+    JoulepathError,
+    Pose,
+    Problem,
+    Solution,
+    optimize,
+    pareto,
+)
+from joulepath.optimizer.pareto import PARETO
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import PAYLOAD, START, changed, fixed, limits, problem, tcp_pose

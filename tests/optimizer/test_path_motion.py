@@ -11,11 +11,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import Solution, ToolCone, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion.spline import sample
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import problem_with
 from tests.selection import long_but
 

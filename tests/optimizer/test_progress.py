@@ -10,18 +10,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import pareto
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.progress import (
+from joulepath import (
     CandidatesFound,
     CandidateTried,
-    Event,
     Improved,
-    no_listener,
-    only_news,
+    Problem,
+    optimize,
+    pareto,
+    plan_cycle,
 )
+from joulepath.optimizer.progress import Event, no_listener, only_news
 from joulepath.optimizer.search.candidates import Reason
 from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose

@@ -11,22 +11,27 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from joulepath.models.robot import Array, Robot
+from joulepath import (
+    AnyOf,
+    Arm,
+    Bus,
+    ConeOrientedPose,
+    Dwell,
+    Payload,
+    Pose,
+    Problem,
+    Robot,
+    Solution,
+    ToolCone,
+    optimize,
+    pareto,
+    what_if,
+)
+from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.confirmed_inverse import ConfirmedInverseKinematics
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.pareto import pareto
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import MethodName, Problem
-from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.search.answer import may_be_optimal
 from joulepath.optimizer.solve.methods import METHODS
-from joulepath.optimizer.what_if import what_if
 from tests.by_pinocchio import torques_of
 from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import Arm, Box, Obstacle, Scene, Sphere
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
 from joulepath.optimizer.collision.model import CollisionModel
@@ -17,8 +18,6 @@ from joulepath.optimizer.collision.planner.planning_result import PlanningEnd
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from joulepath.optimizer.surroundings import CONTACT, Surroundings
 from tests.optimizer.cells import LOADS, arm_in_cell, at, cell
 from tests.optimizer.moves import ROBOT

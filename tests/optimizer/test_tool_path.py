@@ -9,21 +9,26 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from joulepath.models.registry import load_robot
+from joulepath import (
+    AnyOf,
+    Arm,
+    Box,
+    NoCollisionFreeTrajectory,
+    NoTrajectory,
+    Obstacle,
+    PathInfeasible,
+    Pose,
+    Problem,
+    Scene,
+    Solution,
+    ToolPath,
+    load_robot,
+    optimize,
+)
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory, PathInfeasible
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.path_retiming import PathRetiming
 from joulepath.optimizer.solve.methods.retiming_program import RetimingProgram

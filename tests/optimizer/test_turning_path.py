@@ -11,21 +11,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath import Arm, BranchFilter, PathInfeasible, Pose, Problem, Solution, ToolPath, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.course_tracing import chain_of
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.kinematics.tool_path.turning_grid import TurningGrid, shortest
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.errors import PathInfeasible
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.optimizer.tool_paths import HOME, along, moved
 from tests.refusals import refusal_of

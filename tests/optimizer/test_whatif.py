@@ -7,15 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import (
+    DeadlineExceeded,
+    Obstacle,
+    Problem,
+    Scene,
+    Solution,
+    Sphere,
+    TorqueInfeasible,
+    optimize,
+    what_if,
+)
 from joulepath.optimizer.certificate import certify
-from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
-from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.errors import TorqueInfeasible
-from joulepath.optimizer.what_if import what_if
 from tests.optimizer.cells import at
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import PAYLOAD, changed, limits, problem, tcp_pose

@@ -7,12 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from joulepath import Arm, Pose, Problem, Solution, ToolPath
 from joulepath.models.robot import Array
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])

@@ -18,13 +18,12 @@ from geometry_msgs.msg import PoseStamped
 import joulepath
 from benchmarks.service import running
 from benchmarks.tasks import as_pose, flange
-from joulepath.app.exceptions.base import InvalidRequest
+from joulepath import InvalidRequest, UnknownRobot
 from joulepath.app.ros2.node import UNREACHABLE
 from joulepath.app.ros2.planner import LocalPlanner, Plan
 from joulepath.models.robot import Array
 from joulepath.models.urdf import urdf_of
 from joulepath.optimizer.deadline import Stopped
-from joulepath.optimizer.exceptions import UnknownRobot
 from tests.ros2.system import Json, System, system
 
 ROOT = Path(__file__).parents[2]

@@ -12,6 +12,7 @@ import orjson
 import pytest
 from pydantic import ValidationError
 
+from joulepath import Baseline, Certificate, Clearance
 from joulepath.app.answers.declared import as_json, model_of, texts_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.engine.result import json_document
@@ -27,8 +28,6 @@ from joulepath.optimizer.declared import (
     Unit,
 )
 from joulepath.optimizer.presentation.declared_fields import shown_fields
-from joulepath.optimizer.result.baseline import Baseline
-from joulepath.optimizer.result.certificate import Certificate, Clearance
 from tests.app.live import ROOT
 
 

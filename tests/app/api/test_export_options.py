@@ -7,13 +7,11 @@ from typing import Any
 
 import pytest
 
+from joulepath import InvalidRequest, KrlOptions, Ros2Options
 from joulepath.app.api.export.request import ExportRequest, option_field, to_options
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.given_answer import AnswerRequest
 from joulepath.optimizer.export.export import FORMATS
 from joulepath.optimizer.export.formats import FORMAT_NAMES, FormatName
-from joulepath.optimizer.export.krl import KrlOptions
-from joulepath.optimizer.export.ros_messages import Ros2Options
 
 
 def request(**given: Any) -> ExportRequest:

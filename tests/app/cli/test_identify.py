@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from joulepath import NoPowerChannel, NothingHeldOut, load_robot
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.identifications.answer import IdentificationResult
 from joulepath.app.cli.identify import moves_of, summary_of
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.identify.errors import NoPowerChannel, NothingHeldOut
 from tests.app.cli.console import Here
 from tests.app.problems import checked
 from tests.identification_logs import csv_of, recorded, truth_of

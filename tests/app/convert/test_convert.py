@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from joulepath import InvalidProblem, load_robot
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import InvalidProblem
 from tests.app.requests import move
 
 

@@ -11,19 +11,15 @@ import pinocchio as pin
 import pytest
 from fastapi.testclient import TestClient
 
+from joulepath import AnyOf, Arm, ConeOrientedPose, Pose, load_robot, robot_names
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.api.ik.task import IKRequest, to_ik_arm
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.models.own_arm.description import Description
-from joulepath.models.registry import load_robot, robot_names
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.targets import AnyOf
 from tests.models.own_arm.arms import robot
 
 # sin π is not 0 in floating point

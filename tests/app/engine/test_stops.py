@@ -14,12 +14,11 @@ from typing import Any
 
 import pytest
 
+from joulepath import DeadlineExceeded, JoulepathError, ServiceError
 from joulepath.app.engine import pool
 from joulepath.app.engine.fair_queue import PATIENCE
 from joulepath.app.engine.task import result_of
-from joulepath.app.exceptions.base import ServiceError
 from joulepath.app.exceptions.queue import Preempted, ShuttingDown, WorkerLost
-from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
 from tests.app.engine.bench import (
     DEADLINE_GRACE,
     LONG,

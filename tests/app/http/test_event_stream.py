@@ -13,15 +13,14 @@ import httpx2
 import orjson
 import pytest
 
+from joulepath import DurationTooShort, InvalidRequest, UnreachablePose
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.compare.task import CompareAnswer
 from joulepath.app.api.cycle.task import CycleAnswer
 from joulepath.app.api.optimize.task import OptimizeAnswer
 from joulepath.app.api.pareto.task import ParetoAnswer
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import TooManyRequests, WorkerLost
-from joulepath.optimizer.exceptions import DeclaredError, UnreachablePose
-from joulepath.optimizer.search.errors import DurationTooShort
+from joulepath.optimizer.exceptions import DeclaredError
 from tests.app.live import CLIENT, GRACE, Server, serving, until
 from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, long_search, move

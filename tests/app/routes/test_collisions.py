@@ -12,17 +12,17 @@ import pytest
 from scipy.interpolate import BSpline
 from starlette.testclient import TestClient
 
-from joulepath.app.convert.arm import to_arm
-from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
-from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.search.errors import (
+from joulepath import (
+    Arm,
     GoalInCollision,
+    InvalidRequest,
     NoCollisionFreeTrajectory,
     StartInCollision,
 )
+from joulepath.app.convert.arm import to_arm
+from joulepath.app.schemas.request import OptimizeRequest
+from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
+from joulepath.optimizer.collision.model import CollisionModel
 from tests.app.requests import EXAMPLES, HOME, move
 from tests.app.routes.test_problems import DOWN, refused
 from tests.optimizer.moves import ROBOT

@@ -14,15 +14,11 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import EffortNotUsable, InvalidRequest, InvalidTable, Payload, load_robot
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.evaluate.task import EvaluateAnswer
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownLog
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
-from joulepath.optimizer.problem.arm import Payload
 from tests.app.cli.console import run
 from tests.app.job_clients import ended
 from tests.app.routes.test_problems import refused

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import DeadlineExceeded, ExcitationInfeasible, InvalidRequest, OutsideLimits
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.excitation.task import ExcitationAnswer
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.examples.files import body_examples
-from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
-from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 

@@ -12,13 +12,9 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
-from joulepath.app.exceptions.base import InvalidRequest
+from joulepath import FormatUnsuitable, InvalidRequest, NotCertified, UnknownRobot, load_robot
 from joulepath.app.exceptions.stored import UnknownAnswer
-from joulepath.models.registry import load_robot
 from joulepath.models.urdf import urdf_of
-from joulepath.optimizer.evaluate.errors import NotCertified
-from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.export import FORMATS
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused

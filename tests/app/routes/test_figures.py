@@ -14,13 +14,10 @@ import pytest
 import yaml
 from starlette.testclient import TestClient
 
+from joulepath import InvalidFigures, InvalidRequest, load_robot, optimize
 from joulepath.app.api.figures.models import FiguresDetail, FiguresList
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import FiguresInUse, TooManyFigures, UnknownFigures
 from joulepath.app.schemas.examples.figures import FIGURES
-from joulepath.models.registry import load_robot
-from joulepath.models.uncertainty.document import InvalidFigures
-from joulepath.optimizer.optimize import optimize
 from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused

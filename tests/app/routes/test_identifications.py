@@ -9,6 +9,16 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import (
+    InvalidRequest,
+    MethodNotApplicable,
+    NoPowerChannel,
+    NotExcited,
+    NothingHeldOut,
+    Payload,
+    PayloadUnknown,
+    load_robot,
+)
 from joulepath.app.api.excitation.task import ExcitationRequest
 from joulepath.app.api.identifications.models import (
     Identification,
@@ -18,18 +28,8 @@ from joulepath.app.api.identifications.models import (
     ResidualMove,
 )
 from joulepath.app.api.identifications.route import completed
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownIdentification, UnknownLog
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import DeclaredError
-from joulepath.optimizer.identify.errors import (
-    MethodNotApplicable,
-    NoPowerChannel,
-    NotExcited,
-    NothingHeldOut,
-    PayloadUnknown,
-)
-from joulepath.optimizer.problem.arm import Payload
 from tests.app.problems import checked
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused

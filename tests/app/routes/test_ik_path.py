@@ -9,12 +9,10 @@ import pinocchio as pin
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import InvalidRequest, OutsideLimits, load_robot
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.ik.path.task import IKPathAnswer
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.schemas.examples.files import body_examples
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import OutsideLimits
 from tests import by_pinocchio
 from tests.app.problems import checked
 from tests.app.requests import HOME

@@ -10,14 +10,13 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import DurationTooShort, InvalidRequest
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import Busy
 from joulepath.app.exceptions.stored import JobNotCancellable, KeyReused, UnknownAnswer, UnknownJob
 from joulepath.app.exceptions.transport import BodyTooLarge
 from joulepath.app.schemas.jobs import Job, JobList
-from joulepath.optimizer.search.errors import DurationTooShort
 from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
 from tests.app.problems import checked
 from tests.app.recorded import recorded_service

@@ -12,17 +12,21 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import (
+    EffortNotUsable,
+    InvalidRequest,
+    InvalidTable,
+    LogTooLarge,
+    UnknownRobot,
+    load_robot,
+)
 from joulepath.app.api.logs.models import LogDetail, LogList
 from joulepath.app.convert.recorded import GivenLog
 from joulepath.app.exceptions.access import NotOwner, Role, RoleTooLow, Unauthenticated
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import TooManyLogs, UnknownLog
 from joulepath.app.exceptions.transport import BodyTooLarge, UnsupportedMediaType
 from joulepath.app.schemas.examples.bodies import LOG_EXAMPLES
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import InvalidTable, UnknownRobot
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from tests.app.access.test_key_file import add
 from tests.app.live import CLIENT, Server
 from tests.app.recorded import recorded_service

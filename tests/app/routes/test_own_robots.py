@@ -14,13 +14,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import InvalidRequest, OrientationNotHeld, UnknownRobot, load_robot
 from joulepath.app.api.robots.models import RobotDetail, RobotList
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import RobotExists, TooManyRobots
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import UnknownRobot
-from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.motion.limit_ratios import RATIO_TOLERANCE
 from tests.app.recorded import recorded_service
 from tests.app.requests import PATIENT

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import ConeOrientedPose, Pose
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
@@ -15,8 +16,6 @@ from joulepath.app.api.placement.problem import request_at
 from joulepath.app.api.placement.request import PlacementRequest
 from joulepath.app.api.placement.task import PlacementAnswer
 from joulepath.optimizer.placement.moved_cycle import cycle_at
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.pose import Pose
 from tests.app.requests import HOME, PATIENT
 
 Json = dict[str, Any]

@@ -9,6 +9,17 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import (
+    DeadlineExceeded,
+    DurationTooShort,
+    JoulepathError,
+    OutsideLimits,
+    SingularPose,
+    TorqueInfeasible,
+    UnknownRobot,
+    UnreachablePose,
+    robot_names,
+)
 from joulepath.app.api.ik.task import IKRequest, IKTask
 from joulepath.app.exceptions.base import InternalError
 from joulepath.app.exceptions.error_types import types_of_error
@@ -17,18 +28,8 @@ from joulepath.app.exceptions.transport import BodyTooLarge, MethodNotAllowed, N
 from joulepath.app.http.problems import own_fields, path_of, problem_of
 from joulepath.app.main import create_app
 from joulepath.app.settings import Settings
-from joulepath.models.registry import robot_names
-from joulepath.optimizer.exceptions import (
-    DeadlineExceeded,
-    DeclaredError,
-    JoulepathError,
-    OutsideLimits,
-    SingularPose,
-    UnknownRobot,
-    UnreachablePose,
-)
+from joulepath.optimizer.exceptions import DeclaredError
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
-from joulepath.optimizer.search.errors import DurationTooShort, TorqueInfeasible
 from tests.app.live import LOCAL
 from tests.app.problems import checked
 from tests.app.requests import AMPLE, HOME, move

@@ -9,13 +9,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import DeadlineExceeded, InvalidRequest, NotCertified
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.replay.task import ReplayAnswer
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.stored import UnknownAnswer
 from joulepath.app.schemas.examples.own_arm import ARM
-from joulepath.optimizer.evaluate.errors import NotCertified
-from joulepath.optimizer.exceptions import DeadlineExceeded
 from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.app.routes.test_problems import refused
 

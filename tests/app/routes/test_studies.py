@@ -12,17 +12,17 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from joulepath.app.exceptions.base import InvalidRequest
-from joulepath.app.exceptions.stored import KeyReused, UnknownAnswer, UnknownStudy
-from joulepath.app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
-from joulepath.optimizer.exceptions import (
+from joulepath import (
     DeadlineExceeded,
-    DeclaredError,
+    DurationTooShort,
+    InvalidRequest,
     InvalidTable,
     UnknownRobot,
     UnreachableTargets,
 )
-from joulepath.optimizer.search.errors import DurationTooShort
+from joulepath.app.exceptions.stored import KeyReused, UnknownAnswer, UnknownStudy
+from joulepath.app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
+from joulepath.optimizer.exceptions import DeclaredError
 from tests.app.documents import open_document
 from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, move

@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import Arm, InvalidRequest, load_robot
 from joulepath.app.api.studies.suggest.models import Suggestions
 from joulepath.app.convert.pose import to_matrix
-from joulepath.app.exceptions.base import InvalidRequest
 from joulepath.app.exceptions.queue import ShuttingDown
 from joulepath.app.exceptions.stored import EmptyStudy, UnknownStudy
 from joulepath.app.schemas.common import QuaternionPose
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.tcp import rotated_poses
-from joulepath.optimizer.problem.arm import Arm
 from tests.app.problems import checked
 from tests.app.recorded import recorded_service
 from tests.app.requests import HOME, NEAR, move

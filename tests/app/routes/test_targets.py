@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from joulepath import UnreachableTargets, load_robot
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.optimize.task import OptimizeAnswer
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import UnreachableTargets
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.app.problems import checked
 from tests.app.requests import HOME, NEAR, move

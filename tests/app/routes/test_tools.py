@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from joulepath import Arm, UnknownTool, load_tool, tool_names
 from joulepath.app.api.cycle.problem import to_cycle
 from joulepath.app.api.cycle.request import CycleRequest
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.tools.registry import tool_names
-from joulepath.optimizer.exceptions import UnknownTool
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.tool import load_tool
 from tests.app.requests import move
 
 PART = {"mass": 1.0, "com": [0.0, 0.0, 0.2]}

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from joulepath import load_robot
-from joulepath.models.own_arm.description import InvalidArm
+from joulepath import InvalidArm, load_robot
 from joulepath.models.own_arm.reading import read_description
 from tests.models.own_arm.arms import PLAIN, SHAPE
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Payload, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
@@ -19,7 +19,6 @@ from joulepath.optimizer.bounds.path_terms import GridPoints, path_terms
 from joulepath.optimizer.bounds.reference import Reference, half_sides
 from joulepath.optimizer.bounds.speed_conjugate import SpeedConjugate
 from joulepath.optimizer.bounds.weights import Weights
-from joulepath.optimizer.problem.arm import Arm, Payload
 from tests.optimizer.bounds import numpy_terms
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED
 

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import ConeOrientedPose, Payload, Problem, ToolCone
 from joulepath.optimizer.bounds import free_goal_bound
 from joulepath.optimizer.bounds.free_goal_bound import POSE_FAMILY, family_bound
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
@@ -19,10 +20,6 @@ from joulepath.optimizer.kinematics.full_turns import full_turn_alternatives
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.orientation_tolerance import sample_orientations, within_cone
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.tool_cone import ToolCone
 from tests.by_pinocchio import flange
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem, tcp_pose

@@ -7,11 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.inertia_spectrum import InertiaSpectrum
-from joulepath.optimizer.problem.arm import Arm
 from tests.optimizer.moves import PAYLOAD
 
 STEP = 1e-4

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from joulepath.models.robot import Array, Robot
+from joulepath import Energy, Payload, Problem, Robot, optimize
+from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.losses import breakdown
@@ -21,11 +22,8 @@ from joulepath.optimizer.motion.bspline import DEGREE
 from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.spline import peak_rates, spline_of
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.problem import DURATIONS, Problem
-from joulepath.optimizer.result.energy import Energy
+from joulepath.optimizer.problem.problem import DURATIONS
 from joulepath.optimizer.search.baselines import guesses, motion_energy
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, changed, fixed, limits, problem
 from tests.selection import long_but

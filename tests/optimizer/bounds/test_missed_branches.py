@@ -9,19 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import AnyOf, Dwell, JoulepathError, load_robot, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.holding_cells import HoldingCells
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.bounds.missed_branches import all_branches_known, bound_of_missed_branches
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.angles import nearest_turn, wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.newton import solved
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.candidates import Candidate, pairs
 from joulepath.optimizer.search.ends import ends
 from tests.optimizer.search.test_redundant_goals import asked, members, pose_of, tasks

@@ -9,15 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import BranchFilter, Pose, Problem, load_robot, optimize
 from joulepath.optimizer.bounds.raised_bounds import RAISING, raised_bounds
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.kinematics.tcp import tcp_pose as tcp_pose_of
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search import candidates as search
 from joulepath.optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, START, problem, tcp_pose

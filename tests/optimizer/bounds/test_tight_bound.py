@@ -10,11 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.solution import Solution
+from joulepath import Bus, Dwell, Problem, Solution, optimize
 from tests.optimizer.moves import (
     PAYLOAD,
     ROBOT,

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Payload, Spline, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import lower_bounds, travel_bounds
 from joulepath.optimizer.motion import bspline
-from joulepath.optimizer.motion.spline import Spline, least_time_scale, retimed, spline_of
+from joulepath.optimizer.motion.spline import least_time_scale, retimed, spline_of
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Payload
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem
 from tests.selection import long_but
 

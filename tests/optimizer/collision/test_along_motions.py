@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import Arm, Obstacle, Points, Scene
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision import clearance_proof
 from joulepath.optimizer.collision.clearance_proof import (
@@ -15,9 +16,6 @@ from joulepath.optimizer.collision.clearance_proof import (
     proven_clearance,
 )
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.clouds import Points
-from joulepath.optimizer.problem.scene import Obstacle, Scene
 from tests.optimizer.cells import LOADS, arm_in_cell, cell, positions, wander
 from tests.optimizer.moves import ROBOT
 

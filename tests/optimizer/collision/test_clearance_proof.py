@@ -9,13 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
-from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.clouds import Points
-from joulepath.optimizer.problem.scene import (
+from joulepath import (
+    Arm,
     Attachment,
     Box,
     Capsule,
@@ -23,10 +18,16 @@ from joulepath.optimizer.problem.scene import (
     HalfSpace,
     Mesh,
     Obstacle,
+    Payload,
+    Points,
     Scene,
-    Shape,
     Sphere,
+    Spline,
+    load_robot,
 )
+from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.problem.scene import Shape
 from tests.optimizer.cells import LOADS, at, cell, positions, wander
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but

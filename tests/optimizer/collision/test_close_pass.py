@@ -9,16 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import Arm, Clearance, Obstacle, Scene, Sphere, Waypoints, evaluate
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
 from joulepath.optimizer.collision.close_pass import CLOSE_PASS, close_pass
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Waypoints
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
-from joulepath.optimizer.result.certificate import Clearance
 from tests.optimizer.cells import at
 from tests.optimizer.moves import ROBOT
 

@@ -11,6 +11,19 @@ import coal
 import numpy as np
 import pytest
 
+from joulepath import (
+    Attachment,
+    Box,
+    Mesh,
+    Obstacle,
+    Points,
+    Scene,
+    Sphere,
+    StartInCollision,
+    TriangleMesh,
+    Voxels,
+    optimize,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.bounding_tree import BoundingTree, point_segment
 from joulepath.optimizer.collision.clearance_proof import CLEARANCE_PROOF, proven_clearance
@@ -20,11 +33,8 @@ from joulepath.optimizer.collision.coal_distance import COAL, coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.clouds import CLOUD_RANGES, Points, TriangleMesh, Voxels
+from joulepath.optimizer.problem.clouds import CLOUD_RANGES
 from joulepath.optimizer.problem.clouds import Cloud as Shape
-from joulepath.optimizer.problem.scene import Attachment, Box, Mesh, Obstacle, Scene, Sphere
-from joulepath.optimizer.search.errors import StartInCollision
 from tests.optimizer.cells import LOADS, arm_in_cell, at, wander
 from tests.optimizer.moves import GOAL, START, problem_with
 from tests.refusals import refusal_of

@@ -10,21 +10,22 @@ import coal
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array
-from joulepath.optimizer.collision.coal_distance import _lower_bound, coal_shape
-from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.scene import (
+from joulepath import (
+    Arm,
     Attachment,
     Cylinder,
     Mesh,
     Obstacle,
+    Payload,
     Scene,
-    Shape,
     Sphere,
     capsule_between,
+    load_robot,
 )
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.coal_distance import _lower_bound, coal_shape
+from joulepath.optimizer.collision.model import CollisionModel
+from joulepath.optimizer.problem.scene import Shape
 from tests.optimizer.cells import LOADS, arm_in_cell
 from tests.optimizer.collision.separations import separation
 from tests.optimizer.moves import ROBOT

@@ -10,14 +10,12 @@ import coal
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from joulepath import Arm, Attachment, Box, Obstacle, Points, Scene, Sphere, load_tool
 from joulepath.models.meshes import link_surfaces
 from joulepath.optimizer.collision.coal_distance import coal_shape
 from joulepath.optimizer.collision.cores import Core
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.problem.arm import TOOL, Arm
-from joulepath.optimizer.problem.clouds import Points
-from joulepath.optimizer.problem.scene import Attachment, Box, Obstacle, Scene, Sphere
-from joulepath.optimizer.problem.tool import load_tool
+from joulepath.optimizer.problem.arm import TOOL
 from tests.mesh_folders import meshes
 from tests.models.own_arm.arms import URDF, changed, robot
 from tests.optimizer.moves import ROBOT

@@ -11,7 +11,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.collision_replay import CollisionReplay
-from joulepath import optimize
+from joulepath import (
+    Arm,
+    Box,
+    HalfSpace,
+    NoCollisionFreeTrajectory,
+    NoTrajectory,
+    Obstacle,
+    Problem,
+    Scene,
+    ToolCone,
+    capsule_between,
+    optimize,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.collision.planner.joint_path import interpolation_is_free, path_samples
@@ -19,24 +31,12 @@ from joulepath.optimizer.collision.planner.path_planner import PLANNER, REGIONS,
 from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.collision.planner.state_validity import StateValidityChecker
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.exceptions import NoTrajectory
 from joulepath.optimizer.kinematics.forward import joint_placements
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
 from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import (
-    Box,
-    HalfSpace,
-    Obstacle,
-    Scene,
-    Shape,
-    capsule_between,
-)
-from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
+from joulepath.optimizer.problem.scene import Shape
 from joulepath.optimizer.solve.methods import free_spline, planned_paths
 from joulepath.optimizer.solve.methods.free_spline import FREE_SPLINE, FreeSpline
 from joulepath.optimizer.solve.methods.planned_paths import PLANNED_PATHS

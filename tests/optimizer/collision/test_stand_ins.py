@@ -9,25 +9,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.robot import Array
-from joulepath.optimizer.collision.stand_ins import StandIns, StandInSettings
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import Waypoints
-from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import (
+from joulepath import (
+    Arm,
     Attachment,
     Box,
+    Clearance,
     HalfSpace,
     Mesh,
     Obstacle,
+    Payload,
+    Problem,
     Scene,
     Sphere,
+    Waypoints,
     capsule_between,
+    evaluate,
+    optimize,
 )
-from joulepath.optimizer.result.certificate import Clearance
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.stand_ins import StandIns, StandInSettings
+from joulepath.optimizer.kinematics.tcp import tcp_pose
 from tests.optimizer.cells import at
 from tests.optimizer.moves import AMPLE, HOME, ROBOT
 

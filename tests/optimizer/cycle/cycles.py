@@ -7,10 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.stops import Stop
+from joulepath import Arm, Cycle, Payload, Pose, Stop
 from tests.optimizer.moves import AMPLE, ROBOT
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])

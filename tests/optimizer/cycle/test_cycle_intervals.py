@@ -7,17 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.robot import Robot
+from joulepath import Arm, Cycle, CycleMove, Payload, Robot, Stop, plan_cycle
 from joulepath.models.uncertainty.spread import spread_of
-from joulepath.optimizer.cycle.cycle_move import CycleMove
 from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.dynamics.plant import REPORT
 from joulepath.optimizer.motion.spline import fine_samples
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.dynamics.test_interval import nominal, with_values
 from tests.optimizer.moves import AMPLE, GOAL, PAYLOAD, ROBOT, START, fixed, problem, torques
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import BranchFilter, Cycle, FreeOrder, Problem, Stop, StopPath, ToolPath
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.divided_paths import (
     PLACES,
@@ -20,13 +21,6 @@ from joulepath.optimizer.cycle.path_segments import PathSegment, path_segments
 from joulepath.optimizer.kinematics.tcp import tcp_pose as pose_of
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.free_order import FreeOrder
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.stop_path import StopPath
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.tool_path import ToolPath
 from tests.optimizer.cycle.test_paths import FREE, a_cycle, down
 from tests.optimizer.moves import ROBOT
 

@@ -12,7 +12,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from joulepath.models.registry import load_robot
+from joulepath import (
+    Arm,
+    ConeOrientedPose,
+    Cycle,
+    Payload,
+    Pose,
+    Problem,
+    Stop,
+    StopPath,
+    ToolPath,
+    load_robot,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import LeastBound
 from joulepath.optimizer.cycle import tool_turns
@@ -26,14 +37,6 @@ from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.kinematics.tool_path.least_time import least_tcp_distance, least_time
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.stop_path import StopPath
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.tool_path import ToolPath
 from tests.optimizer.cycle.cycles import HOME, PART
 from tests.optimizer.moves import AMPLE
 from tests.selection import long_but

@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import (
+    ContradictoryOrder,
+    Cycle,
+    DeadlineExceeded,
+    FreeOrder,
+    InvalidProblem,
+    plan_cycle,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.held_karp import HeldKarp
-from joulepath.optimizer.exceptions import ContradictoryOrder, DeadlineExceeded, InvalidProblem
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.free_order import FreeOrder
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import pick_and_place
 from tests.optimizer.cycle.test_lines import with_lines

@@ -10,20 +10,24 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath import (
+    Arm,
+    BranchFilter,
+    ConeOrientedPose,
+    Cycle,
+    CycleSolution,
+    DeadlineExceeded,
+    InvalidProblem,
+    Line,
+    Pose,
+    Stop,
+    StopPath,
+    ToolPath,
+    UnreachablePose,
+    plan_cycle,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle import free_orientations, stop_layers, tool_turns
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, UnreachablePose
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.line import Line
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.stop_path import StopPath
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.tool_path import ToolPath
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import HOME
 from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned

@@ -7,15 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Cycle, Pose, Stop, load_robot, plan_cycle
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.held_pose import HELD_POSE, HeldPose
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.cycle.test_optimize_cycle import planned
 from tests.optimizer.moves import AMPLE
 from tests.selection import long_but

@@ -8,15 +8,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
+from joulepath import (
+    Arm,
+    Box,
+    Cycle,
+    CycleSolution,
+    Obstacle,
+    Payload,
+    Problem,
+    Scene,
+    Spline,
+    Stop,
+    plan_cycle,
+)
 from joulepath.optimizer.cycle.known_motions import KnownMotion, KnownMotions, knowing
-from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true
 from tests.optimizer.moves import ROBOT

@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import DeadlineExceeded, NoSequence, Spline
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.lazy_search import LazySearch
 from joulepath.optimizer.cycle.legs import Leg
 from joulepath.optimizer.deadline import NEVER
-from joulepath.optimizer.exceptions import DeadlineExceeded
-from joulepath.optimizer.motion.spline import Spline
 
 RANGE = 3.0
 ROUNDING = 1e-9

@@ -8,15 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.line import Line
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.search.errors import PathInfeasible, StopInCollision
+from joulepath import (
+    Arm,
+    Box,
+    Cycle,
+    InvalidProblem,
+    Line,
+    Obstacle,
+    PathInfeasible,
+    Pose,
+    Scene,
+    Stop,
+    StopInCollision,
+    plan_cycle,
+)
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import planned
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose

@@ -10,14 +10,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from joulepath import BranchFilter, Cycle, CycleSolution, Improved, Payload, plan_cycle
 from joulepath.optimizer.cycle import cycle_search, legs
 from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.progress import Event, Improved
+from joulepath.optimizer.progress import Event
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import PART, pick_and_place
 from tests.refusals import refusal_of

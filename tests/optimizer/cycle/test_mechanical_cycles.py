@@ -11,16 +11,14 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
+from joulepath import CycleSolution, CycleTooShort, Problem, plan_cycle
 from joulepath.optimizer.bounds.mechanical_bound import mechanical_bounds
 from joulepath.optimizer.bounds.priced_work import PRICED_WORK, priced_work_bounds
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import MethodName, Problem
+from joulepath.optimizer.problem.problem import MethodName
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.moves import ROBOT
 from tests.refusals import refusal_of

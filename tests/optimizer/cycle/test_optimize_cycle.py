@@ -9,32 +9,35 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import (
+    AnyOf,
+    Arm,
+    Box,
+    BranchFilter,
+    ConeOrientedPose,
+    Cycle,
+    CycleSolution,
+    DeadlineExceeded,
+    NoSequence,
+    Obstacle,
+    OutsideLimits,
+    Payload,
+    Pose,
+    Problem,
+    Scene,
+    Stop,
+    StopInCollision,
+    UnreachablePose,
+    load_robot,
+    optimize,
+    plan_cycle,
+)
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.cycle.errors import NoSequence
 from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.dynamics.dwell import holding_power
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.exceptions import (
-    DeadlineExceeded,
-    OutsideLimits,
-    UnreachablePose,
-)
 from joulepath.optimizer.kinematics.end_configuration import EndConfiguration
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.search.errors import StopInCollision
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.cycle.cycles import HOME, pick_and_place, poses
 from tests.optimizer.moves import AMPLE, ROBOT, torques

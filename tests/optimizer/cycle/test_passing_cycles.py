@@ -12,20 +12,24 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import (
+    AnyOf,
+    Arm,
+    Cycle,
+    CycleSolution,
+    DeadlineExceeded,
+    FreeOrder,
+    Line,
+    Payload,
+    Pose,
+    Problem,
+    Stop,
+    plan_cycle,
+)
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.passing_leg import PassingLeg
-from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import CYCLE_RANGES, Cycle
-from joulepath.optimizer.problem.free_order import FreeOrder
-from joulepath.optimizer.problem.line import Line
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.cycle import CYCLE_RANGES
 from joulepath.optimizer.search.run import Run
 from tests.optimizer.cycle.cycles import HOME, PART, poses
 from tests.optimizer.moves import AMPLE, ROBOT

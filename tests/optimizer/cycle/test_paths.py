@@ -9,23 +9,28 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import (
+    AnyOf,
+    Arm,
+    Box,
+    BranchFilter,
+    Cycle,
+    Line,
+    Obstacle,
+    PathInfeasible,
+    Payload,
+    Pose,
+    Problem,
+    Scene,
+    Stop,
+    StopPath,
+    ToolPath,
+    optimize,
+    plan_cycle,
+)
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
 from joulepath.optimizer.cycle.priced_search import priced_motion
 from joulepath.optimizer.cycle.stop_layers import layers_of
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.line import Line
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.problem.stop_path import StopPath
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.problem.tool_path import ToolPath
-from joulepath.optimizer.search.errors import PathInfeasible
 from tests.optimizer.cycle.cycles import HOME, PART, pick_and_place
 from tests.optimizer.cycle.test_lines import INTO
 from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned

@@ -11,17 +11,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from joulepath import Arm, Bus, Cycle, CycleSolution, Payload, Stop, plan_cycle
 from joulepath.models.robot import Array
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
 from joulepath.optimizer.cycle.stored_charge import Demand, charges_of, drawn
 from joulepath.optimizer.dynamics.bus_flow import charges, pooled
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.moves import AMPLE, ROBOT
 
 ROUNDING = 1e-9

@@ -12,26 +12,26 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import (
+    BranchFilter,
+    Cycle,
+    CycleSolution,
+    CycleTooShort,
+    DeadlineExceeded,
+    InvalidProblem,
+    JoulepathError,
+    NoTrajectory,
+    Problem,
+    Stop,
+    optimize,
+    plan_cycle,
+)
 from joulepath.optimizer.cycle.cycle_search import CycleSearch
-from joulepath.optimizer.cycle.cycle_solution import CycleSolution
-from joulepath.optimizer.cycle.errors import CycleTooShort
 from joulepath.optimizer.cycle.pair_solver import PairSolver
 from joulepath.optimizer.cycle.stop_layers import layers_of
 from joulepath.optimizer.cycle.time_allocation import TimeAllocation, total_duration
 from joulepath.optimizer.cycle.timed_cycle import TimedSearch
 from joulepath.optimizer.dynamics.dwell import holding_power
-from joulepath.optimizer.exceptions import (
-    DeadlineExceeded,
-    InvalidProblem,
-    JoulepathError,
-    NoTrajectory,
-)
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.clocks import still
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
 from tests.optimizer.cycle.test_optimize_cycle import assert_true, planned

@@ -7,14 +7,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Payload, Problem, Spline, load_robot, optimize
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.motion.quadrature import quadrature
-from joulepath.optimizer.motion.spline import Spline, sample
-from joulepath.optimizer.optimize import optimize
+from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import Problem
 from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 

@@ -12,17 +12,14 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from joulepath import Bus, Inverter, Payload, Solution, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.lower_bound import lower_bounds
 from joulepath.optimizer.dynamics.bus_flow import drawn_at, exchange
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.dynamics.losses import power_flow
 from joulepath.optimizer.motion.spline import sample
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Inverter, Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.dynamics.kernel_states import left_out
 from tests.optimizer.moves import ROBOT, limits, problem
 from tests.refusals import refusal_of

@@ -12,15 +12,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import Bus, DurationTooShort, Dwell, Payload, Solution, optimize
 from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power, linear_dwells
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.result.solution import Solution
-from joulepath.optimizer.search.errors import DurationTooShort
 from tests.optimizer.moves import ROBOT, fixed, problem
 from tests.refusals import refusal_of
 from tests.selection import long_but

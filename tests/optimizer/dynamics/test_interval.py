@@ -11,8 +11,21 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_figures, load_robot
-from joulepath.models.robot import Array, FrictionLaw, Robot
+from joulepath import (
+    Bus,
+    Dwell,
+    Inverter,
+    Problem,
+    RecordedRows,
+    Recording,
+    Robot,
+    Spline,
+    evaluate,
+    load_robot,
+    optimize,
+)
+from joulepath.models.registry import load_figures
+from joulepath.models.robot import Array, FrictionLaw
 from joulepath.models.uncertainty import parameters
 from joulepath.models.uncertainty.parameters import count, index, place, values
 from joulepath.models.uncertainty.ranges import default_ranges
@@ -21,16 +34,9 @@ from joulepath.optimizer.dynamics.dwell import dwell_energy, holding_power
 from joulepath.optimizer.dynamics.interval import MotionEnergy, interval_of, saving_interval
 from joulepath.optimizer.dynamics.losses import breakdown
 from joulepath.optimizer.dynamics.plant import REPORT
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
-from joulepath.optimizer.motion.spline import Spline, fine_samples
+from joulepath.optimizer.motion.spline import fine_samples
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Inverter
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.search.baselines import guesses
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem, torques

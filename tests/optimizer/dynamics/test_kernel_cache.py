@@ -22,8 +22,7 @@ import pinocchio as pin
 import pytest
 
 import joulepath
-from joulepath.models.registry import robot_names
-from joulepath.models.robot import Robot
+from joulepath import Robot, optimize, robot_names
 from joulepath.optimizer.dynamics import kernel
 from joulepath.optimizer.dynamics.kernel import Kernel, kernel_for
 from joulepath.optimizer.dynamics.kernel_cache import (
@@ -37,7 +36,6 @@ from joulepath.optimizer.dynamics.kernel_expressions import build
 from joulepath.optimizer.dynamics.kernel_source import AVX2, PORTABLE, source
 from joulepath.optimizer.native.build import compiler
 from joulepath.optimizer.native.library_cache import work_folder
-from joulepath.optimizer.optimize import optimize
 from tests.app.forks import run
 from tests.optimizer.dynamics.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques

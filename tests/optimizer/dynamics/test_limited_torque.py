@@ -10,19 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Problem, RecordedRows, Recording, evaluate, load_robot, optimize
 from joulepath.models.from_figures import robot_of
-from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.dynamics.kernel import Kernel
 from joulepath.optimizer.dynamics.kernel_expressions import build
 from joulepath.optimizer.dynamics.kernel_functions import Interpreted
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.recording import RecordedRows, Recording
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import Problem
 from tests.by_pinocchio import torques_of
 from tests.optimizer.dynamics.kernel_states import LOSSY, TORQUE, left_out, states
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques

@@ -9,10 +9,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from joulepath import Arm, Bus
 from joulepath.models.robot import Array, Drives, Electronics
 from joulepath.optimizer.dynamics.losses import breakdown, drawn_power, power_flow, smooth_abs
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.bus import Bus
 from tests.by_pinocchio import torques_of
 from tests.optimizer.moves import ROBOT
 

@@ -7,17 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Payload, Problem, Spline, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.dynamics.limited_torque import limited_torque
 from joulepath.optimizer.dynamics.torque_bound import TorqueSamples, torque_bounds
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.quadrature import grid
-from joulepath.optimizer.motion.spline import Spline, sample, spline_of
+from joulepath.optimizer.motion.spline import sample, spline_of
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.problem import Problem
 from tests.selection import long_but
 
 # relative; the bound stops at 1e-6 of the limit, and these motions use a third of a limit or more

@@ -10,17 +10,24 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import (
+    Arm,
+    Bus,
+    DeadlineExceeded,
+    Evaluation,
+    InvalidProblem,
+    InvalidTable,
+    RecordedRows,
+    Recording,
+    Waypoints,
+    evaluate,
+    optimize,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.evaluate.evaluate import evaluate
-from joulepath.optimizer.evaluate.evaluation import Evaluation
-from joulepath.optimizer.evaluate.recording import MOTION_LIMITS, RecordedRows, Recording, Waypoints
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
+from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.motion.time_scalings import quintic
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.bus import Bus
 from tests.by_pinocchio import torques_of
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem
 

@@ -10,10 +10,20 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem, OutsideLimits
+from joulepath import (
+    Arm,
+    DeadlineExceeded,
+    ExcitationInfeasible,
+    InvalidProblem,
+    Obstacle,
+    OutsideLimits,
+    Payload,
+    Scene,
+    Sphere,
+    ToolCone,
+    load_robot,
+)
 from joulepath.optimizer.excitation import excite as module
-from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
 from joulepath.optimizer.excitation.excitation_result import Excitation
 from joulepath.optimizer.excitation.excite import MOUNTING_PLANE, excite
@@ -21,9 +31,6 @@ from joulepath.optimizer.excitation.fourier import FourierBasis
 from joulepath.optimizer.excitation.information import Information
 from joulepath.optimizer.excitation.torque_columns import TorqueColumns
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
-from joulepath.optimizer.problem.tool_cone import ToolCone
 from tests.by_pinocchio import torques_of
 from tests.refusals import refusal_of
 

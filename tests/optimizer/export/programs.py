@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from joulepath.optimizer.export.program import Move, Program, Rest
-from joulepath.optimizer.problem.arm import Payload
+from joulepath import Move, Payload, Program, Rest
 from tests.optimizer.export.read_back.random_motions import arm_of, random_spline
 
 LOAD = Payload(1.5, np.array([0.0, 0.01, 0.06]))

@@ -11,11 +11,9 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from joulepath import McapOptions, Program, export
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.export.export import export
-from joulepath.optimizer.export.mcap_recording import McapOptions
-from joulepath.optimizer.export.program import Program
 from tests.optimizer.export.programs import cycle_with_payload
 
 # rad, rad/s: messages have 64 bits

@@ -11,19 +11,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from joulepath import (
+    Cycle,
+    InvalidProblem,
+    Move,
+    NotCertified,
+    Payload,
+    Program,
+    Rest,
+    Spline,
+    Stop,
+    Trajectory,
+    plan_cycle,
+)
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.evaluate.errors import NotCertified
 from joulepath.optimizer.evaluate.sample_check import check_samples
-from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.export.certified import certified
-from joulepath.optimizer.export.program import Move, Program, Rest, program_of_cycle
+from joulepath.optimizer.export.program import program_of_cycle
 from joulepath.optimizer.motion.joined import spline_through
-from joulepath.optimizer.motion.spline import Spline, retimed
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.result.solution import Trajectory
+from joulepath.optimizer.motion.spline import retimed
 from tests.optimizer.export.programs import cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline
 from tests.optimizer.moves import AMPLE, GOAL, START

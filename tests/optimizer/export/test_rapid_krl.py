@@ -7,10 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.optimizer.export.errors import FormatUnsuitable
-from joulepath.optimizer.export.krl import KrlOptions, to_krl
-from joulepath.optimizer.export.program import Move, Program, Rest
-from joulepath.optimizer.export.rapid import RapidOptions, to_rapid
+from joulepath import FormatUnsuitable, KrlOptions, Move, Program, RapidOptions, Rest
+from joulepath.optimizer.export.krl import to_krl
+from joulepath.optimizer.export.rapid import to_rapid
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.point_programs import (
     cut,

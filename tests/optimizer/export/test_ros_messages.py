@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 import yaml
 
+from joulepath import FormatUnsuitable, Move, MoveitOptions, Program, Ros2Options, Spline
 from joulepath.models.robot import Array
 from joulepath.optimizer.export import quintic_points as points_module
-from joulepath.optimizer.export.errors import FormatUnsuitable
-from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.export.quintic_points import QUINTICS
-from joulepath.optimizer.export.ros_messages import MoveitOptions, Ros2Options, to_moveit, to_ros2
-from joulepath.optimizer.motion.spline import Spline
+from joulepath.optimizer.export.ros_messages import to_moveit, to_ros2
 from tests.optimizer.export.programs import cycle_with_payload
 from tests.optimizer.export.read_back.joint_trajectories import deviations, followed
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move

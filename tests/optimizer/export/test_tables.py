@@ -8,13 +8,11 @@ from io import BytesIO
 import numpy as np
 import pytest
 
+from joulepath import FormatUnsuitable, Spline, TableOptions
 from joulepath.app.api.evaluate.motion_csv import MotionCsv
 from joulepath.optimizer.export.csv_table import to_csv
-from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.export.json_document import to_json
 from joulepath.optimizer.export.npz_arrays import to_npz
-from joulepath.optimizer.export.rows import TableOptions
-from joulepath.optimizer.motion.spline import Spline
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import one_move
 

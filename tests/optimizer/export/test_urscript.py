@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_lsq_spline
 
+from joulepath import FormatUnsuitable, Move, Program, UrscriptOptions
 from joulepath.models.robot import Array
-from joulepath.optimizer.export.errors import FormatUnsuitable
-from joulepath.optimizer.export.program import Move, Program
-from joulepath.optimizer.export.urscript import URSCRIPT, UrscriptOptions, to_urscript
+from joulepath.optimizer.export.urscript import URSCRIPT, to_urscript
 from joulepath.optimizer.motion.spline import retimed
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline

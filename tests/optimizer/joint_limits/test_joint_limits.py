@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 import yaml
 
-from joulepath.models.own_arm.description import Description
-from joulepath.models.registry import load_robot, robot_names
-from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.joint_limits.errors import NoJointLimits
-from joulepath.optimizer.joint_limits.joint_limits import (
+from joulepath import (
+    Arm,
+    InvalidProblem,
     JointLimits,
+    NoJointLimits,
+    Payload,
     joint_limits,
-    joint_limits_along,
+    load_robot,
+    robot_names,
 )
+from joulepath.models.own_arm.description import Description
+from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
+from joulepath.optimizer.joint_limits.joint_limits import joint_limits_along
 from joulepath.optimizer.joint_limits.posture_set import PostureSet
 from joulepath.optimizer.joint_limits.posture_terms import PostureTerms
 from joulepath.optimizer.joint_limits.torque_cover import TorqueCover
@@ -25,7 +28,6 @@ from joulepath.optimizer.joint_limits.torque_load import Rates, TorqueLoad, grea
 from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
 from joulepath.optimizer.motion.joined import spline_through
 from joulepath.optimizer.motion.spline import sample
-from joulepath.optimizer.problem.arm import Arm, Payload
 from tests.by_pinocchio import torques_of
 from tests.models.own_arm.arms import robot
 from tests.models.own_arm.palletiser import ACROSS, UP, joint, link

@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.robot import Robot
-from joulepath.optimizer.exceptions import SingularPose
+from joulepath import Robot, SingularPose
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm

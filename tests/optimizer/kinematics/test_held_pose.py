@@ -9,11 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.held_pose import HeldPose
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm
 
 # largest pose error [m, rad]
 HELD = 1e-9

@@ -9,9 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath import Arm, Pose, Problem, optimize
-from joulepath.models.robot import Robot
-from joulepath.optimizer.exceptions import UnreachablePose
+from joulepath import Arm, Pose, Problem, Robot, UnreachablePose, optimize
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm

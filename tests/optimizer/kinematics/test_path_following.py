@@ -7,12 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, DeadlineExceeded, load_robot
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.kinematics.tool_path.path_following import PathPoint, follow
-from joulepath.optimizer.problem.arm import Arm
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import START
 

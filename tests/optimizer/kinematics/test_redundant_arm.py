@@ -8,9 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.exceptions import UnreachablePose
+from joulepath import Robot, UnreachablePose, load_robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.seven.redundant_arm import RedundantArm

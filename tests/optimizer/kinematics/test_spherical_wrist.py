@@ -9,15 +9,14 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import brentq
 
+from joulepath import BranchFilter, SingularPose, UnreachablePose
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.joint_axes import JointAxes
 from joulepath.optimizer.kinematics.six.decomposition import DecomposedArm
 from joulepath.optimizer.kinematics.six.spherical_wrist import SphericalWrist
-from joulepath.optimizer.problem.branches import BranchFilter
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, KUKA, flange, inside, solved
 from tests.selection import long_but
 

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath import ToolPath, optimize
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.kinematics.tool_path.tool_course import ToolCourse
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.tool_path import ToolPath
 from tests.optimizer.moves import tcp_pose
 from tests.optimizer.tool_paths import HOME, along, moved
 

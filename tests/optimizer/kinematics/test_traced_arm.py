@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.robot import Robot
-from joulepath.optimizer.exceptions import SingularPose, UnreachablePose
+from joulepath import Robot, SingularPose, UnreachablePose
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.chain import Chain, pose_error, twist_size
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, Robot
+from joulepath import Arm, ConeOrientedPose, Pose, Robot, load_robot
+from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.covers.turned_pose_boxes import BRANCHES, TurnedPose
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose, tcp_pose
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.pose import Pose
 from tests.optimizer.kinematics.axis_patterns import redrawn, robot_of, shifted
 
 # largest error of a solution of the closed form next to a singularity [rad]

@@ -7,13 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Box, Cycle, HalfSpace, Obstacle, Payload, Pose, Scene, Stop, load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene
-from joulepath.optimizer.problem.stops import Stop
 
 DOWN = [0.0, 1.0, 0.0, 0.0]
 PART = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.06]))

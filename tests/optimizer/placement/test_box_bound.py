@@ -10,26 +10,32 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Robot
+from joulepath import (
+    AnyOf,
+    Arm,
+    ConeOrientedPose,
+    Cycle,
+    Group,
+    JoulepathError,
+    Moved,
+    Places,
+    Pose,
+    Region,
+    Robot,
+    WeightedCycle,
+    load_robot,
+    plan_cycle,
+)
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.angles import wrapped
 from joulepath.optimizer.kinematics.covers.pose_cells import URPoseCells, pose_cells_of
 from joulepath.optimizer.kinematics.six.ur_closed_form import URClosedForm
 from joulepath.optimizer.kinematics.tcp import flange_pose
 from joulepath.optimizer.placement.box_bound import _CycleBoxes, _PlaceBoxBound, box_bound
 from joulepath.optimizer.placement.extents import Extents
-from joulepath.optimizer.placement.placement import Placement, WeightedCycle
-from joulepath.optimizer.placement.region import Group, Moved, Places, Region
+from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.rounds import ROUNDS
 from joulepath.optimizer.placement.space import Space
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.targets import AnyOf
 from tests.optimizer.kinematics.axis_patterns import redrawn, robot_of, shifted
 from tests.optimizer.placement.cells import at, down, two_stops
 from tests.selection import long_but

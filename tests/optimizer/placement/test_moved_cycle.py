@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from joulepath import (
+    AnyOf,
+    ConeOrientedPose,
+    Line,
+    Pose,
+    Stop,
+    StopPath,
+    ToolCone,
+    ToolPath,
+    plan_cycle,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.placement.moved_cycle import cycle_at
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.line import Line
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.stop_path import StopPath
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.problem.tool_path import ToolPath
 from tests.optimizer.placement.cells import arm, at, down, floor, two_stops
 
 ROUNDING = 1e-12

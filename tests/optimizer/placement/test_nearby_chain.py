@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Cycle, Pose, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.placement.moved_cycle import cycle_at, inverted
 from joulepath.optimizer.placement.nearby_chain import Visited, nearby_cycle
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cycle import START, Cycle
-from joulepath.optimizer.problem.pose import Pose
+from joulepath.optimizer.problem.cycle import START
 from tests.optimizer.placement.cells import at, two_stops
 
 MIDDLE = {

@@ -7,15 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import DeadlineExceeded, JoulepathError
-from joulepath.optimizer.placement.errors import NoPlacement
-from joulepath.optimizer.placement.place import place, place_robot
-from joulepath.optimizer.placement.placement import Placement, WeightedCycle
-from joulepath.optimizer.placement.placement_solution import PlacementSolution
-from joulepath.optimizer.placement.region import Moved, Places, Region
+from joulepath import (
+    CandidatesFound,
+    CandidateTried,
+    DeadlineExceeded,
+    Improved,
+    JoulepathError,
+    Moved,
+    NoPlacement,
+    PlacementSolution,
+    Places,
+    Region,
+    WeightedCycle,
+    place,
+    plan_cycle,
+)
+from joulepath.optimizer.placement.place import place_robot
+from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.space import Space
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.progress import CandidatesFound, CandidateTried, Event, Improved
+from joulepath.optimizer.progress import Event
 from tests.optimizer.placement.cells import arm, at, floor, two_stops, wall
 
 AMPLE = 600.0

@@ -7,17 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from joulepath import Cycle, Moved, Region, WeightedCycle
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.known_motions import KnownMotions
 from joulepath.optimizer.deadline import NEVER, Clock, Deadline
 from joulepath.optimizer.placement import placement_search
 from joulepath.optimizer.placement.nearby_chain import Visited
-from joulepath.optimizer.placement.placement import Placement, WeightedCycle
+from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.placement_search import PlacementSearch
-from joulepath.optimizer.placement.region import Moved, Region
 from joulepath.optimizer.placement.rounds import Round, Rounds
 from joulepath.optimizer.placement.space import Place, Space
-from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.progress import no_listener
 from tests.optimizer.clocks import still
 from tests.optimizer.placement.cells import two_stops

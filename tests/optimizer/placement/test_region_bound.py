@@ -9,19 +9,27 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot, robot_names
-from joulepath.optimizer.exceptions import JoulepathError
+from joulepath import (
+    Arm,
+    Bus,
+    Cycle,
+    Group,
+    JoulepathError,
+    Moved,
+    Payload,
+    Places,
+    Region,
+    Stop,
+    WeightedCycle,
+    load_robot,
+    plan_cycle,
+    robot_names,
+)
 from joulepath.optimizer.kinematics.tcp import tcp_jacobian
 from joulepath.optimizer.placement.extents import Extents
-from joulepath.optimizer.placement.placement import Placement, WeightedCycle
-from joulepath.optimizer.placement.region import Group, Moved, Places, Region
+from joulepath.optimizer.placement.placement import Placement
 from joulepath.optimizer.placement.region_bound import levers, prices_of_travel, region_bound
 from joulepath.optimizer.placement.space import Place, Space
-from joulepath.optimizer.plan_cycle import plan_cycle
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.stops import Stop
 from tests.optimizer.placement.cells import PART, arm, at, down, two_stops
 from tests.selection import long_but
 

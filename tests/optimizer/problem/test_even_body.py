@@ -6,18 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import Attachment, Box, Capsule, Cylinder, Mesh, Payload, Sphere, even_payload
 from joulepath.models.robot import Array
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.even_body import even_payload
-from joulepath.optimizer.problem.scene import (
-    Attachment,
-    Box,
-    Capsule,
-    Cylinder,
-    Mesh,
-    Shape,
-    Sphere,
-)
+from joulepath.optimizer.problem.scene import Shape
 
 MASS = 2.5
 ROUNDING = 1e-12  # relative, of sums of a few hundred products

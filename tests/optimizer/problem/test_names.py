@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from joulepath.models.registry import load_robot, robot_names
-from joulepath.models.robot import Robot
+from joulepath import (
+    Arm,
+    InvalidProblem,
+    Obstacle,
+    Robot,
+    Scene,
+    Sphere,
+    capsule_between,
+    load_robot,
+    robot_names,
+)
 from joulepath.optimizer.collision.bodies import bodies_of
-from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.names import LONGEST_NAME, first_repeated, is_plain, normalized
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere, capsule_between
 from tests.optimizer.chains import serial_chain
 
 ROBOTS: list[Robot] = [*map(load_robot, robot_names()), serial_chain(4)]

@@ -10,14 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import AnyOf, Arm, InvalidProblem, OutsideLimits, Payload, Pose, Problem, load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import InvalidProblem, OutsideLimits
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, tcp_pose
 from tests.refusals import refusal_of

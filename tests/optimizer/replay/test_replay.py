@@ -14,21 +14,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import (
+    Arm,
+    Box,
+    DeadlineExceeded,
+    InvalidProblem,
+    Obstacle,
+    Payload,
+    PlannedMotion,
+    PlannedTorques,
+    Replay,
+    Scene,
+    Solution,
+    Spline,
+    load_robot,
+    optimize,
+    replay,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import collision_model
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.exceptions import DeadlineExceeded, InvalidProblem
-from joulepath.optimizer.motion.spline import Spline
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.replay.planned import PlannedMotion, PlannedTorques
 from joulepath.optimizer.replay.reference import TIME_GRID, course_of, reference
-from joulepath.optimizer.replay.replay import planned_motion, replay
-from joulepath.optimizer.replay.replay_result import Replay
-from joulepath.optimizer.result.solution import Solution
+from joulepath.optimizer.replay.replay import planned_motion
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import GOAL, PAYLOAD, START, problem, tcp_pose
 from tests.refusals import refusal_of

@@ -12,14 +12,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath.models.registry import load_robot, robot_names
-from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.collision.model import collision_model
-from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
-from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.clouds import Points
-from joulepath.optimizer.problem.scene import (
+from joulepath import (
+    Arm,
     Attachment,
     Box,
     Capsule,
@@ -27,10 +21,19 @@ from joulepath.optimizer.problem.scene import (
     HalfSpace,
     Mesh,
     Obstacle,
+    Payload,
+    Points,
+    Robot,
     Scene,
-    Shape,
     Sphere,
+    load_robot,
+    robot_names,
 )
+from joulepath.models.robot import Array
+from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.kinematics.rigid_body_model import rigid_body_model
+from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.problem.scene import Shape
 from joulepath.optimizer.replay.shapes import unsimulated
 from joulepath.optimizer.replay.simulated_arm import SimulatedArm, with_changes
 from joulepath.optimizer.replay.simulator import mujoco

@@ -7,11 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath import Arm, Pose, Problem, optimize
+from joulepath import Arm, JoulepathError, Pose, Problem, Solution, optimize
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
-from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.kinematics.six_joints import KUKA, flange
 from tests.selection import long_but
 

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from joulepath import Baseline, Payload, Problem
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.interval import MotionEnergy
 from joulepath.optimizer.dynamics.losses import saving
@@ -19,9 +20,6 @@ from joulepath.optimizer.motion.time_scalings import (
     SampledMotion,
     quintic,
 )
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.baseline import Baseline
 from joulepath.optimizer.result.energy import Sensitivity
 from joulepath.optimizer.search.baselines import (
     Broken,

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import BranchFilter, optimize
 from joulepath.optimizer.deadline import NEVER, Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.branches import BranchFilter
 from joulepath.optimizer.search import candidates as search
 from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.candidates import Candidate

@@ -11,17 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import BranchFilter, Payload, Problem, TorqueInfeasible, UnreachablePose
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import UnreachablePose
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search import candidates as search
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.search.errors import TorqueInfeasible
 from tests.optimizer.moves import (
     GOAL,
     ROBOT,

@@ -7,10 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from joulepath import Obstacle, Problem, Scene, Sphere, optimize
 from joulepath.optimizer.collision.model import CollisionModel
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from tests.optimizer.moves import GOAL, ROBOT, START, changed, problem_with, tcp_pose
 
 # clearance [m] that an end has, less than what is kept of it, and of a ball that touches it

@@ -9,15 +9,10 @@ import pytest
 
 from benchmarks.agreement import request
 from benchmarks.tasks import collision_free
+from joulepath import Arm, Bus, Pose, Problem, load_robot, optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 from scipy.stats import qmc
 
+from joulepath import ConeOrientedPose, Pose
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.orientation_tolerance import (
     excess_angle,
@@ -17,8 +18,6 @@ from joulepath.optimizer.kinematics.orientation_tolerance import (
 )
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.search.free_goal import goal_constraints
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates, GoalConstraints

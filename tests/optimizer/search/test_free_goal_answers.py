@@ -7,16 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.optimizer.exceptions import UnreachablePose, UnreachableTargets
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Payload
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.targets import AnyOf
-from joulepath.optimizer.result.solution import Solution
+from joulepath import (
+    AnyOf,
+    BranchFilter,
+    Bus,
+    ConeOrientedPose,
+    Dwell,
+    Payload,
+    Pose,
+    Solution,
+    UnreachablePose,
+    UnreachableTargets,
+    optimize,
+)
 from joulepath.optimizer.search.finishing_time import FINISHING
 from joulepath.optimizer.search.sampled_ends import SAMPLES
 from tests.optimizer.clocks import LAST_READINGS, CountingClock

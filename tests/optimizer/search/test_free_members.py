@@ -7,19 +7,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import (
+    Arm,
+    GoalInCollision,
+    Obstacle,
+    Pose,
+    Problem,
+    Scene,
+    Sphere,
+    StartInCollision,
+    load_robot,
+    optimize,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.clearance_constraint import CLEARANCE_CONSTRAINT
 from joulepath.optimizer.collision.model import CollisionModel
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Obstacle, Scene, Sphere
 from joulepath.optimizer.search.ends import SAMPLING
-from joulepath.optimizer.search.errors import GoalInCollision, StartInCollision
 from tests.selection import long_but
 
 ROBOT = load_robot("panda")

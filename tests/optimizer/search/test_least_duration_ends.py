@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, ConeOrientedPose, Pose, Problem, load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.least_duration_ends import with_shorter_duration
 from joulepath.optimizer.search.sampled_ends import fastest_samples
 from tests.optimizer.moves import AMPLE

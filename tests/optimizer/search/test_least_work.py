@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import CandidateStatus, Solution, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.motion import bspline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.result.candidates import CandidateStatus
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import Reason
 from joulepath.optimizer.search.coarse_motions import COARSE, CoarseSolver, best_of_each
 from joulepath.optimizer.search.least_work import explore_least_work

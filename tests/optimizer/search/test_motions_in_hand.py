@@ -10,17 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Certificate, DeadlineExceeded, Solution, Spline, optimize
 from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.deadline import DeadlinePassed
-from joulepath.optimizer.exceptions import DeadlineExceeded
 from joulepath.optimizer.feasible_answer import least_certified
-from joulepath.optimizer.motion.spline import Spline, lasting
+from joulepath.optimizer.motion.spline import lasting
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.result.certificate import Certificate
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search import baseline_comparison
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.state import SearchState

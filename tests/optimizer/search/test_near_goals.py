@@ -10,18 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import (
+    AnyOf,
+    Arm,
+    BranchFilter,
+    ConeOrientedPose,
+    Dwell,
+    Pose,
+    Problem,
+    load_robot,
+    optimize,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.dwell import Dwell
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.targets import AnyOf
 from joulepath.optimizer.search.ends import label_of
 from joulepath.optimizer.search.near_goals import NEAR_GOALS, activate_near_goals
 from joulepath.optimizer.search.sampled_ends import nearest_configuration

@@ -10,12 +10,8 @@ import numpy as np
 import pytest
 
 from benchmarks.tasks import collision_free
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Bus, Pose, Problem, load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.other_starts import start_beside
 from joulepath.optimizer.search.state import SearchState

@@ -10,15 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Bus, ConeOrientedPose, Payload, Pose, Problem, load_robot
 from joulepath.optimizer.kinematics.end_configuration import FULL_TURN
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.seven_segment import shortest_duration
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import Candidate
 from joulepath.optimizer.search.near_goals import OTHER_TURNS, other_turns
 from joulepath.optimizer.search.run import Run

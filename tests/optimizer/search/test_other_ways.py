@@ -7,12 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Box, Obstacle, Pose, Problem, Scene, load_robot
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
 from joulepath.optimizer.search import stages
 from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.other_ways import OTHER_WAYS, explore_other_ways, quickest

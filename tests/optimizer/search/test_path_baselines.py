@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from joulepath import Spline, optimize
 from joulepath.optimizer.kinematics.inverse import inverse_kinematics_for
 from joulepath.optimizer.motion import ramped
 from joulepath.optimizer.motion.bspline import DEGREE, clamped, fit
 from joulepath.optimizer.motion.quintic import fraction
-from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.search.baseline_comparison import PATH_BASELINES
 from joulepath.optimizer.search.baselines import standing

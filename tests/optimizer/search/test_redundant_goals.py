@@ -11,20 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
-from joulepath.models.robot import Array, Robot
+from joulepath import Arm, JoulepathError, Pose, Problem, Robot, load_robot, optimize
+from joulepath.models.robot import Array
 from joulepath.optimizer.bounds.holding_cells import HoldingCells
 from joulepath.optimizer.bounds.self_motion_bound import self_motion_bound
 from joulepath.optimizer.collision.model import collision_model
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends
 from tests.selection import long_but

@@ -7,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from joulepath import Bus, ConeOrientedPose, load_robot, optimize
 from joulepath.optimizer.search import free_goal
 from tests.optimizer.clocks import still
 from tests.optimizer.moves import PAYLOAD, fixed, problem, tcp_pose

@@ -12,16 +12,10 @@ import numpy as np
 import pytest
 
 from benchmarks.tasks import collision_free
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Bus, CandidateStatus, Payload, Pose, Problem, load_robot, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.time_scalings import quintic_spline
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm, Payload
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.result.candidates import CandidateStatus
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.seeds import (
     SEEDS,

@@ -9,14 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import BranchFilter, ConeOrientedPose, JoulepathError, Solution, optimize
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.kinematics.inverse import required_inverse_kinematics
 from joulepath.optimizer.kinematics.self_motion import SelfMotion
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from joulepath.optimizer.result.solution import Solution
 from tests.optimizer.moves import ROBOT, problem, tcp_pose
 from tests.selection import long_but
 

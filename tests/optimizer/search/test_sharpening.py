@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Arm, Bus, Problem, optimize
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.attempts import solve
 from joulepath.optimizer.search.branch_and_bound import explore
 from joulepath.optimizer.search.sharpening import sharpen

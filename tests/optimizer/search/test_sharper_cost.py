@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.agreement import P95, request
+from joulepath import Bus, Problem, optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.bus import Bus
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.sharper_cost import (
     SHARPER_COST,
     SharperCostSettings,

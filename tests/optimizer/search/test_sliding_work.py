@@ -9,14 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Pose, Problem, load_robot, optimize
 from joulepath.models.robot import Array
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.kinematics.tcp import tcp_pose
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.arm import Arm
-from joulepath.optimizer.problem.pose import Pose
-from joulepath.optimizer.problem.problem import Problem
 from joulepath.optimizer.search.sampled_ends import between
 from joulepath.optimizer.search.sharpening import sharpen
 from joulepath.optimizer.search.sliding_work import explore_sliding_work

@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import AnyOf, BranchFilter, OutsideLimits, Pose, UnreachableTargets, optimize
 from joulepath.models.robot import Array
-from joulepath.optimizer.exceptions import OutsideLimits, UnreachableTargets
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.problem.branches import BranchFilter
-from joulepath.optimizer.problem.pose import Pose
 from joulepath.optimizer.problem.problem import narrowed
-from joulepath.optimizer.problem.targets import AnyOf, members, single
+from joulepath.optimizer.problem.targets import members, single
 from tests.optimizer.moves import GOAL, HOME, START, limits, paper_poses, problem, tcp_pose
 from tests.refusals import refusal_of
 from tests.selection import long_but

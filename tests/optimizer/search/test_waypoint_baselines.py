@@ -9,20 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import Baseline, Cycle, Problem, Solution, Stop, load_robot, optimize, plan_cycle
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
-from joulepath.models.registry import load_robot
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.motion.ruckig_motion import straight
 from joulepath.optimizer.motion.spline import peak_rates, sample
-from joulepath.optimizer.optimize import optimize
-from joulepath.optimizer.plan_cycle import plan_cycle
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.cycle import Cycle
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.stops import Stop
-from joulepath.optimizer.result.baseline import Baseline
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.baselines import standing
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.search.waypoint_baselines import (

@@ -6,12 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from joulepath.models.registry import load_robot
+from joulepath import Arm, Move, Program, Spline, load_robot
 from joulepath.models.robot import Array
-from joulepath.optimizer.export.program import Move, Program
 from joulepath.optimizer.motion.bspline import DEGREE, clamped
-from joulepath.optimizer.motion.spline import Spline, least_time_scale, retimed
-from joulepath.optimizer.problem.arm import Arm
+from joulepath.optimizer.motion.spline import least_time_scale, retimed
 
 OWN = "own_arm"
 

@@ -9,17 +9,23 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from joulepath import (
+    Box,
+    NoCollisionFreeTrajectory,
+    Obstacle,
+    Problem,
+    Scene,
+    Sphere,
+    ToolCone,
+    optimize,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.motion import bspline, quintic
 from joulepath.optimizer.motion.spline import least_time_scale, retimed, spline_of
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import MethodName, Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
-from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.search.errors import NoCollisionFreeTrajectory
+from joulepath.optimizer.problem.problem import MethodName
 from joulepath.optimizer.solve.methods import METHODS, planned_paths, solver_for
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline

@@ -11,16 +11,14 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from joulepath import DurationTooShort, Solution, optimize
 from joulepath.optimizer.deadline import NEVER
 from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.motion.ruckig_motion import time_optimal_spline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.problem import MethodName
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.candidates import bound, pairs
 from joulepath.optimizer.search.ends import ends
-from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.solve.methods import METHODS, polynomial_ga
 from joulepath.optimizer.solve.methods.method import with_excess
 from joulepath.optimizer.solve.methods.polynomial_ga import PolynomialGA

@@ -7,17 +7,22 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from joulepath import (
+    Box,
+    NoTrajectory,
+    Obstacle,
+    OutsideLimits,
+    Problem,
+    Scene,
+    Solution,
+    Spline,
+    optimize,
+)
 from joulepath.models.robot import Array
 from joulepath.optimizer.deadline import Deadline
-from joulepath.optimizer.exceptions import NoTrajectory, OutsideLimits
 from joulepath.optimizer.kinematics.tcp import tcp_pose
 from joulepath.optimizer.motion.joined import joined
-from joulepath.optimizer.motion.spline import Spline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 from joulepath.optimizer.solve.methods.passing_spline import PassingSpline

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from joulepath import AnyOf, Bus, optimize
 from joulepath.optimizer.collision.planner.joint_path import path_samples
 from joulepath.optimizer.collision.planner.path_planner import USUAL_EFFORT, Effort, plan_paths
 from joulepath.optimizer.collision.planner.planning_result import PlannedPaths, PlanningEnd
 from joulepath.optimizer.deadline import NEVER, Deadline
-from joulepath.optimizer.optimize import optimize
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.bus import Bus, BusMode
-from joulepath.optimizer.problem.targets import AnyOf
+from joulepath.optimizer.problem.bus import BusMode
 from joulepath.optimizer.solve.methods import free_spline, planned_paths
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.method import above

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from joulepath import optimize
+from joulepath import Box, Obstacle, Problem, Scene, Solution, Sphere, ToolCone, optimize
 from joulepath.optimizer.collision.clearance_constraint import (
     CLEARANCE_CONSTRAINT,
     ClearanceConstraint,
@@ -17,10 +17,6 @@ from joulepath.optimizer.kinematics.forward import joint_placements
 from joulepath.optimizer.kinematics.path_constraints import PathConstraints
 from joulepath.optimizer.motion.spline import sample
 from joulepath.optimizer.prepared_problem import PreparedProblem
-from joulepath.optimizer.problem.problem import Problem
-from joulepath.optimizer.problem.scene import Box, Obstacle, Scene, Sphere
-from joulepath.optimizer.problem.tool_cone import ToolCone
-from joulepath.optimizer.result.solution import Solution
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
 from joulepath.optimizer.solve.methods.limit_repair import LIMIT_REPAIR
 from joulepath.optimizer.solve.methods.solve_context import SolveContext
