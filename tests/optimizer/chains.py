@@ -17,7 +17,9 @@ from joulepath.models.robot import (
 )
 
 # distance of neighbouring joints [m], radius of the capsule around a link [m], mass of a link [kg]
-LENGTH, RADIUS, MASS = 0.22, 0.03, 1.6
+LENGTH = 0.22
+RADIUS = 0.03
+MASS = 1.6
 
 
 def serial_chain(nq: int, capsules: bool = True) -> Robot:

@@ -16,7 +16,8 @@ from tests.by_pinocchio import flange, torques_of
 from tests.selection import long_but
 
 # m and rad: what an answer may miss its pose by, and a configuration itself
-ACCURACY, FOUND = 1e-9, 1e-6
+ACCURACY = 1e-9
+FOUND = 1e-6
 # N·m; both recursions round at about 1e-13 of torques of some 500 N·m
 TORQUE = 1e-9
 # s: no search comes near it, however busy the machine

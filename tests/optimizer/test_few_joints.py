@@ -29,9 +29,11 @@ from tests.selection import long_but
 HOME = np.array([0.2, -0.4, 0.9, 0.5, 0.3])
 THERE = np.array([-0.9, 0.3, 0.6, 0.8, -0.7])
 # the axis of the last joint, about which it turns the tool, and one across it
-ROLL, ACROSS = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+ROLL = np.array([1.0, 0.0, 0.0])
+ACROSS = np.array([0.0, 0.0, 1.0])
 # m and rad: residual of a pose, and difference of a configuration found again
-ACCURACY, FOUND = 1e-9, 1e-6
+ACCURACY = 1e-9
+FOUND = 1e-6
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,8 @@ from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem, torques
 
 LOAD = np.array([0.08, 0.2, 0.1, 0.05, 0.0, 0.15])
 # relative to the largest: central differences with a step of 1e-6
-DIFFERENCE, STEP = 2e-6, 1e-6
+DIFFERENCE = 2e-6
+STEP = 1e-6
 FORMULA = 1e-9  # relative; the same formula by another route
 HEAVY = Payload(mass=5.0, com=np.array([0.0, 0.05, 0.1]))
 

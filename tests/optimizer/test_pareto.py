@@ -46,7 +46,8 @@ SAME = 1e-6
 ROUNDING = 1e-12
 # of the energy: what a jump lowers it to at most; of the duration: how near it is looked at from
 # below
-JUMP, NEAR = 0.9, 2e-3
+JUMP = 0.9
+NEAR = 2e-3
 POINTS = 6
 
 

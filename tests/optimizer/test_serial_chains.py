@@ -42,7 +42,8 @@ JOINTS = (2, 3, 5, 8)
 OBJECTIVES: dict[str, dict[str, Any]] = {"electrical": {}, "mechanical": {"duration_max": 1.5}}
 # relative, of the energy: a sum over this many equal steps, of powers that have corners where they
 # change sign
-STEPS, SUMMED = 20001, 1e-3
+STEPS = 20001
+SUMMED = 1e-3
 # relative, of a limit: the certificate's own tolerance
 HELD = 1e-6
 
@@ -142,7 +143,8 @@ def test_links_keep_clear_of_each_other(robot: Robot) -> None:
     assert clearance is not None and clearance.min_clearance >= 0
 
 
-POSE, FREE = Pose(np.eye(4)), ConeOrientedPose([0.3, 0.1, 0.4])
+POSE = Pose(np.eye(4))
+FREE = ConeOrientedPose([0.3, 0.1, 0.4])
 
 
 @pytest.mark.parametrize(("end", "target"), [("start", POSE), ("goal", POSE), ("goal", FREE)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -10,32 +10,12 @@ from joulepath.models.robot import Array, Mask
 from joulepath.optimizer.bounds.chain_derivatives import ChainDerivatives
 from joulepath.optimizer.bounds.cruise import TINY
 from joulepath.optimizer.bounds.friction_conjugate import FrictionConjugate
-from joulepath.optimizer.bounds.grid_cells import Curvature, GridCells
+from joulepath.optimizer.bounds.grid_cells import GridCells
 from joulepath.optimizer.bounds.least_potential import LeastPotential, _excess, _hold, _weight
 from joulepath.optimizer.bounds.path_curvature import DIFFERENCE_STEP
 from joulepath.optimizer.bounds.path_terms import GridPoints
 from joulepath.optimizer.bounds.speed_conjugate import BISECTIONS, SpeedConjugate, TimeParts
 from joulepath.optimizer.bounds.weights import Weights
-from joulepath.optimizer.kinematics.vectors import cross
-
-
-def joint_inertia(chain: ChainDerivatives, q: Array) -> Array:
-    """As `ChainDerivatives.joint_inertia`."""
-    z, o, R, c = chain._frames(q)
-    about_centre = R @ chain.inertia @ R.transpose(0, 1, 3, 2)
-    square = (c * c).sum(axis=-1)[..., None, None] * np.eye(3) - c[..., :, None] * c[..., None, :]
-    about_origin = _from_outside(about_centre + chain.mass[:, None, None] * square)
-    outer, moment = np.cumsum(chain.mass[::-1])[::-1], _from_outside(chain.mass[:, None] * c)
-    speed = cross(o, z)
-    linear = outer[:, None] * speed + cross(z, moment)
-    angular = (about_origin @ z[..., None])[..., 0] + cross(moment, speed)
-    upper = np.triu(z @ angular.transpose(0, 2, 1) + speed @ linear.transpose(0, 2, 1))
-    return np.asarray(upper + np.triu(upper, 1).transpose(0, 2, 1) + np.diag(chain.rotor))
-
-
-def _from_outside(each: Array) -> Array:
-    """Sums over a link and all beyond it, along axis 1."""
-    return np.cumsum(each[:, ::-1], axis=1)[:, ::-1]
 
 
 def grid_points(
@@ -52,8 +32,8 @@ def grid_points(
         return every.reshape(S + 1, K, *values.shape[1:])
 
     torque, slope = map(placed, chain.gravity_torque(q))
-    own = joint_inertia(chain, q)
-    beside = joint_inertia(chain, q + DIFFERENCE_STEP * np.repeat(omega, K, axis=0)[flat])
+    own = chain.joint_inertia(q)
+    beside = chain.joint_inertia(q + DIFFERENCE_STEP * np.repeat(omega, K, axis=0)[flat])
     M, N = placed(own), placed((beside - own) / DIFFERENCE_STEP)
     momentum = _sides(
         lambda at: (
@@ -79,15 +59,6 @@ def grid_points(
 def _sides(term: Callable[[slice], Array]) -> Array:
     """A term of the nodes at both ends of each step, (S, 2, ...)."""
     return np.stack([term(slice(None, -1)), term(slice(1, None))], axis=1)
-
-
-def deviation(
-    cells: GridCells, value: Array, mean: Array, curvature: Curvature, joints: Sequence[int]
-) -> Array:
-    """As `GridCells.deviation`."""
-    away = np.abs(value - mean[:, None, None])[..., joints]
-    around = _between(cells, curvature.across[..., joints]) + curvature.along[:, None, joints]
-    return np.asarray(_of_corners(cells, away, np.maximum) + around[:, None])
 
 
 def _of_corners(cells: GridCells, points: Array, reduce: Callable[[Array, Array], Array]) -> Array:

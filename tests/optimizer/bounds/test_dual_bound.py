@@ -30,13 +30,15 @@ from tests.selection import long_but
 
 # times, positions, speeds and accelerations of a motion, and weights of the times [s]
 Moved = tuple[Array, Array, Array, Array, Array]
-STEPS, FINE = 6, 801
+STEPS = 6
+FINE = 801
 WIDE = Spacing()
 # relative; a cell has one multiplier of the displacement, found by bisection, and a duration its
 # own
 CHOICE = 1e-3
 MOVES = 2
-NARROW, LOST = 1.015, 0.01  # a cell of durations, and what such a cell may take from the bound
+NARROW = 1.015  # a cell of durations
+LOST = 0.01  # what such a cell may take from the bound
 CLOSELY = 0.02  # relative: how near the bound comes to what it bounds
 USEFUL = 0.3  # of the energy, where nearly all of it is copper loss; elsewhere more
 

@@ -32,10 +32,12 @@ from tests.optimizer.moves import limits, problem
 from tests.selection import long_but
 
 MOVES = 6
-BOX, WIDE = 0.03, 0.3  # rad
+BOX = 0.03  # rad
+WIDE = 0.3  # rad
 SAMPLES = 601
 SAMPLED = 1e-3  # relative; friction turns fast where a speed changes its sign
-NEAR, CLOSE = 0.9, 0.995  # of the linear energy
+NEAR = 0.9  # of the linear energy
+CLOSE = 0.995  # of the linear energy
 SHIFT = 20.0  # J added to both, so that a ratio tells of energies near zero
 LOADED = [name for name in CONDITIONS if "load" in name and name != "loaded and tilted"]
 NAMES = [name for name in CONDITIONS if name not in LOADED]

@@ -11,7 +11,8 @@ import numpy as np
 from joulepath.models.robot import Array, Limits
 from joulepath.optimizer.bounds.least_displacement import LIMIT_TOLERANCE, least_displacement
 
-NQ, COUNT = 2, 200
+NQ = 2
+COUNT = 200
 ONES = np.ones(NQ)
 # a range below one turn, one of about three turns off the middle
 LIMITS = Limits(np.array([-2.9, -4.0]), np.array([2.9, 14.0]), ONES, ONES, ONES, ONES)

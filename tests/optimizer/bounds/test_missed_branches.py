@@ -26,7 +26,8 @@ from tests.selection import long_but
 GEN3 = load_robot("gen3")
 CHAIN = Chain.of(GEN3.model)
 # of an attack
-PARTICLES, STEPS = 80, 25
+PARTICLES = 80
+STEPS = 25
 # what a configuration misses its pose by, at most [m, rad]
 EXACT = 1e-11
 # relative

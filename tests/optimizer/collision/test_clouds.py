@@ -42,10 +42,12 @@ from tests.selection import long_but
 
 # two exact computations of one distance [m] differ by rounding; by Coal's tolerance where it takes
 # part
-ROUNDING, COAL_TOLERANCE = 1e-9, 1e-7
+ROUNDING = 1e-9
+COAL_TOLERANCE = 1e-7
 # a gradient by central differences of STEP [rad]: curvature of distances of centimetres, and
 # rounding over the step
-STEP, GRADIENT = 1e-6, 1e-4
+STEP = 1e-6
+GRADIENT = 1e-4
 POSE = at([0.1, -0.05, 0.2], [0.3, -0.2, 0.5])
 MARGIN = 0.02
 

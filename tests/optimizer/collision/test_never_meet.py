@@ -60,7 +60,8 @@ BY_CAPSULES = {
 # arms of the same kinematics and capsules as another
 TWINS = {"ur7e": "ur5e", "ur12e": "ur10e"}
 # largest edge of a piece of a surface [m], and range of an angle that is looked at first [rad]
-EDGE, FIRST_STEP = 4e-3, np.deg2rad(8.0)
+EDGE = 4e-3
+FIRST_STEP = np.deg2rad(8.0)
 # height [m] of the base below which it is widest
 FOOT = {"ur5e": 0.074, "ur3e": 0.03, "ur10e": 0.074, "ur16e": 0.074}
 

@@ -34,7 +34,8 @@ from tests.optimizer.moves import AMPLE, HOME, ROBOT
 
 # m: a depth from frames against that from the pose of the TCP
 ROUNDED = 1e-9
-LENGTH, MASS = 0.15, 4.0
+LENGTH = 0.15
+MASS = 4.0
 SETTINGS = StandInSettings()
 BALL = np.cbrt(3 * MASS / (4 * np.pi * SETTINGS.payload_density))
 T_FLANGE_TCP = at([0.0, 0.0, LENGTH])

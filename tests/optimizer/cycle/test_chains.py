@@ -1,14 +1,22 @@
-"""The least chain, against every chain."""
+"""The least chain of configurations, against every chain: of given costs, and of costs that a lazy
+search asks for.
+"""
 
 from __future__ import annotations
 
 from itertools import pairwise, product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from joulepath import DeadlineExceeded, NoSequence, Spline
 from joulepath.models.robot import Array
 from joulepath.optimizer.cycle.chains import LeastChain
+from joulepath.optimizer.cycle.lazy_search import LazySearch
+from joulepath.optimizer.cycle.legs import Leg
+from joulepath.optimizer.deadline import NEVER
 
 
 def least_of_all(costs: list[Array], closed: bool) -> float:
@@ -80,3 +88,133 @@ def test_a_cost_that_falls_from_infinity_opens_chains(closed: bool) -> None:
     costs[0][0, 1] = 0.5
     chain.lower(np.inf)
     assert chain.find() == (0.6, [0, 1, 0])
+
+
+RANGE = 3.0
+ROUNDING = 1e-9
+
+
+def layer(count: int) -> Any:
+    ends = [SimpleNamespace(label=str(node)) for node in range(count)]
+    return SimpleNamespace(name="stop", ends=ends, q=np.zeros((count, 1)), end=np.arange(count))
+
+
+def leg(kind: Array, bound: Array) -> Leg:
+    """A leg of given kinds (s, g), whose first pair is the one farthest from the limits, with
+    bounds (k,) [J].
+    """
+    limits = SimpleNamespace(q_min=np.array([-RANGE]), q_max=np.array([RANGE]))
+    prepared: Any = SimpleNamespace(arm=SimpleNamespace(active_limits=limits))
+    pair = np.array([np.argwhere(kind == each)[0] for each in range(int(kind.max()) + 1)])
+    none = np.zeros(0)
+    return Leg(
+        prepared,
+        layer(len(kind)),
+        layer(kind.shape[1]),
+        kind,
+        pair,
+        none,
+        none,
+        bound,
+        np.zeros(kind.shape[1]),
+        bound[kind],
+    )
+
+
+class Known(LazySearch):
+    """A search whose pairs need the `energies` [J] of each leg (s, g); those `near` a limit (s, g)
+    come to it.
+    """
+
+    def __init__(self, legs: list[Leg], energies: list[Array], near: list[Array]) -> None:
+        super().__init__(legs, False, NEVER)
+        self.energies, self.near = energies, near
+
+    def attempt(self, k: int, s: int, g: int) -> float | None:
+        return float(self.energies[k][s, g])
+
+    def motion(self, k: int, s: int, g: int) -> Spline | None:
+        return spline(RANGE if self.near[k][s, g] else 0.0)
+
+    def chain_tried(self, nodes: list[int]) -> None:
+        assert (
+            all(self.legs[k].is_pair_solved(s, g) for k, s, g in self.pairs(nodes))
+            or self.cut_short
+        )
+
+
+def spline(q: float) -> Spline:
+    """A motion that comes to q [rad]."""
+    knots = np.repeat([0.0, 1.0], 6)
+    return Spline(5, knots, np.array([0.0, 0.0, q, q, 0.0, 0.0])[:, None])
+
+
+class Late(Known):
+    """A search in which every pair takes longer than its share of the time."""
+
+    def attempt(self, k: int, s: int, g: int) -> float | None:
+        return self.out_of_time()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4])
+@pytest.mark.parametrize("seed", range(25))
+def test_the_least_chain_is_that_of_all_pairs_solved(seed: int, share: float) -> None:
+    """Bounds below what every kind needs; this share of the pairs needs more, for a joint's range
+    is in the way.
+    """
+    rng = np.random.default_rng(seed)
+    legs, energies, near, own = list[Leg](), list[Array](), list[Array](), list[Array]()
+    sizes = rng.integers(1, 6, 4)
+    for starts, goals in pairwise(sizes):
+        _, kind = np.unique(rng.integers(0, 6, (starts, goals)), return_inverse=True)
+        kind = kind.reshape(starts, goals)
+        of_kind = rng.uniform(10, 20, int(kind.max()) + 1)
+        legs.append(leg(kind, of_kind * rng.uniform(0.6, 1.0, len(of_kind))))
+        near.append((rng.random(kind.shape) < share) & ~_first(kind))
+        own.append(of_kind[kind])
+        energies.append(own[-1] + np.where(near[-1], rng.uniform(0, 5, kind.shape), 0.0))
+    search = Known(legs, energies, near)
+    found = search.cost(search.explore())
+    # a pair near a limit that was not tried weighs what its kind does: `CycleSearch` finishes it,
+    # and looks again
+    assert least_of_pairs(own) - ROUNDING <= found <= least_of_pairs(energies) + ROUNDING
+
+
+def least_of_pairs(costs: list[Array]) -> float:
+    """The least sum of one cost of each matrix over all chains."""
+    sizes = [costs[0].shape[0], *(cost.shape[1] for cost in costs)]
+    chains = product(*(range(size) for size in sizes))
+    return min(
+        sum(float(cost[pair]) for cost, pair in zip(costs, pairwise(chain), strict=True))
+        for chain in chains
+    )
+
+
+def _first(kind: Array) -> Array:
+    """Which pairs (s, g) are the first of their kind."""
+    first = np.zeros(kind.size, dtype=bool)
+    first[np.unique(kind, return_index=True)[1]] = True
+    return first.reshape(kind.shape)
+
+
+def test_a_range_in_the_way_of_one_pair_is_not_in_that_of_its_kind() -> None:
+    kind = np.array([[0, 0]])
+    search = Known(
+        [leg(kind, np.array([1.0]))], [np.array([[5.0, 9.0]])], [np.array([[False, True]])]
+    )
+    search.try_kind(0, 0, 1)
+    assert search.legs[0].cost.tolist() == [[5.0, 9.0]]
+
+
+def test_no_chain_names_the_stop_to_which_none_leads() -> None:
+    kind = np.array([[0]])
+    search = Known([leg(kind, np.ones(1))], [np.array([[np.inf]])], [np.array([[False]])])
+    with pytest.raises(NoSequence) as refusal:
+        search.explore()
+    assert (refusal.value.reached, refusal.value.open) == (["0"], ["0"])
+
+
+def test_too_little_time_is_no_proof_that_there_is_no_chain() -> None:
+    search = Late([leg(np.array([[0]]), np.ones(1))], [np.ones((1, 1))], [np.array([[False]])])
+    with pytest.raises(DeadlineExceeded):
+        search.explore()

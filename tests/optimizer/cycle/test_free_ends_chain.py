@@ -43,7 +43,8 @@ from tests.selection import long_but
 
 AXIS = np.array([0.0, 0.0, 1.0])
 # angles of the tool of the chains that attack a bound; J: rounding of energies
-ANGLES, ROUNDING = 16, 1e-6
+ANGLES = 16
+ROUNDING = 1e-6
 
 
 def _cycle(seed: int, robot: str = "ur5e") -> Cycle:

@@ -16,7 +16,8 @@ from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 
 # rad: a step along the curve; relative: what solves of the same motion may differ by
-STEP, AGREED = 0.1, 2e-3
+STEP = 0.1
+AGREED = 2e-3
 POSTURES = {
     # the fifth joint is stretched at both stops
     "ur5e": [

@@ -1,5 +1,5 @@
-"""Cycles of many stops: the same cycle for fewer motions, told on the way, and the best one so far
-at a deadline.
+"""Cycles of many stops: fewer motions for the same cycle, news on the way, the best one at a
+deadline, and shared models of arms.
 """
 
 from __future__ import annotations
@@ -11,11 +11,15 @@ import numpy as np
 import pytest
 
 from joulepath import BranchFilter, Cycle, CycleSolution, Improved, Payload, plan_cycle
+from joulepath.optimizer import surroundings
+from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.cycle import cycle_search, legs
-from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH
+from joulepath.optimizer.cycle.cycle_search import CYCLE_SEARCH, CycleSearch
+from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.progress import Event
-from tests.optimizer.clocks import CountingClock
+from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.cycle.cycles import PART, pick_and_place
+from tests.optimizer.placement.cells import floor, two_stops
 from tests.refusals import refusal_of
 
 # a counting clock never comes to it
@@ -91,3 +95,18 @@ def test_moves_with_the_same_payload_share_an_arm() -> None:
     same = Payload(mass=PART.mass, com=np.array(PART.com))
     arms = replace(asked, stops=[*asked.stops[:2], replace(asked.stops[2], payload=same)]).arms
     assert arms[0] is arms[2] and arms[1] is arms[3] and arms[0] is not arms[1]
+
+
+def test_each_arm_of_a_cycle_has_one_collision_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two stops and the start share the models of the arm with the part and without it."""
+    built = list[Arm]()
+
+    def counted(arm: Arm) -> CollisionModel:
+        built.append(arm)
+        return collision_model(arm)
+
+    monkeypatch.setattr(surroundings, "collision_model", counted)
+    search = CycleSearch(two_stops([floor()]), still)
+    search.explore()
+    payloads = sorted(arm.payload.mass for arm in built)
+    assert payloads == [0.0, 2.0]

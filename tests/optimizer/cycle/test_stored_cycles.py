@@ -23,16 +23,15 @@ ROUNDING = 1e-9
 # relative: the reported energy by quadrature, and the charge by the same intervals summed in
 # another order
 QUADRATURE = 1e-6
-HIGH, LOW = (
-    np.array([0.0, -1.4, 0.3, -1.57, -1.57, 0.0]),
-    np.array([0.6, -0.5, 1.2, -1.57, -1.57, 0.0]),
-)
+HIGH = np.array([0.0, -1.4, 0.3, -1.57, -1.57, 0.0])
+LOW = np.array([0.6, -0.5, 1.2, -1.57, -1.57, 0.0])
 LOADED = Arm(
     robot=ROBOT, collisions=False, payload=Payload(mass=5.0, com=np.array([0.0, 0.0, 0.05]))
 )
 STOPS = [Stop(name="low", target=LOW, dwell=0.1), Stop(name="high", target=HIGH + 0.3)]
 ASKED = Cycle(arm=LOADED, start=HIGH, stops=STOPS, deadline=AMPLE)
-LARGE, SMALL = Bus("storage", 0.9, 30.0, 500.0), Bus("storage", 0.9, 3.0, 100.0)
+LARGE = Bus("storage", 0.9, 30.0, 500.0)
+SMALL = Bus("storage", 0.9, 3.0, 100.0)
 
 
 # s: little more than the shortest cycle takes, so that braking leaves surplus

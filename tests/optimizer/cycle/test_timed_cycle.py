@@ -45,7 +45,8 @@ TURN = np.array([0.9, -0.3, 0.2, 0.0, 0.1, 0.4])
 # relative: an optimum found from another guess
 CONVERGED = 2e-3
 # of the cycle's own duration; and between the shortest one and this
-LONGER, SHORTER = 1.2, 0.5
+LONGER = 1.2
+SHORTER = 0.5
 ASKED = pick_and_place(1, 2, windings=False)
 
 

@@ -16,7 +16,9 @@ from tests.optimizer.moves import AMPLE
 from tests.selection import long_but
 
 # relative; the documented figures, rounded up
-MEDIAN, MOST, WORST = 1e-6, 7e-5, 2e-4
+MEDIAN = 1e-6
+MOST = 7e-5
+WORST = 2e-4
 PANELS = 20_000
 
 

@@ -156,20 +156,6 @@ def test_the_store_by_hand() -> None:
         assert drawn_at(bus, 0.0, 0.0, np.array([[joints]]), np.array([charge]))[0] == drawn
 
 
-def test_an_initial_charge_is_no_gift() -> None:
-    """What is used of it counts as drawn: a full store is worth no more than an empty one, but for
-    its lack of room.
-    """
-    for seed in range(10):
-        joints, weights = course(seed)
-        totals = []
-        for initial in (0.0, 10.0, 20.0):
-            bus = Bus("storage", efficiency=0.9, capacity=20.0, initial=initial)
-            flow = exchange(bus, 0.0, 20.0, joints, weights)
-            totals.append(flow.drawn.sum() + flow.charge[0] - flow.charge[-1])
-        assert totals[0] <= totals[1] * (1 + ROUNDING) <= totals[2] * (1 + ROUNDING) ** 2
-
-
 @pytest.mark.parametrize("name", long_but(("down",), MOVES))
 @pytest.mark.parametrize(
     "bus", [Bus(), Bus("isolated"), Bus("recuperating", efficiency=0.5), STORE], ids=str
@@ -250,12 +236,6 @@ def test_the_charge_is_in_the_answer() -> None:
     assert drawn + use.initial - use.final == pytest.approx(
         electrical.total, rel=1e-2
     )  # known to 2 ms when it runs empty
-
-
-def test_the_charge_begun_with_is_accounted_for() -> None:
-    """The same motion may start the store full; what it takes out is in the total."""
-    full = total("down", replace(STORE, initial=5.0))
-    assert full >= total("down", STORE) * (1 - SEARCH)
 
 
 @pytest.mark.parametrize("mode", ["isolated", "recuperating"])

@@ -23,10 +23,8 @@ from tests.selection import long_but
 BY_HAND = 1e-12  # relative; a few operations
 SCAN = 5e-3  # relative; neighbouring durations of the scan, and where each search stops
 
-START, GOAL = (
-    np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]),
-    np.array([1.2, -0.6, 0.9, -1.9, -1.57, 0.4]),
-)
+START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+GOAL = np.array([1.2, -0.6, 0.9, -1.9, -1.57, 0.4])
 HEAVY = Payload(mass=4.0, com=np.array([0.0, 0.0, 0.08]))
 # motors at the goal draw some 85 W
 DWELLS = {

@@ -44,7 +44,8 @@ from tests.optimizer.test_load_friction import loaded
 
 # relative to the largest derivative: central differences over 1e-4 of a figure, corners of the
 # power between samples
-DIFFERENCE, STEP = 2e-3, 1e-4
+DIFFERENCE = 2e-3
+STEP = 1e-4
 # of the interval's half-width: energy is not quite linear in the figures, and both sides are drawn
 ENDS = 0.12
 SAMPLES = 400
@@ -307,7 +308,8 @@ def test_every_default_has_its_source() -> None:
 
 # --- figures identified on one arm ---
 
-MOVE_SD, SESSION_SD = 1.5, 0.03
+MOVE_SD = 1.5
+SESSION_SD = 0.03
 
 
 def identified(move_sd: float = MOVE_SD, session_sd: float = SESSION_SD) -> Robot:

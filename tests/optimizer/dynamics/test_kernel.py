@@ -28,7 +28,8 @@ ROUNDING = 1e-12
 FORMULA = 1e-9
 # relative to the largest candidate; central differences with a step of 1e-6 lose about 1e-6² · f'''
 # and 1e-16 / 1e-6 · f
-DIFFERENCE, STEP = 2e-6, 1e-6
+DIFFERENCE = 2e-6
+STEP = 1e-6
 
 
 def multipliers() -> Array:

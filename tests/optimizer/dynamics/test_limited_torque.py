@@ -25,7 +25,8 @@ from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, p
 
 LINK = replace(ROBOT, torque_side="link", drives=LOSSY)
 # relative to the largest: central differences with a step of 1e-6
-DIFFERENCE, STEP = 2e-6, 1e-6
+DIFFERENCE = 2e-6
+STEP = 1e-6
 # a little less than the motion without limits puts on the links
 TIGHT = limits(tau_max=[25, 70, 36, 6, 6, 4])
 

@@ -1,5 +1,5 @@
-"""Losses, bus power and the breakdown: by hand, against the energy identity, and numpy against
-CasADi.
+"""Losses, bus power and the breakdown: by hand, and against the identity of energy; and savings of
+two energies.
 """
 
 from __future__ import annotations
@@ -11,9 +11,12 @@ import pytest
 
 from joulepath import Arm, Bus
 from joulepath.models.robot import Array, Drives, Electronics
+from joulepath.models.uncertainty.parameters import count
+from joulepath.optimizer.dynamics.interval import MotionEnergy, saving_interval, saving_intervals
 from joulepath.optimizer.dynamics.losses import breakdown, drawn_power, power_flow, smooth_abs
+from joulepath.optimizer.result.energy import Sensitivity
 from tests.by_pinocchio import torques_of
-from tests.optimizer.moves import ROBOT
+from tests.optimizer.moves import ROBOT, problem
 
 IDENTITY_TOLERANCE = (
     1e-9  # relative; spectrally accurate quadrature of smooth shaft power leaves rounding only
@@ -143,26 +146,6 @@ def test_surplus_is_burnt_or_returned(regeneration: float, drawn: float) -> None
     assert drawn_power(100.0, regeneration) == pytest.approx(100.0, rel=HAND_TOLERANCE)
 
 
-def test_braking_costs_nothing_but_its_losses() -> None:
-    """A joint braking hard, 200 W at the shaft: without regeneration nothing is drawn, and the
-    surplus is reported.
-    """
-    v, tau = np.zeros((1, 6)), np.zeros((1, 6))
-    v[:, 0], tau[:, 0] = 2.0, -100.0
-    flow = power_flow(tau, v, 0 * v, ROBOT.drives, ROBOT.friction)
-    surplus = -(36.7 + flow.joints.sum())
-    assert surplus > 50.0  # W
-    for regeneration in (0.0, 0.5):
-        electronics = replace(ROBOT.electronics, regeneration=regeneration)
-        electrical = breakdown(
-            np.ones(1), v, 0 * v, tau, 0.0, arm(ROBOT.drives, electronics)
-        ).electrical
-        assert electrical.braking == pytest.approx(surplus, rel=HAND_TOLERANCE)
-        assert electrical.total == pytest.approx(
-            -regeneration * surplus, rel=HAND_TOLERANCE, abs=1e-12
-        )
-
-
 def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
     """sqrt(x² + w²) lies above |x| by at most w (at zero), so the optimiser never sees less than
     what is reported.
@@ -187,3 +170,19 @@ def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
         assert excess.min() >= 0
         assert (excess <= LOSSY.inverter_linear * width + 1e-12).all()
     assert smooth_abs(-3.0, 0.0, np) == 3.0
+
+
+def test_several_savings_are_each_one_by_itself() -> None:
+    """Of no energy, and of none at all, too."""
+    arm, rng = problem().arm, np.random.default_rng(5)
+    known = [
+        MotionEnergy(e, Sensitivity(rng.normal(size=count(6)), 0.1), 1.5) for e in (50.0, 60.0, 0.0)
+    ]
+    others = [known[1], known[0], known[0]]
+    alone = [saving_interval(*each, arm) for each in zip(others, known, strict=True)]
+    for one, other in zip(saving_intervals(others, known, arm), alone, strict=True):
+        # means over the draws, summed in another order
+        assert [one.p5, one.p95, one.sd] == pytest.approx(
+            [other.p5, other.p95, other.sd], rel=1e-12, abs=1e-12
+        )
+    assert saving_intervals([], [], arm) == []

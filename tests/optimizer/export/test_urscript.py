@@ -15,7 +15,7 @@ from joulepath.optimizer.export.urscript import URSCRIPT, to_urscript
 from joulepath.optimizer.motion.spline import retimed
 from tests.optimizer.export.programs import LOAD, cycle_with_payload
 from tests.optimizer.export.read_back.random_motions import arm_of, one_move, random_spline
-from tests.optimizer.export.read_back.urscript_machine import Controller, Halt, translated
+from tests.optimizer.export.read_back.urscript_machine import Controller, Halt
 
 EVIL = 'pick"\n  set_standard_digital_out(7, True)\r# \u2028 end'
 
@@ -171,9 +171,3 @@ def test_a_long_motion_is_refused_before_it_fills_the_memory() -> None:
     with pytest.raises(FormatUnsuitable, match="set points"):
         to_urscript(program, UrscriptOptions(form="points"))
     assert len(to_urscript(program).content) < 10_000
-
-
-def test_what_is_no_urscript_is_refused_by_the_interpreter() -> None:
-    for line in ("for x in y:", "q = a; b", "import os", "servoj(q)) end"):
-        with pytest.raises(SyntaxError):
-            translated(f"def f():\n  {line}\nend")

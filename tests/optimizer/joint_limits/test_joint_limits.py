@@ -36,7 +36,8 @@ from tests.optimizer.joint_limits.attack import torque_ratios, worst_ratio
 from tests.refusals import refusal_of
 from tests.selection import long_but
 
-HOME, REST = np.array([0, -1.6, 1.6, -1.6, -1.6, 0]), np.zeros((2, 6))
+HOME = np.array([0, -1.6, 1.6, -1.6, -1.6, 0])
+REST = np.zeros((2, 6))
 PENDULUM = (
     '<robot name="pendulum"><link name="base"/>'
     + link("bar", 8.0, "0.2 0 0.1")

@@ -26,7 +26,8 @@ from tests.optimizer.kinematics.axis_patterns import (
 )
 
 # rad and m: pose error of a configuration, and difference of a configuration found again
-EXACT, FOUND = 1e-9, 1e-6
+EXACT = 1e-9
+FOUND = 1e-6
 
 
 def reached(closure: LoopClosure, T: Array) -> Array | None:

@@ -44,22 +44,6 @@ def spans(space: Basis) -> Array:
     return np.diff(np.unique(space.knots))
 
 
-def test_basis_functions_share_out_unity(space: Basis) -> None:
-    """They are nonnegative and add up to one everywhere, so that a curve stays in the hull of its
-    control points.
-    """
-    values = bspline.basis_matrix(space.knots, np.linspace(0.0, 1.0, 997))
-    assert values.min() >= 0
-    assert np.abs(values.sum(axis=1) - 1).max() < EXACT
-    for d in range(3):
-        assert (
-            np.abs(space.at_nodes[d].sum(axis=1) - (d == 0)).max()
-            < DERIVATIVE / spans(space).min() ** d
-        )
-    for d in range(1, 4):
-        assert np.abs(space.at_grid[d - 1].sum(axis=1)).max() < DERIVATIVE / spans(space).min() ** d
-
-
 @pytest.mark.parametrize("power", range(DEGREE + 1))
 def test_polynomials_of_the_degree_are_reproduced(space: Basis, power: int) -> None:
     """x^k has control points that interpolate it at the Greville points; its derivatives follow at
@@ -125,17 +109,6 @@ def test_quadrature_is_exact_for_polynomials(space: Basis, per_span: int) -> Non
     kink = np.unique(space.knots)[len(np.unique(space.knots)) // 2]
     expected = ((1 - kink) ** (power + 1) + kink ** (power + 1)) / (power + 1)
     assert weights @ np.abs(points - kink) ** power == pytest.approx(expected, rel=EXACT)
-
-
-def test_nodes_integrate_the_square_of_an_acceleration(space: Basis) -> None:
-    """Copper loss is nearly that: of degree 6 in a span."""
-    rng = np.random.default_rng(2)
-    curve = BSpline(space.knots, rng.normal(size=space.n), DEGREE)
-    points, weights = quadrature(space.knots, 12)
-    assert space.weights @ curve(space.nodes, 2) ** 2 == pytest.approx(
-        weights @ curve(points, 2) ** 2, rel=EXACT
-    )
-    assert len(space.nodes) >= bspline.BASIS.least_nodes
 
 
 def test_nodes_give_kinetic_energy_back(space: Basis) -> None:
@@ -218,20 +191,6 @@ def test_moved_knots_follow_the_switches(repeat: int) -> None:
     assert 0 < np.abs(change).max() < 3 * by
 
 
-@pytest.mark.parametrize(("repeat", "jumps"), [(1, False), (2, False), (3, True)])
-def test_jerk_jumps_at_a_knot_repeated_three_times(repeat: int, jumps: bool) -> None:
-    space = bspline.graded(np.array([0.4]), repeat)
-    rng = np.random.default_rng(4)
-    curve = BSpline(space.knots, rng.normal(size=space.n), DEGREE)
-    before, after = curve([0.4 - 1e-9, 0.4 + 1e-9], 3)
-    scale = np.abs(space.at_grid[2] @ curve.c).max()
-    assert (abs(after - before) > 1e-3 * scale) == jumps
-    for d in range(3):
-        assert (
-            np.ptp(curve([0.4 - 1e-12, 0.4 + 1e-12], d)) < 1e-6
-        )  # all that a motion needs stays continuous
-
-
 def test_refit_is_exact_on_a_refinement(space: Basis) -> None:
     """More knots and knots repeated more often: the same curve, for several joints at once."""
     rng = np.random.default_rng(5)
@@ -251,17 +210,6 @@ def test_refit_is_exact_on_a_refinement(space: Basis) -> None:
     assert (
         np.abs(difference).max() < 1e-9
     )  # random knots may lie close together, which interpolation feels
-
-
-def test_fit_finds_the_spline_behind_its_samples(space: Basis) -> None:
-    rng = np.random.default_rng(6)
-    points = rng.normal(size=(space.n, 2))
-    points[:REST_POINTS], points[-REST_POINTS:] = points[0], points[-1]
-    t = np.linspace(0.0, 1.0, 401)
-    found = bspline.fit(bspline.basis_matrix(space.knots, t) @ points, t, space.knots)
-    assert (
-        np.abs(found - points).max() < 1e-8
-    )  # the condition of a least-squares fit, squared, times rounding
 
 
 def test_fit_is_the_nearest_motion_at_rest() -> None:

@@ -1,5 +1,5 @@
-"""Ruckig's motion as a spline: as fast, through the same positions, however close the jumps of jerk
-are.
+"""Ruckig's motion from its phases of jerk: as a spline, and instant by instant as Ruckig evaluates
+it.
 """
 
 from __future__ import annotations
@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 
 from joulepath.models.registry import load_robot
-from joulepath.optimizer.motion.ruckig_motion import (
-    time_optimal_positions,
-    time_optimal_spline,
-)
+from joulepath.optimizer.motion import ruckig_motion
+from joulepath.optimizer.motion.ruckig_motion import time_optimal_positions, time_optimal_spline
 from joulepath.optimizer.motion.spline import least_time_scale, sample
 from tests.selection import long_but
 
 NAMES = ("ur5e", "kr10_r1100", "panda")
 MOVES = 40
 # relative: jumps of jerk that become one change the jerk of short phases
-MOSTLY, ALWAYS = {False: 1e-4, True: 1e-3}, 0.02
+MOSTLY = {False: 1e-4, True: 1e-3}
+ALWAYS = 0.02
 # rad: a jump that is moved by a ten thousandth of the duration, at the greatest speed
 AWAY = 1e-3
 HARDLY = 0.5  # the same as ALWAYS, of moves of which some joints move by a billionth of others
@@ -84,3 +83,38 @@ def test_joints_that_stay() -> None:
     q = sample(spline, np.linspace(0, spline.duration, 50))[0]
     assert np.abs(q[:, [0, 2, 3, 5]]).max() < 1e-12
     assert least_time_scale(spline, limits.rates) < 1 + ALWAYS
+
+
+# rad, rad/s, rad/s²: rounding of polynomials whose jerk is up to some 1e4 rad/s³
+ROUNDING = 1e-10
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "panda", "kr10_r1100"])
+def test_its_states_are_those_of_ruckig(robot: str) -> None:
+    limits, rng = load_robot(robot).limits, np.random.default_rng(0)
+    for k in range(30):
+        start, goal = rng.uniform(-2.0, 2.0, (2, len(limits.q_min)))
+        if k % 3 == 1:
+            goal[2] = start[2]
+        if k % 3 == 2:
+            # some joints stand still, others hardly move
+            goal = start + (rng.random(len(start)) < 0.5) * 10.0 ** rng.uniform(-9, -1, len(start))
+        found = ruckig_motion._ruckig(limits, start, goal)
+        if found.duration == 0:
+            continue
+        t = np.concatenate([[0.0], rng.uniform(0.0, found.duration, 20), [found.duration]])
+        expected = np.array([found.at_time(instant) for instant in t.tolist()])
+        assert np.abs(np.stack(ruckig_motion._states(found, t), axis=1) - expected).max() < ROUNDING
+        whole = ruckig_motion.time_optimal_positions(limits, start, goal, np.array([0.0, 1.0]))
+        assert np.abs(whole - [start, goal]).max() < ROUNDING
+
+
+def test_a_joint_that_just_reaches_its_greatest_acceleration() -> None:
+    """There 0.05 rad are twice a³ / j²: of half of these moves Ruckig says that it has none."""
+    limits = load_robot("ur5e").limits
+    for first in np.round(np.arange(-3, 3, 0.25), 2):
+        q_start = np.array([first, 0.0, 0.0, 0.0, 0.0, 0.0])
+        q_goal = np.array([first + 0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
+        found = ruckig_motion.time_optimal(limits, q_start, q_goal)
+        # jerk alone: 4 (d / 2j)^(1/3)
+        assert found.duration == pytest.approx(4 * np.cbrt(0.05 / 400), rel=1e-6)

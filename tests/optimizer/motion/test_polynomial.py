@@ -1,15 +1,17 @@
-"""Polynomials by their values at Chebyshev nodes, against the product formula, differences and
-Bernstein's form.
+"""Polynomials by their values at Chebyshev nodes, and the quintic from rest to rest, against NumPy
+and Bernstein's form.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 from scipy.interpolate import BSpline
 
 from joulepath.models.robot import Array
 from joulepath.optimizer.motion.polynomial import cardinals, chebyshev, polynomials
+from joulepath.optimizer.motion.quintic import PEAKS, coefficients, derivatives, fraction
 from joulepath.optimizer.motion.spline import peak_rates, sample, spline_of
 
 COUNTS = [1, 4, 8, 10, 12]
@@ -33,16 +35,6 @@ def by_products(m: int, at: Array) -> Array:
         ],
         axis=1,
     )
-
-
-@pytest.mark.parametrize("m", COUNTS)
-def test_cardinal_functions_are_one_at_their_own_node(m: int) -> None:
-    space = polynomials(m)
-    at = np.concatenate([[0.0], space.at, [1.0]])
-    assert cardinals(space.knots, space.bernstein, at) == pytest.approx(np.eye(m + 2), abs=EXACT)
-    for derivative in (1, 2):
-        ends = cardinals(space.knots, space.bernstein, np.array([0.0, 1.0]), derivative)
-        assert np.abs(ends).max() < EXACT * m**4  # the derivatives are as many times greater
 
 
 @pytest.mark.parametrize("m", COUNTS)
@@ -120,3 +112,32 @@ def test_peaks_of_a_high_degree(m: int) -> None:
     t = np.linspace(0.0, 0.9, 40001)
     fine = np.stack([np.abs(curve(t, d)).max(axis=0) for d in (1, 2, 3)])
     assert peak_rates(motion) == pytest.approx(fine, rel=1e-4)
+
+
+S = Polynomial([0, 0, 0, 10, -15, 6])
+TAU = np.linspace(0.0, 1.0, 101)
+# rounding of a few operations on numbers up to 60
+ROUNDING = 1e-12
+# relative; a peak between two of 10001 points: its curvature, at most 360, times (half their
+# distance)², halved
+BETWEEN = 1e-6
+
+
+def test_values_and_derivatives() -> None:
+    assert fraction(TAU) == pytest.approx(S(TAU), abs=ROUNDING)
+    assert derivatives(TAU) == pytest.approx(
+        np.array([S.deriv(k)(TAU) if k else S(TAU) for k in range(3)]), abs=ROUNDING
+    )
+
+
+def test_peaks() -> None:
+    dense = np.linspace(0.0, 1.0, 10_001)
+    found = [np.abs(S.deriv(k)(dense)).max() for k in (1, 2, 3)]
+    assert np.array(found) == pytest.approx(PEAKS, rel=BETWEEN)
+
+
+def test_coefficients_are_those_of_the_time() -> None:
+    durations = np.array([0.5, 2.0])
+    for k, T in enumerate(durations):
+        powers = [c[k] for c in coefficients(durations)]
+        assert np.polyval(powers, TAU * T) == pytest.approx(S(TAU), abs=ROUNDING)

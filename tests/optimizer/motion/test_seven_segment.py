@@ -80,21 +80,6 @@ def test_the_arm_takes_as_long_as_its_slowest_joint() -> None:
         )
 
 
-def test_no_travel_takes_no_time() -> None:
-    assert shortest_duration(np.zeros(6), limits()) == 0
-
-
-def test_longer_travel_never_takes_less_time() -> None:
-    """Over the borders between the shapes of profile, where formulas change."""
-    rng = np.random.default_rng(3)
-    distance = np.sort(10 ** np.linspace(-5, 1, 4001))
-    for _ in range(20):
-        _, v, a, j = random_case(rng)
-        times = shortest_duration(distance[:, None] * np.ones(6), limits(v_max=v, a_max=a, j_max=j))
-        assert (np.diff(times) > 0).all()
-        assert np.diff(times).max() < 0.01 * times.max()  # and without a jump
-
-
 def test_switches_are_ruckigs_at_the_shortest_duration() -> None:
     """Of the joint that leads, where it reaches its acceleration limit; nowhere otherwise."""
     rng = np.random.default_rng(4)

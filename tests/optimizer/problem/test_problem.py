@@ -1,9 +1,9 @@
-"""What a problem accepts, and that what it refuses names the field as the contract does."""
+"""What a problem and a branch filter accept; a refusal names the field as the contract does."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import pytest
 from joulepath import AnyOf, Arm, InvalidProblem, OutsideLimits, Payload, Pose, Problem, load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.branches import BranchFilter, Label
 from joulepath.optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, tcp_pose
 from tests.refusals import refusal_of
@@ -255,3 +256,43 @@ def test_bodies_on_the_border_are_bodies() -> None:
     Payload(mass=3.0)
     Payload(mass=1.0, inertia=np.diag([0.01, 0.01, 0.02]))
     Payload(mass=0.0)
+
+
+LABELS = [
+    Label("left", "up", "flip"),
+    Label("left", "up", "no_flip"),
+    Label("left", "down", "flip"),
+    Label("left", "down", "no_flip"),
+    Label("right", "up", "flip"),
+    Label("right", "up", "no_flip"),
+    Label("right", "down", "flip"),
+    Label("right", "down", "no_flip"),
+]
+
+
+@dataclass(frozen=True)
+class ElbowOnly:
+    """The label of an arm whose branches differ in the elbow alone."""
+
+    elbow: str
+
+
+def test_an_empty_filter_allows_every_label() -> None:
+    assert all(
+        BranchFilter().allows(label) for label in [*LABELS, ElbowOnly("up"), "another family's"]
+    )
+
+
+def test_each_part_that_is_named_halves_the_labels() -> None:
+    assert sum(BranchFilter(elbow="up").allows(label) for label in LABELS) == 4
+    assert sum(BranchFilter(elbow="up", wrist="flip").allows(label) for label in LABELS) == 2
+    assert [label for label in LABELS if BranchFilter("left", "down", "no_flip").allows(label)] == [
+        Label("left", "down", "no_flip")
+    ]
+
+
+def test_a_filter_assumes_only_the_parts_that_it_names() -> None:
+    assert BranchFilter(elbow="up").allows(ElbowOnly("up"))
+    assert not BranchFilter(elbow="down").allows(ElbowOnly("up"))
+    # an arm without a shoulder part cannot be on the left
+    assert not BranchFilter(shoulder="left").allows(ElbowOnly("up"))

@@ -43,7 +43,10 @@ from tests.refusals import refusal_of
 
 # what the documentation promises of feed-forward with PD at 0.25 ms: rad, m, and parts of the
 # energies
-JOINT, TCP, ELECTRICAL, MECHANICAL = 3e-4, 2.5e-4, 5e-4, 1e-3
+JOINT = 3e-4
+TCP = 2.5e-4
+ELECTRICAL = 5e-4
+MECHANICAL = 1e-3
 # of savings
 POINT = 1e-3
 FAST = 1e-3
@@ -131,16 +134,6 @@ def test_an_arm_at_rest_stays_there() -> None:
     run = replay(plan, ("feed_forward",)).under("feed_forward")
     assert run.joint_error.max() < 1e-9
     assert run.energy.electrical.total == pytest.approx(plan.electrical, rel=1e-6)
-
-
-def test_a_coarser_step_is_as_good_to_a_tenth_of_a_milliradian() -> None:
-    plan = answer()
-    runs = [
-        replay(plan, ("feed_forward",), step).under("feed_forward") for step in (2e-3, 1e-3, 5e-4)
-    ]
-    errors = [run.joint_error.max() for run in runs]
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[0] < 2 * JOINT
 
 
 def in_the_way(margin: float = 0.0, above: float = 0.0) -> Arm:

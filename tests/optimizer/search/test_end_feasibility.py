@@ -12,7 +12,8 @@ from joulepath.optimizer.collision.model import CollisionModel
 from tests.optimizer.moves import GOAL, ROBOT, START, changed, problem_with, tcp_pose
 
 # clearance [m] that an end has, less than what is kept of it, and of a ball that touches it
-TOO_NEAR, TOUCHING = 1e-4, -1e-4
+TOO_NEAR = 1e-4
+TOUCHING = -1e-4
 
 
 def beside_goal(asked: Problem, clearance: float) -> Problem:

@@ -1,5 +1,5 @@
-"""Another start from the time-optimal motion, where path constraints hold a motion back or its
-first solve ended too early.
+"""Other starts: from the time-optimal motion, where path constraints hold a motion back, and from
+ends that joints reach in less time.
 """
 
 from __future__ import annotations
@@ -9,18 +9,17 @@ import pytest
 
 from benchmarks.agreement import request
 from benchmarks.tasks import collision_free
-from joulepath import Arm, Bus, Pose, Problem, load_robot, optimize
+from joulepath import Arm, Bus, ConeOrientedPose, Pose, Problem, load_robot, optimize
 from joulepath.app.convert.request import to_problem
 from joulepath.app.schemas.request import OptimizeRequest
 from joulepath.optimizer.kinematics.tcp import tcp_pose
+from joulepath.optimizer.motion.seven_segment import shortest_duration
 from joulepath.optimizer.search import refinement
 from joulepath.optimizer.search.attempts import in_time, solver_of
 from joulepath.optimizer.search.candidates import Candidate
-from joulepath.optimizer.search.refinement import (
-    FastestStartSettings,
-    refine,
-    start_from_fastest,
-)
+from joulepath.optimizer.search.least_duration_ends import with_shorter_duration
+from joulepath.optimizer.search.refinement import FastestStartSettings, refine, start_from_fastest
+from joulepath.optimizer.search.sampled_ends import fastest_samples
 from joulepath.optimizer.search.state import ENERGY_TOLERANCE, SearchState
 from joulepath.optimizer.solve.methods.duration_intervals import duration_intervals
 from joulepath.optimizer.solve.methods.free_spline import FreeSpline
@@ -30,7 +29,9 @@ from tests.selection import long_but
 
 # requests of the benchmark: two motions that a limit on the speed of the TCP holds back, and one
 # whose NLP costs 0.15 % less than the motion needs
-HELD_BACK_TO_POSE, HELD_BACK, ENDED_EARLY = 37, 16, 34
+HELD_BACK_TO_POSE = 37
+HELD_BACK = 16
+ENDED_EARLY = 34
 
 
 def asked(index: int) -> Problem:
@@ -118,3 +119,55 @@ def test_a_broken_promise_starts_another_solve_between_fixed_ends_alone(slides: 
     assert best is not None
     start_from_fastest(run.state, best, FastestStartSettings(broken_promise=-1.0))
     assert (run.state.solves == solves) is slides
+
+
+# m, rad: what the certificate allows at an end
+REACHED = 1e-6
+
+
+def between_samples(robot: str, seed: int, free: bool) -> Problem:
+    """From joint positions to a pose: of a Panda with its posture free, or with any orientation."""
+    arm = Arm(robot=load_robot(robot), collisions=False)
+    rng = np.random.default_rng(seed)
+    limits = arm.robot.limits
+    start, goal = rng.uniform(0.8 * limits.q_min, 0.8 * limits.q_max, (2, arm.robot.nq))
+    pose = Pose(tcp_pose(arm, goal))
+    target = ConeOrientedPose(pose.T[:3, 3]) if free else pose
+    return Problem(arm=arm, start=start, goal=target, deadline=AMPLE)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("robot", "free"), [("panda", False), ("ur5e", True)])
+def test_they_reach_the_target_in_less_time(robot: str, free: bool) -> None:
+    helped = 0
+    for seed in range(3):
+        problem = between_samples(robot, seed, free)
+        run = prepared(problem)
+        pose = problem.goal.T if isinstance(problem.goal, Pose) else None
+        for candidate in fastest_samples(run.state.candidates)[:4]:
+            found = with_shorter_duration(run.state.prepared, candidate)
+            if found is None:
+                continue
+            helped += 1
+            assert found.shortest < candidate.shortest
+            least = shortest_duration(found.q_goal - found.q_start, problem.arm.active_limits)
+            assert found.shortest == pytest.approx(float(least))
+            assert (found.q_start == candidate.q_start).all()
+            T = tcp_pose(problem.arm, found.q_goal)
+            if pose is not None:
+                assert np.abs(T - pose).max() < REACHED
+            else:
+                assert isinstance(problem.goal, ConeOrientedPose)
+                assert np.abs(T[:3, 3] - problem.goal.position).max() < REACHED
+    assert helped > 3
+
+
+def test_few_samples_are_tried_also_where_many_are_open() -> None:
+    """Otherwise neighbours on one self-motion were searched for their fastest motions in turn."""
+    run = prepared(between_samples("panda", 0, free=False))
+    candidates = run.state.candidates
+    deferred = fastest_samples(candidates)
+    for each in candidates:
+        each.activate()
+    assert [*map(id, fastest_samples(candidates))] == [*map(id, deferred)]
+    assert 0 < len(deferred) < len(candidates) / 4

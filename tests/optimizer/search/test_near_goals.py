@@ -38,7 +38,8 @@ SAME = 2e-3
 # rad: how far a task leads, in each joint
 STEP = 0.5
 # rad: a proposal beside a goal, and how much farther its projection may be
-BESIDE, FARTHER = 0.05, 4.0
+BESIDE = 0.05
+FARTHER = 4.0
 # relative: an estimate is a quadrature of a few points, of smoothed friction and corners
 FEW_POINTS = 1e-2
 

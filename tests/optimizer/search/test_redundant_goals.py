@@ -32,7 +32,8 @@ ROUNDING = 1e-12
 AMPLE = 300.0
 # least share by which the copper loss of holding raises one of a few bounds, and how many of them
 # are solved
-RAISED, SOLVED = 0.01, 2
+RAISED = 0.01
+SOLVED = 2
 # start and goal [rad] of an xarm7: a curve of the goal's pose that needs little passes half a turn;
 # the share by which its bound is raised: 0.031, or 0.011 with wide boxes
 PASSING = np.array(

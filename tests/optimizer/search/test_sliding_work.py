@@ -27,13 +27,15 @@ DURATION = 1.6
 # a motion in a given time [s], and the least work [J] that is known of it
 BEST_START = np.array([-0.7409, 0.2653, -1.9028, -1.9881, 0.2075, 0.1431, 0.9865])
 BEST_GOAL = np.array([0.7247, -1.6752, -2.0039, -1.5995, -0.8184, 2.1719, -2.6627])
-BEST_DURATION, BEST_WORK = 1.644, 33.64066
+BEST_DURATION = 1.644
+BEST_WORK = 33.64066
 # relative; what is promised against the least work known
 PROMISED = 5e-3
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
 # displacement of an end [rad] far above rounding, and the rounding of a joint limit
-MOVED, ROUNDING = 1e-3, 1e-9
+MOVED = 1e-3
+ROUNDING = 1e-9
 
 
 def problem(goal: Array = GOAL, **given: Any) -> Problem:

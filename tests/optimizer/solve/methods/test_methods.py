@@ -86,16 +86,6 @@ def test_a_free_spline_spends_least(number: int) -> None:
                 ), method
 
 
-def test_bounds_hold_for_all() -> None:
-    """They are built around the methods' own motions, but none is above the energy of another
-    method's.
-    """
-    found = [solved(method) for method in METHODS]
-    assert max(each.lower_bound for each in found) <= min(
-        each.energy.electrical.total for each in found
-    )
-
-
 def test_a_polynomial_is_one() -> None:
     spline = solved("lagrange").trajectory.spline
     assert len(np.unique(spline.knots)) == 2 and len(spline.control_points) == spline.degree + 1

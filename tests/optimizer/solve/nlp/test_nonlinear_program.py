@@ -14,7 +14,6 @@ from joulepath.optimizer.dynamics.losses import drawn_power, power_flow
 from joulepath.optimizer.dynamics.plant import SMOOTHING
 from joulepath.optimizer.motion import bspline
 from joulepath.optimizer.motion.bspline import DEGREE, Basis
-from joulepath.optimizer.motion.quadrature import quadrature
 from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.solve.nlp.coordinates import Coordinates
 from joulepath.optimizer.solve.nlp.nonlinear_program import NonlinearProgram
@@ -27,9 +26,6 @@ EPS = 1e-6
 # derivative, large at the reversal of friction, and rounding / step
 GRADIENT_TOLERANCE = 1e-6
 HESSIAN_TOLERANCE = 1e-5
-# relative error of the quadrature: smoothed corners of |power| and the reversal of friction lie
-# between the nodes
-QUADRATURE_TOLERANCE = 2e-3
 # relative tolerance of a sum of powers in another order
 SUM_TOLERANCE = 1e-9
 # relative tolerance of linear maps in another order
@@ -113,19 +109,6 @@ def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
     t = basis.nodes * T
     expected = T * basis.weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
     assert case.program.value(case.free, T)[0] == pytest.approx(float(expected), rel=SUM_TOLERANCE)
-
-
-def test_cost_is_the_integral_of_power(case: Case) -> None:
-    """Along a straight motion, against sixteen times as many points."""
-    line = case.program.coordinates
-    points = line.start + np.outer(case.program.basis.quintic, line.goal - line.start)
-    smooth = replace(case, free=points[case.program.basis.free])
-    curve = motion(smooth)
-    t, weights = quadrature(curve.t, 64)
-    expected = weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
-    assert case.program.value(smooth.free, case.duration)[0] == pytest.approx(
-        float(expected), rel=QUADRATURE_TOLERANCE
-    )
 
 
 def test_torques_are_those_of_the_motion(case: Case) -> None:
