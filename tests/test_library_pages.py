@@ -1,4 +1,4 @@
-"""The code of the pages on the library and the command line, run as it is printed."""
+"""The code of the README and of the pages on library and command line, run as it is printed."""
 
 from __future__ import annotations
 
@@ -82,3 +82,31 @@ def test_the_exit_codes_of_the_page_are_those_of_the_help() -> None:
     assert joulepath.epilog is not None
     told = set(re.findall(r"^\s+(\d+)  \S", joulepath.epilog, re.MULTILINE))
     assert set(re.findall(r"^\| (\d+) \|", text, re.MULTILINE)) == told
+
+
+def test_the_snippet_prints_what_the_readme_says() -> None:
+    """Its digits are few enough to be the same on every machine."""
+    snippets = re.findall(
+        r"```python\n(.*?)```\n\nIt prints\n\n```\n(.*?)```",
+        (ROOT / "README.md").read_text(),
+        re.DOTALL,
+    )
+    assert len(snippets) == 1
+    ((code, printed),) = snippets
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert run.stdout == printed
+
+
+@pytest.mark.long
+def test_the_snippet_of_the_cycles_page_goes_round() -> None:
+    (code,) = re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs" / "reference" / "cycle.md").read_text(), re.DOTALL
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    energy, bound, labels = run.stdout.split(" ", 2)
+    assert 0.8 * float(energy) < float(bound) < float(energy)
+    assert labels.count("/") == 2 * 3

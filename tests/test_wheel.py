@@ -7,12 +7,9 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import sysconfig
-import time
-import urllib.request
 import venv
 import zipfile
 from collections.abc import Callable
@@ -21,7 +18,6 @@ from pathlib import Path
 import pytest
 
 from joulepath.optimizer.native.build import LIBRARY
-from tests.app.live import free_port
 from tests.app.requests import move
 from tests.compilers import with_compiler
 
@@ -29,7 +25,6 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("app", "optimizer", "models")
 # a cold start of the service with one worker, on a busy machine [s]
 START = 90.0
-STOP = 30.0  # from SIGTERM to the end of the process, at most [s]
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -168,48 +163,3 @@ def test_the_console_command_works_from_anywhere(run: Run) -> None:
     assert "ur5e" in run("joulepath", "robots").stdout
     answer = json.loads(run("joulepath", "optimize", "-", stdin=json.dumps(move())).stdout)
     assert answer["status"] == "optimal"
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("command", [("python", "-m", "joulepath.app"), ("joulepath", "serve")])
-def test_the_service_starts_from_anywhere(
-    environment: Path, tmp_path: Path, command: tuple[str, ...]
-) -> None:
-    """Ready, with a database that its migrations have made, and ended by SIGTERM."""
-    port = free_port()
-    settings = {
-        "JOULEPATH_HOST": "127.0.0.1",
-        "JOULEPATH_PORT": str(port),
-        "JOULEPATH_WORKERS": "1",
-        "JOULEPATH_DATABASE_URL": f"sqlite:///{tmp_path / 'studies.db'}",
-    }
-    log = tmp_path / "log"
-    with log.open("wb") as output:
-        process = subprocess.Popen(
-            [environment / command[0], *command[1:]],
-            cwd=tmp_path,
-            env=clean(os.environ) | settings,
-            stdout=output,
-            stderr=output,
-        )
-    try:
-        wait_until_ready(process, f"http://127.0.0.1:{port}/readyz", log)
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/studies", timeout=START) as studies:
-            assert studies.status == 200
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(STOP) == 0
-    finally:
-        process.kill()
-        process.wait()
-
-
-def wait_until_ready(process: subprocess.Popen[bytes], url: str, log: Path) -> None:
-    end = time.monotonic() + START
-    while True:
-        assert process.poll() is None, log.read_text()
-        assert time.monotonic() < end, log.read_text()
-        try:
-            with urllib.request.urlopen(url, timeout=5):
-                return
-        except OSError:
-            time.sleep(0.1)

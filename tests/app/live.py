@@ -187,7 +187,7 @@ def serving(
     With `recorded`, its searches are recorded (see `tests.app.recorded`): it has no worker
     processes. With `by_command`, `joulepath serve` starts it, else `python -m joulepath.app`.
     """
-    program = ("tests.app.recorded",) if recorded else ("joulepath.app",)
+    program: tuple[str, ...] = ("tests.app.recorded" if recorded else "joulepath.app",)
     if by_command:
         program = ("joulepath.app.cli", "serve")
     port = free_port()

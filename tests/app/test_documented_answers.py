@@ -24,7 +24,9 @@ BUSES: dict[str, dict[str, Any]] = {
     "shared": {"mode": "shared"},
     "recuperating": {"mode": "recuperating", "efficiency": 0.9},
 }
-TOTAL, BOUND, GAP = ("energy/electrical/total", "energy/lower_bound", "energy/optimality_gap")
+TOTAL = "energy/electrical/total"
+BOUND = "energy/lower_bound"
+GAP = "energy/optimality_gap"
 # where it stands, what it looks like, the path and file of the request, what is changed of it, and
 # the field it states
 SAID: list[tuple[str, str, str, dict[str, Any], str]] = [

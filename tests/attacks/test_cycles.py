@@ -57,7 +57,8 @@ HARD = Cycle(
     deadline=AMPLE,
 )
 # rad: joint positions all over the range, each near the one before
-WHOLE_RANGE, NEAR = 2.9, 1.5
+WHOLE_RANGE = 2.9
+NEAR = 1.5
 
 
 def in_time(asked: Cycle, duration: float, **given: Any) -> Cycle:

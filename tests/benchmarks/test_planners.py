@@ -1,5 +1,8 @@
+"""Planners of others: their motions, and runs in turns in processes of their own."""
+
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib import import_module
 
 import numpy as np
@@ -11,6 +14,7 @@ from benchmarks.motion import Replay, replay
 from benchmarks.planners.__main__ import PLANNERS, planner_of
 from benchmarks.planners.casadi_opti import derivative_points
 from benchmarks.planners.planner import versions
+from benchmarks.side_by_side import Worker, measured
 from benchmarks.tasks import move
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.motion.bspline import DEGREE, uniform
@@ -102,3 +106,23 @@ def test_the_best_is_the_least_energy_within_limits() -> None:
         -0.2,
         0.0,
     ]
+
+
+@pytest.fixture
+def workers() -> Iterator[list[Worker]]:
+    made = [Worker(name, 0, 2) for name in ("toppra", "ruckig")]
+    yield made
+    for each in made:
+        each.end()
+
+
+@pytest.mark.long
+def test_every_planner_takes_time_for_every_task(workers: list[Worker]) -> None:
+    walls = measured(workers[0], workers[1:], 2, 1)
+    assert walls.shape == (2, 2)
+    assert (walls > 0).all()
+
+
+def test_a_planner_that_cannot_be_made_is_told() -> None:
+    with pytest.raises(RuntimeError, match="make bench"):
+        Worker("nobody", 0, 1)

@@ -13,14 +13,13 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.app.live import ROOT, Server
-from tests.app.requests import EXAMPLES, NEAR, long_search, move
+from tests.app.requests import EXAMPLES, long_search, move
 from tests.browser.pages import (
     FIRST,
     MESHES,
     SHOWN,
     ask,
     fill_json,
-    go,
     opened,
     show_json,
     state,
@@ -130,17 +129,6 @@ def test_the_panel_keeps_every_example(page: Page) -> None:
     assert "payload" not in state(page, "request")
 
 
-def test_an_error_stands_at_its_field(page: Page) -> None:
-    fill_json(page, FIRST)
-    show_json(page, False)
-    type_into(page, "/payload/mass", "-1")
-    page.locator("#optimise").click()
-    cell = page.locator("[data-pointer='/payload/mass']")
-    expect(cell).to_have_attribute("aria-invalid", "true")
-    expect(page.get_by_label("Tool and payload").locator(".error")).to_have_count(1)
-    page.locator("#undo").click()
-
-
 def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server) -> None:
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
@@ -180,25 +168,6 @@ def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server)
         assert drawn["name"] == "box 1" and min(drawn["size"]) > 0
         count = len(FIRST["scene"]["obstacles"]) + 1
         assert page.evaluate("() => studio.view.parts.obstacles.children.length") == count
-
-
-def test_an_export_of_the_service_is_offered(page: Page) -> None:
-    """Slow at first, and with an output that the gripper is on."""
-    fill_json(page, FIRST)
-    show_json(page, False)
-    page.locator("#export").click()
-    expect(page.locator("#preview")).to_contain_text("0.1 of its speed")
-    page.get_by_label("Gripper output").select_option("0")
-    page.locator("[data-format=movej]").click()
-    expect(page.locator("#preview")).to_contain_text("movej([")
-    page.locator("[data-format=urscript]").click()
-    expect(page.locator("[data-format=krl]")).to_be_disabled()
-    expect(page.locator("#download")).to_contain_text("speed-0.1")
-    with page.expect_download() as download:
-        page.locator("#download").click()
-    assert "servoj" in Path(download.value.path()).read_text()
-    expect(page.locator("#status")).to_contain_text("safety limits")
-    page.get_by_role("button", name="Close").click()
 
 
 def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
@@ -265,34 +234,6 @@ def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
         leg["kind"] != "move" and leg["goal"]["stop"].startswith("pick") for leg in legs
     ]
     assert any(faint)
-
-
-def test_what_is_kept_has_names_and_opens_again(page: Page, service: Server) -> None:
-    """An answer of a study, and one that this browser has seen, found by a new name."""
-    created = service.post("/studies", {"name": "press", "robot": "ur5e", "threshold": 60.0}).json()
-    service.post(f"/studies/{created['id']}/iterations", {"optimize": move()})
-    go(page, "Library")
-    page.locator("#studies button", has_text="press").click()
-    page.locator("#iterations button").first.click()
-    until(page, "() => studio.state.page === 'cell' && studio.state.answered?.cycle === null")
-    assert state(page, "answered.solution.branch.goal.q") == pytest.approx(NEAR)
-    assert not state(page, "stale")
-    go(page, "Library")
-    kept = page.locator("#answers li")
-    page.get_by_label("Search answers").fill("round")
-    expect(kept.first).to_contain_text("round · ur5e")
-    kept.first.get_by_role("button", name="Rename").click()
-    page.get_by_label("New name of").fill("Night tray")
-    page.keyboard.press("Enter")
-    page.get_by_label("Search answers").fill("NIGHT")
-    expect(kept).to_have_count(1)
-    page.locator("#answers button.choice", has_text="Night tray").click()
-    until(page, "() => studio.state.page === 'cell' && Boolean(studio.state.answered?.cycle)")
-    assert state(page, "project.name") == "Night tray"
-    go(page, "Library")
-    page.get_by_label("Search answers").fill("night tray")
-    page.get_by_role("button", name="Delete Night tray").click()
-    expect(kept).to_have_count(0)
 
 
 def test_a_page_stands_alone(browser: Browser, service: Server, tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ from tests.app.databases import opened, postgres, why_no_postgres
 from tests.app.live import ROOT, Server, serving
 
 SCRIPT = ROOT / "deploy" / "backup.sh"
-BEFORE, MEANWHILE = 30, 30
+BEFORE = 30
+MEANWHILE = 30
 MISSING = (
     why_no_postgres() or (shutil.which("pg_dump") is None and "pg_dump is not installed") or None
 )

@@ -18,7 +18,8 @@ from tests.models.own_arm.arms import RICH_ARM, URDF, changed, robot
 from tests.selection import long_but
 
 # N·m: rounding of torques of some 500 N·m, and of inertias that MuJoCo would refuse
-TORQUE, MENDED = 1e-9, 0.02
+TORQUE = 1e-9
+MENDED = 0.02
 NAMES = ("ur5e", "panda", "ur30")
 
 

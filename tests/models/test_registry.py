@@ -5,7 +5,6 @@ matrices.
 from __future__ import annotations
 
 import pickle
-import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,7 +27,8 @@ from tests.mesh_folders import meshes as arm_folder
 ROUNDING = 1e-14
 # the same over angles that are rounded to nine digits, and lengths of about 1 m; and of limits
 # written as 3.14
-NINE_DIGITS, THREE_DIGITS = 1e-8, 1e-3
+NINE_DIGITS = 1e-8
+THREE_DIGITS = 1e-3
 # the same relative to torques of up to 150 N·m
 TORQUE_ROUNDING = 1e-11
 # kg, of the moving links together, by the maker's list of each arm
@@ -284,29 +284,6 @@ def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert registry.robot_names.__wrapped__() == ("other", "ur5e")
     monkeypatch.setattr(registry, "robot_names", registry.robot_names.__wrapped__)
     assert registry._load_robot.__wrapped__("other").model.name == "other"
-
-
-def test_the_sentence_on_energies_says_what_each_robot_rests_on(robot: Robot) -> None:
-    told = energy_trust(robot.figures)
-    links = {"iiwa14": "second-hand figures", "panda": "figures fitted to measured data"}
-    source = links.get(robot.name, "the maker's own figures")
-    assert f"{source} (link masses, centres of mass" in told
-    # inertias, friction, and rotor inertias: who has them from where
-    together = re.search(r"\(link masses, centres of mass, link inertias", told) is not None
-    assert together == (robot.name != "ur30")
-    groups = {
-        part: group
-        for group, parts in re.findall(r"([^(),]+) \(([^)]+)\)", told)
-        for part in parts.split(", ")
-    }
-    source = dict.fromkeys(("ur3e", "ur5e", "ur10e"), "measured")
-    source |= {"panda": "sister robot", "fr3": "second-hand"}
-    source |= dict.fromkeys(("ur7e", "ur12e", "ur16e"), "sister robot")
-    assert source.get(robot.name, "without a source") in groups["rotor inertias"]
-    without = robot.name in ("fr3", "panda")
-    assert (
-        "without a source" if without else source.get(robot.name, "without a source")
-    ) in groups["friction"]
 
 
 def test_the_sentence_on_energies_is_made_from_the_letters() -> None:

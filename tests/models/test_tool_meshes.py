@@ -28,7 +28,8 @@ from tests.selection import long_but
 
 ROBOTIQ = "robotiq_2f_85"
 # m: by the maker's data sheet, the fingers open 85 mm wide
-OPEN, OPENING = 0.085, 2e-3
+OPEN = 0.085
+OPENING = 2e-3
 # m: the pads touch when closed, but for the last thousandths of a radian
 CLOSED = 5e-4
 # the greatest sagitta is that of the farthest corner, by the first term of its series

@@ -29,7 +29,9 @@ ROUNDING = 1e-12
 # m: a pose goal is reached as the certificate demands
 REACHED = 1e-6
 # codes of moveit_msgs/msg/MoveItErrorCodes
-NO_IK, INVALID_GOAL, GOAL_COLLIDES = -31, -16, -12
+NO_IK = -31
+INVALID_GOAL = -16
+GOAL_COLLIDES = -12
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from joulepath import NoPowerChannel, NothingHeldOut, load_robot
+from joulepath import load_robot
 from joulepath.app.answers.declared import model_of
 from joulepath.app.api.identifications.answer import IdentificationResult
 from joulepath.app.cli.identify import moves_of, summary_of
 from tests.app.cli.console import Here
-from tests.app.problems import checked
 from tests.identification_logs import csv_of, recorded, truth_of
 
 ROBOT = load_robot("ur5e")
@@ -108,22 +107,6 @@ def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path
         "copper",
         "inverter_linear",
     }
-
-
-def test_power_is_refused_of_logs_without(here: Here, tmp_path: Path) -> None:
-    file = tmp_path / "still.csv"
-    file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3), without="P"))
-    code, content = here.problem("identify", str(file), "--fit", "power", "--payload", "0")
-    assert code == 1
-    checked(NoPowerChannel, content)
-
-
-def test_a_log_of_one_motion_is_a_problem(here: Here, tmp_path: Path) -> None:
-    file = tmp_path / "one.csv"
-    file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=1)))
-    code, content = here.problem("identify", str(file), "--payload", "0")
-    assert code == 1
-    checked(NothingHeldOut, content)
 
 
 def test_no_log_is_wrong_usage(here: Here) -> None:

@@ -17,7 +17,9 @@ from tests.app.engine.simple_tasks import Hold, ProcessId
 PATIENCE = 120.0
 # A deadline, and two graces, that a busy machine does not reach by itself [s]; the tests move the
 # clock beyond them.
-LONG, DEADLINE_GRACE, SHUTDOWN_GRACE = 1000.0, 300.0, 500.0
+LONG = 1000.0
+DEADLINE_GRACE = 300.0
+SHUTDOWN_GRACE = 500.0
 
 
 class MovableLoop(asyncio.SelectorEventLoop):

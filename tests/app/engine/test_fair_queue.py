@@ -47,23 +47,6 @@ async def test_clients_are_served_in_turn(tmp_path: Path, bench: Bench) -> None:
     assert ended == ["a0", "b0", "c0", "a1", "b1", "a2"]
 
 
-@settings(queue_size=10)
-async def test_who_waits_and_who_works_is_counted(tmp_path: Path, bench: Bench) -> None:
-    ended: list[str] = []
-    queue = bench.engine.queue
-    assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
-    running, release = await held(bench, tmp_path / "a", "a")
-    tasks = [await waiting(bench, "b", f"b{k}", ended) for k in range(2)]
-    assert [place.client for place in queue.waiting] == ["b", "b"] and queue.busy == 1
-    assert queue.oldest > 0
-    tasks[0].cancel()
-    await asyncio.wait(tasks[:1])
-    assert len(queue.waiting) == 1, "who leaves waits no more"
-    release.touch()
-    await asyncio.gather(running, tasks[1])
-    assert (queue.waiting, queue.oldest, queue.busy) == ([], 0.0, 0)
-
-
 @settings(workers=2, queue_size=10)
 async def test_a_client_without_a_worker_comes_before_one_that_has_some(
     tmp_path: Path, bench: Bench
@@ -129,20 +112,3 @@ async def test_nobody_gives_a_worker_back_twice_or_the_only_one(
     release_first.touch()
     release_second.touch()
     await asyncio.gather(first, second)
-
-
-@settings(workers=2, queue_size=1, client_requests=2)
-async def test_leaving_while_a_worker_is_given_back(tmp_path: Path, bench: Bench) -> None:
-    ended: list[str] = []
-    first, release_first = await held(bench, tmp_path / "first", "a")
-    second, _ = await held(bench, tmp_path / "second", "a")
-    newcomer = await waiting(bench, "b", "b0", ended)
-    bench.move_clock(PATIENCE)
-    await newcomer
-    second.cancel()
-    await asyncio.gather(second, return_exceptions=True)
-    assert second.cancelled()
-    release_first.touch()
-    await first
-    for client in ("a", "b"):
-        await bench.engine.run(ProcessId(), LONG, client)

@@ -92,14 +92,6 @@ async def test_kills_a_worker_that_overruns_and_replaces_it(bench: Bench) -> Non
     assert not alive(pid)
 
 
-async def test_cancellation_in_the_queue_spares_the_worker(bench: Bench) -> None:
-    (running, release), waiting = await bench.held(), await bench.queued(ProcessId())
-    waiting.cancel()
-    release.touch()
-    assert int((await running).document) == bench.engine.worker_pids[0]
-    await bench.pid()
-
-
 async def test_errors_of_a_task_reach_its_caller_with_their_data(bench: Bench) -> None:
     pid = await bench.pid()
     limits = OutsideLimits("start", "elbow_joint", 4.0, -3.1, 3.1)

@@ -27,7 +27,8 @@ from joulepath.app.engine import fair_queue
 from joulepath.app.engine.fair_queue import PATIENCE, FairQueue, Place, State
 from joulepath.app.exceptions.queue import Busy
 
-CAPACITY, SHARE = 8, 5
+CAPACITY = 8
+SHARE = 5
 CLIENTS = st.sampled_from("abc")
 WORKERS = 3
 # a request that nobody waits for needs a turn to leave, one to give its worker back, and one to get

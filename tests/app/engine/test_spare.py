@@ -97,12 +97,6 @@ async def test_its_deadline_counts_from_its_start(tmp_path: Path, bench: Bench) 
         await running
 
 
-async def test_a_crash_is_told(bench: Bench) -> None:
-    with pytest.raises(WorkerLost):
-        await result_of(bench.engine.spare.run, Die(), LONG)
-    await result_of(bench.engine.spare.run, ProcessId(), LONG)
-
-
 @pytest.mark.parametrize("is_short", [False, True])
 async def test_one_after_another_on_one_worker(is_short: bool, bench: Bench) -> None:
     """Errors of tasks end nothing but themselves; what kills the worker leaves the rest. Short ones

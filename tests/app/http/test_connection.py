@@ -28,8 +28,10 @@ from tests.app.raw import answer_on, connected, ends, is_reset, post
 from tests.selection import long_but
 
 MOST_HEAD = 4096
-MOST, MOST_OF_CLIENT = 12, 8
-OTHER, THIRD = "127.0.0.2", "127.0.0.3"
+MOST = 12
+MOST_OF_CLIENT = 8
+OTHER = "127.0.0.2"
+THIRD = "127.0.0.3"
 SHORT = 0.5
 """Times that clients have [s]. Whoever keeps them sends at once; no test waits for one to pass, but
 for its effect.

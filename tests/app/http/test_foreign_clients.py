@@ -1,5 +1,5 @@
-"""Clients that speak HTTP in ways of their own: without names, with offers of other protocols, for
-the head alone.
+"""Clients that speak HTTP in ways of their own: without names or media types, with offers of other
+protocols, for the head alone.
 """
 
 from __future__ import annotations
@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from fastapi.testclient import TestClient
 from starlette.requests import Request
 
 from joulepath.app.http.weights import is_wanted
@@ -14,7 +15,8 @@ from tests.app.live import Server
 from tests.app.raw import RawAnswer, answer_on, connected
 
 WRONG = b'{"sart": {"q": [0, 0, 0, 0, 0, 0]}}'
-EVENTS, CSV = "text/event-stream", "text/csv"
+EVENTS = "text/event-stream"
+CSV = "text/csv"
 
 
 def asked(server: Server, *parts: bytes) -> RawAnswer:
@@ -134,3 +136,22 @@ def test_an_empty_content_type_is_none(server: Server, declared: str) -> None:
 def test_what_a_client_accepts(accept: str, media_type: str, wanted: bool) -> None:
     request = Request({"type": "http", "headers": [(b"accept", accept.encode())]})
     assert is_wanted(request, media_type) == wanted
+
+
+BODY = '{"start": {"q": [0, -1, 1, 0, 1, 0]}, "goal": {"q": [0.1, -1, 1, 0, 1, 0]}}'
+
+
+@pytest.mark.parametrize(
+    "declared", ["application/x-www-form-urlencoded", "application/json", None]
+)
+def test_json_is_taken_however_it_is_declared(client: TestClient, declared: str | None) -> None:
+    headers = {} if declared is None else {"content-type": declared}
+    answer = client.post("/optimize", content=BODY, headers=headers)
+    assert answer.status_code == 200
+    assert answer.json()["branch"]["goal"]["q"][0] == pytest.approx(0.1)
+
+
+def test_a_form_is_refused(client: TestClient) -> None:
+    answer = client.post("/optimize", data={"start": "home", "goal": "away"})
+    assert answer.status_code == 422
+    assert answer.json()["type"] == "/problems/invalid-request"

@@ -18,7 +18,8 @@ from tests.app.problems import checked
 from tests.app.raw import RawAnswer, answer_on, connected, post
 
 BODY = 1 << 20
-OTHER, THIRD = "127.0.0.2", "127.0.0.3"
+OTHER = "127.0.0.2"
+THIRD = "127.0.0.3"
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ from typing import Any
 
 import orjson
 import pytest
-from sqlalchemy.orm import Session
 from starlette.testclient import TestClient
 
 from joulepath.app.engine.result import TaskResult
@@ -126,42 +125,6 @@ def test_a_body_that_a_worker_reads_is_computed(recorded: TestClient) -> None:
 def result(number: int, status: str) -> TaskResult:
     content = {"request": "first", "id": None, "status": status, "number": number, "answer": None}
     return TaskResult.of_kept_json(content, figures_of(content))
-
-
-def numbers(document: bytes) -> Any:
-    return orjson.loads(document)["number"]
-
-
-async def test_one_that_is_not_optimal_does_for_shorter_deadlines(store: Store) -> None:
-    async def keep(number: int, status: str, deadline: float) -> None:
-        asked = Asked("key", deadline)
-        await keep_answer(store, Settings(), "optimize", result(number, status), None, asked)
-
-    async def found(deadline: float) -> Any:
-        known = await AnswerCache(store, None, False).find(Asked("key", deadline), "mine")
-        return None if known is None else numbers(known.document)
-
-    assert await found(1.0) is None
-    await keep(1, "feasible", 10.0)
-    assert [await found(each) for each in (5.0, 10.0, 10.5)] == [1, 1, None]
-    await keep(2, "optimal", 20.0)
-    assert [await found(each) for each in (5.0, 100.0)] == [2, 2]
-    await keep(3, "feasible", 200.0)
-    assert await found(1.0) == 2
-    await keep(4, "optimal", 1.0)
-    assert await found(100.0) == 4
-
-
-async def test_two_services_that_answer_at_the_same_time_lose_nothing(store: Store) -> None:
-    """The row of the first comes between the look and the write of the second."""
-    asked, settings = Asked("key", 1.0), Settings()
-    first = await keep_answer(store, settings, "optimize", result(1, "optimal"), None, asked)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Session, "scalars", lambda *_: [])  # it sees nothing
-        second = await keep_answer(store, settings, "optimize", result(2, "optimal"), None, asked)
-    assert first.document != second.document and not second.document.endswith(b'"answer":null}')
-    known = await AnswerCache(store, None, False).find(asked, "mine")
-    assert known is not None and numbers(known.document) == 1
 
 
 async def test_what_is_pruned_is_forgotten(store: Store) -> None:

@@ -137,13 +137,6 @@ def test_an_evaluated_motion_is_exported_by_its_samples(client: TestClient) -> N
     assert "sample_period" in refused(export(client, "ros2", without), InvalidRequest)["detail"]
 
 
-def test_a_motion_that_is_evaluated_as_too_fast_is_not_exported(client: TestClient) -> None:
-    body = {"configurations": [HOME, NEAR], "time_per_segment": 0.1, "sample_period": 0.01}
-    evaluated = client.post("/evaluate", json=body).json()
-    assert not evaluated["within_limits"]
-    assert max(refused(export(client, "csv", evaluated), NotCertified)["worst_ratio"].values()) > 1
-
-
 def test_an_iteration_of_a_study_and_a_point_of_a_front(client: TestClient) -> None:
     study = client.post("/studies", json={"name": "exports", "threshold": 1.0}).json()["id"]
     step = client.post(f"/studies/{study}/iterations", json={"optimize": move()}).json()
@@ -207,14 +200,6 @@ def test_an_answer_of_another_form_names_the_field(
 ) -> None:
     told = refused(export(client, "csv", altered(answer, *path, value=value)), InvalidRequest)
     assert told["errors"][0]["loc"][:2] == ["body", "answer"]
-
-
-def test_nan_in_the_body_is_no_json(client: TestClient) -> None:
-    body = b'{"answer": {"robot": "ur5e", "trajectory": {"t": [NaN]}}}'
-    refused(
-        client.post("/export/csv", content=body, headers={"content-type": "application/json"}),
-        InvalidRequest,
-    )
 
 
 def test_unknown_answers_and_robots(client: TestClient, answer: Json) -> None:
@@ -283,30 +268,6 @@ def test_accept_chooses_json_where_no_option_says(client: TestClient, answer: Js
     yaml_wanted = body | {"ros2": {"encoding": "yaml"}}
     told = client.post("/export/ros2", json=yaml_wanted, headers=headers)
     assert told.headers["content-type"].startswith("application/yaml")
-
-
-def test_arms_of_the_other_makers_get_their_programs(client: TestClient) -> None:
-    q = [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8]
-    franka = client.post(
-        "/optimize", json=move(robot="panda", start={"q": q}, goal={"q": [0.2, *q[1:]]})
-    ).json()
-    table = export(client, "franka", franka)
-    assert (
-        table.headers["content-type"].startswith("text/csv") and len(table.text.splitlines()) > 100
-    )
-    header = export(client, "franka", franka, franka={"form": "cpp"})
-    assert (
-        "franka::MotionFinished" in header.text and '.hpp"' in header.headers["content-disposition"]
-    )
-    q = [0.0, -1.2, 1.2, 0.0, 0.5, 0.0]
-    kuka = client.post(
-        "/optimize", json=move(robot="kr10_r1100", start={"q": q}, goal={"q": [0.4, *q[1:]]})
-    ).json()
-    program = export(client, "krl", kuka, krl={"tolerance": 0.002, "digital_output": 1})
-    assert (
-        program.text.startswith("&ACCESS RVP\r\nDEF joulepath( )") and "PTP_SPLINE" in program.text
-    )
-    assert "rad of the spline" in program.headers["joulepath-notes"]
 
 
 def test_an_arm_of_a_users_own_gets_programs_of_any_maker(client: TestClient) -> None:

@@ -219,21 +219,6 @@ def test_identifications_are_listed(client: TestClient, log: str) -> None:
     refused(client.get(f"/identifications/{found.id}/residuals"), UnknownIdentification)
 
 
-@pytest.mark.long
-def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log: str) -> None:
-    other = add_log(client, moves=4, seed=5)
-    result = done(client, logs=[log], validate=[other], inertials="refit", estimator="irls")
-    assert result.validation.moves == 4
-    assert result.physical is not None and result.physical.consistent
-    assert (result.structure.base, result.structure.excited) == (40, 40)
-    assert {"mass", "center_of_mass", "inertia"} <= result.document["inertials"].keys()
-
-
-@pytest.mark.long
-def test_each_motion_in_its_turn(client: TestClient, log: str) -> None:
-    assert done(client, logs=[log], validate="moves").validation.moves == 8
-
-
 @pytest.mark.parametrize(
     ("moves", "options", "body", "problem"),
     [

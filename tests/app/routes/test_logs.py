@@ -13,7 +13,6 @@ import pytest
 from starlette.testclient import TestClient
 
 from joulepath import (
-    EffortNotUsable,
     InvalidRequest,
     InvalidTable,
     LogTooLarge,
@@ -35,9 +34,7 @@ from tests.identification_logs import (
     Recording,
     csv_of,
     recorded,
-    rigid_torques,
     truth_of,
-    with_current,
 )
 
 ROBOT = load_robot("ur5e")
@@ -152,19 +149,6 @@ WRONG: list[tuple[str, list[str]]] = [
 def test_wrong_settings(client: TestClient, query: str, loc: list[str]) -> None:
     content = refused(client.post(f"/logs?{query}", content="t,q1\n", headers=CSV), InvalidRequest)
     assert [error["loc"] for error in content["errors"]] == [loc]
-
-
-def test_efforts_without_gravity(client: TestClient, recording: Recording) -> None:
-    rigid = rigid_torques(ROBOT, TRUTH, recording.exact_q, recording.exact_v, recording.a)
-    body = csv_of(with_current(recording, recording.current - rigid / TRUTH.torque_constant))
-    content = refused(client.post("/logs", content=body, headers=CSV), EffortNotUsable)
-    assert content["meaning"] == "external" and set(content["slope"]) == {
-        "shoulder_lift_joint",
-        "elbow_joint",
-    }
-    answer = client.post("/logs", content=body, params={"effort": "external"}, headers=CSV)
-    assert answer.status_code == 201 and answer.json()["effort"]["meaning"] == "external"
-    client.delete(answer.headers["location"])
 
 
 def test_other_media_types(client: TestClient) -> None:

@@ -1,4 +1,4 @@
-"""GET /robots/{name}/meshes.glb. Where the meshes stand: `tests/models/test_pictures.py`."""
+"""GET /robots/{name}/meshes.glb. Where the meshes stand: `tests/models/test_form.py`."""
 
 from __future__ import annotations
 

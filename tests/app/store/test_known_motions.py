@@ -13,7 +13,8 @@ from sqlalchemy.orm import Session
 from joulepath.app.store import known_motions
 from joulepath.app.store.store import Store
 
-CELL, OTHER = "c" * 64, "d" * 64
+CELL = "c" * 64
+OTHER = "d" * 64
 
 
 async def keep(

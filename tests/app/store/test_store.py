@@ -30,15 +30,12 @@ from sqlalchemy.exc import DBAPIError
 from starlette.testclient import TestClient
 
 from joulepath.app.access.client import Client
-from joulepath.app.api.answers import models as schemas
-from joulepath.app.engine.result import StoredAnswer, TaskResult
+from joulepath.app.engine.result import StoredAnswer
 from joulepath.app.exceptions.stored import StoreUnavailable, UnknownAnswer
-from joulepath.app.settings import Settings
 from joulepath.app.store import answers, database
 from joulepath.app.store.database import create_database_engine, migrate, sqlite_file
 from joulepath.app.store.faults import OtherTables, OtherVersion, fault_of
 from joulepath.app.store.store import Store
-from joulepath.app.store.store_answers import store_answers
 from joulepath.app.store.tables import Answer, JobRequest, Table, new_id, now
 from tests.app.databases import Postgres, opened, why_no_postgres
 from tests.app.forks import Fork
@@ -88,15 +85,6 @@ def test_migrations_make_what_the_models_say(url: str) -> None:
     assert tables(url) == []
     migrate(create_database_engine(url))
     assert tables(url) == []
-
-
-def test_the_comparison_above_can_fail(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path}/joulepath.db"
-    engine = create_database_engine(url)
-    migrate(engine)
-    with engine.begin() as connection:
-        connection.execute(text("DROP INDEX ix_answers_study_id"))
-    assert len(tables(url)) == 1
 
 
 def migrate_to(engine: Engine, revision: str) -> None:
@@ -266,28 +254,6 @@ async def test_answers_are_kept_whole(store: Store) -> None:
         await store.read(partial(answers.get, answer_id="no\0such"))
 
 
-async def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
-    """A document repeats texts of the caller: none of them may stand for anything else."""
-    kept = [StoredAnswer(new_id(), b'{"k": 0}'), StoredAnswer(new_id(), b'{"k": 1}')]
-    texts = [f"\x7f{word}/{k}\x7f" for word in ("kept", "stored") for k in range(2)]
-    result = TaskResult.of_json(
-        {"names": texts, "answers": [answer.path for answer in kept]}, tuple(kept)
-    )
-
-    async with opened(f"sqlite:///{tmp_path}/joulepath.db") as store:
-        done = await store_answers(store, Settings(), "optimize", result, None)
-        assert (done.document, done.media_type, done.stored) == (
-            result.document,
-            result.media_type,
-            (),
-        )
-        for answer in kept:
-            _, body = await store.read(
-                partial(answers.get, answer_id=answer.path.removeprefix("/answers/"))
-            )
-            assert body == answer.body
-
-
 async def test_typed_texts_take_room(store: Store) -> None:
     """Only the last ones that were told."""
     kept = await store.write(put)
@@ -330,18 +296,6 @@ async def test_work_that_fails_changes_nothing(store: Store) -> None:
 
 async def test_writers_wait_for_each_other(store: Store) -> None:
     assert len(set(await asyncio.gather(*(store.write(put) for _ in range(50))))) == 50
-
-
-def test_answers_over_http(client: TestClient) -> None:
-    store: Store = client.app.state.store  # type: ignore[attr-defined]
-    assert client.portal is not None
-    answer_id = client.portal.call(
-        store.write, partial(put, kind="ik", body=b'{"solutions": [1.5]}')
-    )
-    answer = client.get(f"/answers/{answer_id}")
-    assert answer.status_code == 200, answer.text
-    schemas.StoredAnswer.model_validate_json(answer.content)
-    assert answer.json()["answer"] == {"solutions": [1.5]}
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from joulepath.models.own_arm.description import Description
 
-UP, ACROSS, DOWN = "0 0 1", "0 1 0", "0 0 -1"
+UP = "0 0 1"
+ACROSS = "0 1 0"
+DOWN = "0 0 -1"
 
 
 def link(name: str, mass: float, com: str) -> str:

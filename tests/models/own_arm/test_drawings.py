@@ -16,7 +16,6 @@ from tests.models.own_arm.drawings import Convention, drawn, inclined, right_ang
 from tests.optimizer.kinematics.six_joints import KUKA, UR5E, flange
 from tests.selection import long_but
 
-START, MOVE = [0.2, -1.2, 1.0, 0.3, 0.9, 0.3], [0.9, 0.3, -0.4, 0.5, 0.4, 0.3]
 FIGURES = (repr, "{:.9f}".format, "{:.4f}".format, "{:.3f}".format)
 AS_GIVEN = Convention(np.ones(6), np.zeros(6), np.tile(np.eye(3), (7, 1, 1)))
 

@@ -21,7 +21,8 @@ BOXED = PLAIN.urdf.replace(FOREARM, FOREARM + BOX.format('<box size="0.1 0.06 0.
 WITHOUT = re.sub(r"<inertial>.*?</inertial>", "", BOXED, flags=re.S)
 BARE = replace(PLAIN, urdf=WITHOUT)
 # kg, m³: of the cylinder of the upper arm and the box of the forearm
-CYLINDER, CUBOID = np.pi * 0.05**2 * 0.3, 0.1 * 0.06 * 0.2
+CYLINDER = np.pi * 0.05**2 * 0.3
+CUBOID = 0.1 * 0.06 * 0.2
 # the flat faces of a mesh against those of a round body
 FACETED = 0.01
 FLAT = (

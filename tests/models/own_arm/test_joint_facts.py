@@ -14,10 +14,8 @@ from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.robot import UPRIGHT
 from tests.models.own_arm.arms import PLAIN, RICH_ARM, refused, robot
 
-SHOULDER, ELBOW = (
-    '<limit lower="-2" upper="2" velocity="3" effort="60"/>',
-    '<limit lower="-2.5" upper="2.5" velocity="3" effort="40"/>',
-)
+SHOULDER = '<limit lower="-2" upper="2" velocity="3" effort="60"/>'
+ELBOW = '<limit lower="-2.5" upper="2.5" velocity="3" effort="40"/>'
 
 
 def with_parts(shoulder: str, elbow: str) -> Description:

@@ -32,7 +32,8 @@ from tests.mesh_folders import meshes as arm_folder
 from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refused, robot, whole
 
 # lengths of about 1 m and torques of some 100 N·m, both by sums of a hundred products
-EXACT, TORQUE = 1e-14, 1e-11
+EXACT = 1e-14
+TORQUE = 1e-11
 # least share of random configurations that guessed shapes leave free
 FREE = 0.6
 

@@ -1,18 +1,24 @@
-"""What makes no robot is refused, with the link or joint named; what is hardly real is remarked."""
+"""What makes no robot is refused by link or joint, what is hardly real is remarked, and a broken
+URDF is told as such.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import random
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from joulepath.app.schemas.examples.own_arm import URDF
+from joulepath.models.from_figures import robot_of
 from joulepath.models.own_arm.description import Collision, Drives, Electronics, InvalidArm, Motion
 from joulepath.models.own_arm.figures import own_figures
 from joulepath.models.registry import load_robot
 from tests.models.own_arm.arms import HELD, RICH, RICH_ARM, refused, robot
+from tests.selection import long_but
 
 
 def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
@@ -36,7 +42,8 @@ BALL_JOINT = (
 LOOP = change('link="forearm"/><child link="wrist"', 'link="finger"/><child link="wrist"')
 
 
-NO_RANGE, EXCHANGED = 'lower="0" upper="0"', 'lower="2.5" upper="-2"'
+NO_RANGE = 'lower="0" upper="0"'
+EXCHANGED = 'lower="2.5" upper="-2"'
 
 
 ON_A_RAIL, ON_A_PLATE = (
@@ -193,3 +200,65 @@ def test_what_is_wrong_in_a_file_is_named(
     with pytest.raises(InvalidArm, match=words) as found:
         load_robot(tmp_path / "my_arm.yaml")
     assert found.value.field == field
+
+
+NUMBERS = (
+    "0",
+    "-1",
+    "1e308",
+    "-1e308",
+    "1e-308",
+    "nan",
+    "inf",
+    "",
+    "a",
+    "1 2",
+    "1e5",
+    "9" * 400,
+    "0x10",
+    "1,5",
+)
+CHARACTERS = ("\0", "<", ">", '"', "&", "\xff", "\U0001f600")
+
+
+def mutant(text: str, chance: random.Random) -> str:
+    """The text with a number, an attribute, an element, a name or a character changed."""
+    kind = chance.choice(["number", "attribute", "element", "name", "character"])
+    if kind == "character":
+        at = chance.randrange(len(text))
+        return text[:at] + chance.choice(CHARACTERS) + text[at + 1 :]
+    pattern = {
+        "number": r"-?\d+\.?\d*",
+        "attribute": r'\w+="[^"]*"',
+        "element": r"<[^>]+/>",
+        "name": r'"\w+"',
+    }[kind]
+    found = list(re.finditer(pattern, text))
+    place, other = chance.choice(found), chance.choice(found)
+    new = {
+        "number": chance.choice(NUMBERS),
+        "attribute": "",
+        "element": chance.choice(["", place[0] * 2]),
+        "name": other[0],
+    }[kind]
+    return text[: place.start()] + new + text[place.end() :]
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("count", long_but((150,), (150, 5_000)))
+def test_a_mutant_is_a_robot_or_is_refused(count: int) -> None:
+    chance, refused = random.Random(1), 0
+    for _ in range(count):
+        text = RICH
+        for _ in range(chance.choice([1, 1, 2, 4])):
+            text = mutant(text, chance)
+        try:
+            assert (
+                robot_of(
+                    "mutant", own_figures("mutant", dataclasses.replace(RICH_ARM, urdf=text))[0]
+                ).nq
+                > 0
+            )
+        except InvalidArm:
+            refused += 1
+    assert 0.5 * count < refused < 0.95 * count
