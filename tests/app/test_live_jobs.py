@@ -91,20 +91,6 @@ def running(server: Server, path: str) -> None:
     until(lambda: shown(over(server), path)["counts"]["running"] > 0)
 
 
-def test_cancelling_stops_what_runs(single: Server) -> None:
-    path = sent(over(single), [LONG, evaluation()])
-    running(single, path)
-    (worker,) = single.workers()
-    answer = single.post(f"{path}/cancel", None)
-    assert answer.status_code == 202
-    until(single.is_idle)
-    assert single.workers() == [worker], "it ends the work when it is told to"
-    job = ended(over(single), path)
-    assert (job["state"], job["counts"]["cancelled"]) == ("cancelled", 2)
-    assert single.post(f"{path}/cancel", None).json()["state"] == "cancelled"
-    assert single.post("/optimize", move()).status_code == 200
-
-
 def test_a_caller_need_not_wait_for_a_job(single: Server) -> None:
     path = sent(over(single), [LONG])
     running(single, path)

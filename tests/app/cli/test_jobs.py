@@ -84,9 +84,6 @@ def test_a_key_that_cannot_be_sent_is_a_problem(here: Here) -> None:
         assert (code, problem["type"]) == (1, "/problems/unauthenticated")
 
 
-pytestmark = pytest.mark.usefixtures("service")
-
-
 def begun(here: Here) -> str:
     """The id of a new study."""
     code, out, _ = here.run("studies", "begin", "--name", "Lift", "--threshold", "500")
@@ -94,6 +91,7 @@ def begun(here: Here) -> str:
     return out.decode().strip()
 
 
+@pytest.mark.usefixtures("service")
 def test_a_study_from_begin_to_end(here: Here) -> None:
     study = begun(here)
     first = json.loads(here.run("studies", "add", study, "-", stdin=json.dumps(move()))[1])
@@ -121,6 +119,7 @@ def test_a_study_from_begin_to_end(here: Here) -> None:
     assert (code, problem["type"]) == (1, "/problems/unknown-study")
 
 
+@pytest.mark.usefixtures("service")
 def test_studies_that_are_refused(here: Here) -> None:
     code, problem = here.problem("studies", "add", begun(here), "-", stdin=json.dumps({"a": 1}))
     assert (code, problem["type"]) == (2, "/problems/invalid-request")
@@ -152,6 +151,7 @@ MADE: dict[str, Callable[[TestClient], str]] = {
 }
 
 
+@pytest.mark.usefixtures("service")
 @pytest.mark.parametrize("kind", KINDS)
 def test_whatever_is_kept_has_another_name(here: Here, client: TestClient, kind: str) -> None:
     path = f"/{kind}/{(id := MADE[kind](client))}"
@@ -167,6 +167,7 @@ def test_whatever_is_kept_has_another_name(here: Here, client: TestClient, kind:
     assert client.delete(path).status_code == 204
 
 
+@pytest.mark.usefixtures("service")
 def test_names_that_are_refused(here: Here) -> None:
     code, problem = here.problem("rename", "jobs", UNKNOWN, "Lift")
     assert (code, problem["type"]) == (1, "/problems/unknown-job")

@@ -6,12 +6,9 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
-
-import pytest
 
 from joulepath.app.access.client import OPERATOR
 from joulepath.app.convert.packed import packed, unpacked
@@ -187,24 +184,6 @@ async def test_a_caller_may_take_its_worker_twice(store: Store, service: Service
     (only,) = await requests(store, job_id)
     assert (only.state, only.attempt) == ("done", 1)
     assert service.work.stoppable == [True, True, False]
-
-
-async def test_owners_take_turns(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With one request leased ahead: two owners of many jobs leave the third one its turn."""
-    monkeypatch.setattr(module, "DISPATCHER", replace(module.DISPATCHER, ahead=0.0))
-    order = list[str]()
-
-    def answered(task: JobRequestTask) -> TaskResult:
-        order.append(task.request_id.rpartition(".")[0])
-        return answer("done")
-
-    service.work.answer = answered
-    service.work.free.set()
-    owners = ["A"] * 6 + ["B"] * 6 + ["C"]
-    made = [await sent(service, owner=owner) for owner in owners]
-    service.dispatcher.start()
-    await until(lambda: len(order) == len(made))
-    assert made[-1] in order[:3] and sorted(order) == sorted(made)
 
 
 async def test_cancelling_stops_what_runs_here_and_elsewhere(store: Store) -> None:

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
@@ -176,28 +176,6 @@ def test_labels_say_where_the_elbow_and_the_arm_are() -> None:
 def test_a_full_turn_keeps_the_label(q: Array, turns: list[int]) -> None:
     assume(abs(np.linalg.det(jacobian(q))) > 1e-6)
     assert IK.label(q + 2 * np.pi * np.array(turns)) == IK.label(q)
-
-
-@given(q=angles, direction=st.lists(st.floats(-1, 1), min_size=6, max_size=6).map(np.array))
-# most random paths meet a singularity
-@pytest.mark.long
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
-def test_label_is_constant_along_a_branch(q: Array, direction: Array) -> None:
-    """Along a path without a singularity, adjacent solutions have the same label."""
-    path = q + np.linspace(0, 1, 60)[:, None] * direction
-    volume = np.array([np.linalg.det(jacobian(point)) for point in path])
-    assume(abs(volume).min() > 1e-5 and (np.sign(volume) == np.sign(volume[0])).all())
-    branches = [IK.branches(forward(point)) for point in path]
-    for last, now, point in zip(branches, branches[1:], path[1:], strict=False):
-        assert IK.label(point) == IK.label(path[0])
-        for solution in last:
-            if solution.smallest_singular_value < 0.01:
-                continue
-            gaps = [np.abs(np.exp(1j * other.q) - np.exp(1j * solution.q)).max() for other in now]
-            # A nearby solution of another branch would have to cross a singularity within a step of
-            # 1/60 rad.
-            if min(gaps) < 0.05:
-                assert now[int(np.argmin(gaps))].label == solution.label
 
 
 @given(q=angles)
