@@ -177,7 +177,10 @@ class Leg:
 
     def trace_of(self, problem: Problem) -> Trace | None:
         """Trace of a pair's problem along its line or path; None if it is not known."""
-        if self.prepared.problem.tool_path is None or not self.goal.traces:
+        # an approach was followed from its stop to its outer end
+        backwards = not self.goal.traces
+        layer = self.start if backwards else self.goal
+        if self.prepared.problem.tool_path is None or not layer.traces:
             return None
         q_start, q_goal = np.asarray(problem.start), np.asarray(problem.goal)
         nodes = np.flatnonzero(
@@ -185,7 +188,8 @@ class Leg:
         )
         if not len(nodes):
             return None
-        trace = self.goal.traces[int(self.goal.end[nodes[0]])]
+        trace = layer.traces[int(layer.end[nodes[0]])]
+        trace = trace.reversed() if backwards else trace
         # all nodes of an end have the same trace up to full turns
         turned = np.round((q_start - trace.q[0]) / (2 * np.pi)) * (2 * np.pi)
         return replace(trace, q=np.concatenate([q_start[None], trace.q[1:] + turned]))

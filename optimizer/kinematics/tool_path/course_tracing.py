@@ -81,6 +81,10 @@ class Trace:
         """Fraction of the course that the arm followed."""
         return max(float(self.at[-1]), self.farthest)
 
+    def reversed(self) -> Trace:
+        """A whole trace without a turning, followed from its end to its start."""
+        return replace(self, q=self.q[::-1], at=1.0 - self.at[::-1])
+
 
 @lru_cache(maxsize=16)
 def chain_of(robot: Robot) -> Chain:

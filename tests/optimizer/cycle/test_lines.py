@@ -20,6 +20,7 @@ from joulepath import (
     Scene,
     Stop,
     StopInCollision,
+    load_robot,
     plan_cycle,
 )
 from tests.optimizer.cycle.cycles import HOME, pick_and_place
@@ -93,6 +94,23 @@ def test_what_is_grasped_is_no_obstacle_on_the_lines() -> None:
         plan_cycle(replace(asked, stops=[replace(held, obstacles_ignored=[])]))
     with pytest.raises(StopInCollision):
         plan_cycle(replace(asked, stops=[replace(held, retreat=None)]))
+
+
+def test_a_redundant_arm_approaches_as_it_was_followed_from_the_stop() -> None:
+    """Traced from its outer end, the line would lead to another configuration of the stop."""
+    stop = Stop(name="stop", target=np.array([0.5, -0.3, 0.4, -1.8, 0.3, 1.8, 0.7]), approach=INTO)
+    found = plan_cycle(
+        Cycle(
+            arm=Arm(robot=load_robot("panda"), collisions=False),
+            start=np.array([0.3, -0.5, 0.2, -2.0, 0.1, 1.6, 0.5]),
+            stops=[stop],
+            closed=False,
+            windings=False,
+            with_baselines=False,
+        )
+    )
+    assert np.array_equal(found.moves[-1].solution.goal.q, stop.target)
+    assert found.moves[-1].solution.certificate.valid
 
 
 def test_a_line_that_no_configuration_follows_says_how_far_each_gets() -> None:
