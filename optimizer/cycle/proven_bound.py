@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -25,6 +26,19 @@ from joulepath.optimizer.prepared_problem import PreparedProblem
 from joulepath.optimizer.problem.cycle import Cycle
 from joulepath.optimizer.problem.stops import PlannedMove
 from joulepath.optimizer.search.candidates import Candidate
+
+
+@dataclass(frozen=True)
+class ProvenBoundSettings:
+    """Settings of the lower bound of a cycle."""
+
+    overtime: float = 2.0
+    """Time after the deadline in which poses are still covered for the first time [s]: a search
+    that used all of its time would otherwise have hardly any bound. It is less than half of the
+    time in which a service waits for a late answer."""
+
+
+PROVEN_BOUND = ProvenBoundSettings()
 
 
 def proven_bound(cycle: Cycle, legs: Sequence[Leg], deadline: Deadline) -> float:
@@ -72,7 +86,13 @@ def bounded_costs(cycle: Cycle, move: PlannedMove, leg: Leg, deadline: Deadline)
 
 
 def _bound_of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
-    """Bound [J] of the motions of a leg with an unknown end; a bound of `enough` suffices."""
+    """Bound [J] of the motions of a leg with an unknown end; a bound of `enough` suffices.
+
+    Long after the deadline it is the weakest one: even the first cover of a pose by boxes takes
+    some 0.3 s, and a cycle has many legs.
+    """
+    if deadline.earlier_by(-PROVEN_BOUND.overtime).passed:
+        return _bound_of_any(leg)
     if all(layer.complete and not layer.sampled_poses for layer in leg.layers):
         return _bound_of_self_motions(leg, deadline)
     if all(

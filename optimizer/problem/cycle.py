@@ -29,6 +29,7 @@ from joulepath.optimizer.problem.stops import (
     passing,
 )
 from joulepath.optimizer.problem.targets import Target, validated_in_cycle
+from joulepath.optimizer.problem.uncoupled import check_uncoupled
 from joulepath.optimizer.result.energy import Objective
 
 
@@ -129,6 +130,11 @@ class Cycle:
                     f"stops.{k}.dwell", f"dwell must be from 0 to {DURATIONS.longest:g} s."
                 )
             self._check_limits(k, stop)
+            for name in ("approach", "retreat", "path"):
+                if getattr(stop, name) is not None:
+                    check_uncoupled(
+                        self.arm.robot, f"stops.{k}.{name}", "Tool paths are not followed"
+                    )
             if stop.path is not None:
                 self._check_path(k, stop, stop.path)
             if stop.via:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,6 +14,7 @@ from joulepath import (
     ConeOrientedPose,
     Cycle,
     InvalidProblem,
+    Line,
     Obstacle,
     Places,
     Pose,
@@ -19,6 +22,7 @@ from joulepath import (
     Scene,
     Solution,
     Stop,
+    StopPath,
     ToolPath,
     evaluate,
     identify,
@@ -28,6 +32,9 @@ from joulepath import (
 )
 from joulepath.models.robot import Array
 from joulepath.optimizer.collision.model import collision_model
+from joulepath.optimizer.cycle.cycle_search import CycleSearch
+from joulepath.optimizer.cycle.proven_bound import PROVEN_BOUND, proven_bound
+from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.plant import Plant
 from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
 from joulepath.optimizer.kinematics.covers.pose_boxes import PoseBoxes
@@ -166,14 +173,30 @@ def test_parts_of_turns_leave_joint_positions_as_targets() -> None:
         optimize(Problem(arm=arm, start=START, goal=Pose(tcp_pose(arm, GOAL))), progress=False)
 
 
+def test_long_after_its_deadline_a_cycle_covers_no_further_pose(arm: Arm) -> None:
+    """Shortly after it, the first cover of a pose gives a search without time left a bound."""
+    poses = [Pose(tcp_pose(arm, q)) for q in (GOAL, START + 0.3)]
+    stops = [Stop(name=str(k), target=pose) for k, pose in enumerate(poses)]
+    asked = Cycle(arm=arm, start=START, stops=stops)
+    legs = CycleSearch(asked, time.perf_counter).legs
+    ends = (np.inf, -0.5 * PROVEN_BOUND.overtime, -2 * PROVEN_BOUND.overtime)
+    whole, short, late = (proven_bound(asked, legs, Deadline(at, clock=lambda: 0.0)) for at in ends)
+    assert late < short < whole
+
+
 def test_what_is_not_modelled_is_refused(arm: Arm) -> None:
     stops = [Stop(name="place", target=GOAL)]
+    line, pose = Line(direction=[0, 0, 1], distance=0.1), Pose(tcp_pose(arm, GOAL))
+    path = StopPath(goal=Pose(tcp_pose(arm, START)))
     for refused in (
         lambda: Problem(arm=arm, start=START, goal=Pose(tcp_pose(arm, GOAL)), tool_path=ToolPath()),
         lambda: ExcitationProblem(arm=arm),
         lambda: SimulatedArm(arm),
         lambda: identify(arm.robot, []),
         lambda: place(Cycle(arm=arm, start=START, stops=stops), Places([np.eye(4)])),
+        lambda: Cycle(arm=arm, start=START, stops=[Stop(name="a", target=GOAL, approach=line)]),
+        lambda: Cycle(arm=arm, start=START, stops=[Stop(name="a", target=GOAL, retreat=line)]),
+        lambda: Cycle(arm=arm, start=START, stops=[Stop(name="a", target=pose, path=path)]),
     ):
         with pytest.raises(InvalidProblem, match="some of its joints follow others"):
             refused()
