@@ -91,7 +91,7 @@ def _parts(cycle: Cycle, models: ModelsOfArms, k: int) -> list[Stop]:
             raise
         places = _places(cycle, models, stop)
         if places is None:
-            raise PathInfeasible(error.length, error.attempts, error.path, in_parts=True) from None
+            raise replace(error, in_parts=True) from None
         return _divided(stop, places)
     return [stop]
 

@@ -13,9 +13,11 @@ from joulepath import (
     Cycle,
     NoConfigurationFound,
     OrientationNotHeld,
+    PathInfeasible,
     Pose,
     Problem,
     Stop,
+    ToolPath,
     UnreachablePose,
     inverse_kinematics,
     optimize,
@@ -76,6 +78,23 @@ def test_position_alone_frees_what_the_joints_can_do(arm: Arm) -> None:
         assert max(error(each, pose, one.q) for one in found) < ACCURACY
         assert min(len(one.free) for one in found) >= freedom
         assert all(one.q.min() >= -2.9 and one.q.max() <= 2.9 for one in found)
+
+
+def test_a_path_out_of_the_plane_of_the_joints_names_what_is_possible(arm: Arm) -> None:
+    """Sideways, the arm would have to turn its tool about the vertical."""
+    start = tcp_pose(arm, HOME)
+    for direction, is_followed in (
+        ([np.cos(HOME[0]), np.sin(HOME[0]), 0.0], True),
+        ([0, 1, 0], False),
+    ):
+        goal = start.copy()
+        goal[:3, 3] -= 0.05 * np.array(direction)
+        problem = Problem(arm=arm, start=HOME, goal=Pose(goal), tool_path=ToolPath())
+        if is_followed:
+            assert optimize(problem, progress=False).certificate.valid
+        else:
+            with pytest.raises(PathInfeasible, match="fewer than six joints"):
+                optimize(problem, progress=False)
 
 
 def test_a_full_pose_that_the_arm_holds(arm: Arm) -> None:
