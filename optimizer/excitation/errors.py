@@ -13,8 +13,9 @@ class ExcitationInfeasible(JoulepathError):
 
     title = "No excitation within the limits"
     remedy = (
-        "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; else "
-        "relax the limit or give a longer `period`."
+        "For `clearance`, move obstacles, ask for less, or give a `centre` with more room; for "
+        "`position`, widen it, or give such a `centre` or a shorter `period`; else relax the limit "
+        "or give a longer `period`."
     )
 
     limit: str
@@ -25,6 +26,8 @@ class ExcitationInfeasible(JoulepathError):
         remedy = "relax it, or give a longer period"
         if self.limit == "clearance":
             remedy = "move the obstacles, ask for less clearance, or give a centre with more room"
+        elif self.limit == "position":
+            remedy = "widen it, give a centre with more room, or give a shorter period"
         return (
             f"No excitation was found that keeps its limits, the last one broke {self.limit}: "
             f"{remedy}."

@@ -18,7 +18,7 @@ from joulepath.optimizer.certificate import certify
 from joulepath.optimizer.collision.model import CollisionModel, collision_model
 from joulepath.optimizer.deadline import Deadline
 from joulepath.optimizer.dynamics.plant import Plant
-from joulepath.optimizer.exceptions import DeadlineExceeded
+from joulepath.optimizer.exceptions import DeadlineExceeded, OutsideLimits
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.excitation.excitation_problem import ExcitationProblem
 from joulepath.optimizer.excitation.excitation_result import (
@@ -68,6 +68,9 @@ class ExcitationSettings:
     """Random centres that are tested for collisions."""
     start_amplitude: float = 0.15
     """Largest coefficient of a start [rad/s]."""
+    start_range: float = 0.2
+    """Share of a joint's range from its ends to the centre of a start, and to which its motion
+    about the centre is limited [1]."""
     fallback_shares: tuple[float, ...] = (1.0, 0.9, 0.7, 0.4, 0.0)
     """Shares of the way from the start to the optimum, tried in turn for a motion within all
     limits."""
@@ -144,12 +147,15 @@ class _Design:
         small = random.uniform(
             -EXCITATION.start_amplitude, EXCITATION.start_amplitude, size
         ) * np.minimum(1.0, limits.v_max)
+        low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
+        # a joint of a narrow range starts with a smaller motion, within this range
+        reach = np.abs(self.matrices[0][:, 1:] @ small).max(axis=0)
+        small *= np.minimum(1.0, EXCITATION.start_range * (high - low) / reach)
         if self.problem.centre is not None:
             return np.vstack([self.problem.centre, small])
-        low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
         for centre in random.uniform(
-            low + 0.2 * (high - low),
-            high - 0.2 * (high - low),
+            low + EXCITATION.start_range * (high - low),
+            high - EXCITATION.start_range * (high - low),
             (EXCITATION.centre_attempts, len(low)),
         ):
             q = centre + self.matrices[0][:, 1:] @ small
@@ -233,7 +239,12 @@ class _Design:
         """
         limit = None
         for share in EXCITATION.fallback_shares:
-            motion = self.certified(start + share * (found - start))
+            try:
+                motion = self.certified(start + share * (found - start))
+            except OutsideLimits:
+                # of the rest at both ends
+                limit = "position"
+                continue
             limit = self.exceeded_limit(motion.certificate)
             if limit is None:
                 return motion, None

@@ -64,5 +64,8 @@ class Information:
         Args:
             samples: number of independent measurements in all rows together.
         """
-        gram = self.columns.T @ self.columns * (samples / len(self.columns))
-        return np.asarray(np.sqrt(np.diag(np.linalg.inv(gram))))
+        scale = np.linalg.norm(self.columns, axis=0)
+        # not by the inverse of the information, whose condition is the square of the columns'
+        _, values, vectors = np.linalg.svd(self.columns / scale, full_matrices=False)
+        spread = np.linalg.norm(vectors / values[:, None], axis=0) / scale
+        return np.asarray(spread * np.sqrt(len(self.columns) / samples))

@@ -127,9 +127,10 @@ class PathAttempt:
     followed: Ratio
     """Share of the path that is followed; of a line, from the stop."""
     reason: PathEnd
-    """What ends it: the next pose is out of reach; a joint would have to jump, at a singularity; a
-    joint leaves its range; the arm collides at the end; the path ends at other joint positions than
-    those of `goal`; another line or the path of the stop cannot be followed."""
+    """What ends it: the next pose is out of reach, or in reach of other configurations only; a
+    joint would have to jump, at a singularity; a joint leaves its range; the arm collides at the
+    end; the path ends at other joint positions than those of `goal`; another line or the path of
+    the stop cannot be followed."""
 
 
 LINES = ("/approach", "/retreat")

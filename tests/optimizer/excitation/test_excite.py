@@ -23,6 +23,7 @@ from joulepath import (
     ToolCone,
     load_robot,
 )
+from joulepath.models.robot import Array
 from joulepath.optimizer.excitation import excite as module
 from joulepath.optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
 from joulepath.optimizer.excitation.excitation_result import Excitation
@@ -170,6 +171,45 @@ def test_no_room_is_said() -> None:
     with pytest.raises(ExcitationInfeasible, match="clearance") as caught:
         excite(ExcitationProblem(arm=arm, starts=2, deadline=np.inf))
     assert caught.value.limit == "clearance"
+
+
+def test_a_joint_that_is_nearly_locked_stays_within_its_range() -> None:
+    """Its figures are then as good as unknown, and the predicted deviations tell by how much."""
+    robot = load_robot("ur5e")
+    locked = robot.limits.tightened(
+        q_min=np.r_[-1e-4, robot.limits.q_min[1:]], q_max=np.r_[1e-4, robot.limits.q_max[1:]]
+    )
+    found = excite(
+        ExcitationProblem(
+            arm=Arm(robot=robot, limits=locked), harmonics=2, parts=("rotor", "friction"), starts=1
+        )
+    )
+    assert found.certificate.valid and np.abs(found.trajectory.q[:, 0]).max() <= 1e-4
+    of_joint, others = (
+        [each.sd for each in found.predicted_sd if ("1" in each.parameter) == first]
+        for first in (True, False)
+    )
+    assert np.isfinite(of_joint).all() and max(of_joint) > 1e6 * max(others)
+
+
+def test_a_motion_beyond_a_range_is_no_refusal_of_a_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An excitation has no start: the search falls back to a smaller motion."""
+
+    def far(self: object, coordinates: Array, deadline: object) -> Array:
+        return np.vstack([coordinates[:1], 50.0 * coordinates[1:]])
+
+    monkeypatch.setattr(module._Design, "improved", far)
+    found = excite(ExcitationProblem(arm=Arm(robot=load_robot("ur5e"), collisions=False), starts=1))
+    assert found.certificate.valid
+
+
+def test_the_deviations_of_columns_that_are_nearly_dependent() -> None:
+    """The inverse of [[1, 1], [0, e]] is [[1, -1/e], [0, 1/e]]."""
+    e = 1e-9
+    deviations = Information(np.array([[1.0, 1.0], [0.0, e]])).deviations(2.0)
+    assert deviations == pytest.approx([np.hypot(1, 1 / e), 1 / e], rel=1e-6)
 
 
 def test_no_time_is_said() -> None:
