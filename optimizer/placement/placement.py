@@ -91,7 +91,8 @@ class Placement:
             raise InvalidProblem(
                 "cycles", f"A placement has 1 to {PLACEMENT_RANGES.max_cycles} cycles."
             )
-        check_uncoupled(self.cycles[0].cycle.arm.robot, "robot", "There are no placements")
+        robot = "cycle.robot" if len(self.cycles) == 1 else "cycles.0.cycle.robot"
+        check_uncoupled(self.cycles[0].cycle.arm.robot, robot, "There are no placements")
         if not 1 <= len(self.moved) <= PLACEMENT_RANGES.max_moved:
             raise InvalidProblem(
                 "moves", f"A placement moves 1 to {PLACEMENT_RANGES.max_moved} bodies."

@@ -44,6 +44,7 @@ from joulepath.optimizer.replay.simulated_arm import SimulatedArm
 from tests.by_pinocchio import torques_of
 from tests.models.own_arm.arms import robot
 from tests.models.own_arm.palletiser import PALLETISER, PLATE, description
+from tests.refusals import refusal_of
 
 START = np.array([-1.0, 0.1, 0.6, 0.0])
 GOAL = np.array([1.2, 0.7, 0.2, 1.0])
@@ -193,10 +194,11 @@ def test_what_is_not_modelled_is_refused(arm: Arm) -> None:
         lambda: ExcitationProblem(arm=arm),
         lambda: SimulatedArm(arm),
         lambda: identify(arm.robot, []),
-        lambda: place(Cycle(arm=arm, start=START, stops=stops), Places([np.eye(4)])),
         lambda: Cycle(arm=arm, start=START, stops=[Stop(name="a", target=GOAL, approach=line)]),
         lambda: Cycle(arm=arm, start=START, stops=[Stop(name="a", target=GOAL, retreat=line)]),
         lambda: Cycle(arm=arm, start=START, stops=[Stop(name="a", target=pose, path=path)]),
     ):
         with pytest.raises(InvalidProblem, match="some of its joints follow others"):
             refused()
+    with refusal_of("cycle.robot", match="follow others"):
+        place(Cycle(arm=arm, start=START, stops=stops), Places([np.eye(4)]))
