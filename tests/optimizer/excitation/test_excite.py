@@ -177,14 +177,14 @@ def test_a_joint_that_is_nearly_locked_stays_within_its_range() -> None:
     """Its figures are then as good as unknown, and the predicted deviations tell by how much."""
     robot = load_robot("ur5e")
     locked = robot.limits.tightened(
-        q_min=np.r_[-1e-4, robot.limits.q_min[1:]], q_max=np.r_[1e-4, robot.limits.q_max[1:]]
+        q_min=np.r_[-5e-4, robot.limits.q_min[1:]], q_max=np.r_[5e-4, robot.limits.q_max[1:]]
     )
     found = excite(
         ExcitationProblem(
             arm=Arm(robot=robot, limits=locked), harmonics=2, parts=("rotor", "friction"), starts=1
         )
     )
-    assert found.certificate.valid and np.abs(found.trajectory.q[:, 0]).max() <= 1e-4
+    assert found.certificate.valid and np.abs(found.trajectory.q[:, 0]).max() <= 5e-4
     of_joint, others = (
         [each.sd for each in found.predicted_sd if ("1" in each.parameter) == first]
         for first in (True, False)

@@ -10,9 +10,21 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from joulepath import AnyOf, Arm, InvalidProblem, OutsideLimits, Payload, Pose, Problem, load_robot
+from joulepath import (
+    AnyOf,
+    Arm,
+    InvalidProblem,
+    OutsideLimits,
+    Payload,
+    Pose,
+    Problem,
+    inverse_kinematics,
+    load_robot,
+)
 from joulepath.models.robot import Array
+from joulepath.optimizer.kinematics.tcp import tcp_pose as forward
 from joulepath.optimizer.prepared_problem import PreparedProblem
+from joulepath.optimizer.problem.arm import ARM_RANGES
 from joulepath.optimizer.problem.branches import BranchFilter, Label
 from joulepath.optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, tcp_pose
@@ -78,6 +90,7 @@ def test_defaults() -> None:
         ({"limits": limits(q_min=-7.0)}, "limits.position"),
         ({"limits": limits(q_max=7.0)}, "limits.position"),
         ({"limits": limits(q_min=1.0, q_max=1.0)}, "limits.position"),
+        ({"limits": limits(q_min=1.0, q_max=1.0 + 9e-4)}, "limits.position"),
     ],
     ids=str,
 )
@@ -86,6 +99,22 @@ def test_refusals_name_the_field(given: dict[str, Any], field: str) -> None:
         problem(**given)
     assert refusal.value.field == field
     assert str(refusal.value).endswith(".") and "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_a_redundant_arm_with_a_joint_in_the_least_range_reaches_its_poses(joint: int) -> None:
+    """A narrower range would lie between two samples of a self-motion."""
+    panda, q = load_robot("panda"), np.array([0.3, -0.5, 0.2, -2.0, 0.1, 1.6, 0.5])
+    half = np.where(np.arange(7) == joint, ARM_RANGES.least_range / 2, np.inf)
+    narrow = panda.limits.tightened(
+        q_min=np.maximum(panda.limits.q_min, q - half),
+        q_max=np.minimum(panda.limits.q_max, q + half),
+    )
+    arm = Arm(robot=panda, limits=narrow, collisions=False)
+    assert all(
+        abs(each.q[joint] - q[joint]) <= half[joint]
+        for each in inverse_kinematics(arm, Pose(forward(arm, q)), windings=False)
+    )
 
 
 @pytest.mark.parametrize(
