@@ -32,6 +32,12 @@ _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 for _part in (Collision, Description, Drives, Electronics, Motion):
     _part.__pydantic_config__ = _STRICT  # type: ignore[union-attr]
 _DESCRIPTION = TypeAdapter(Description)
+_MESSAGES = {
+    "unexpected_keyword_argument": "A description has no such field: correct its name, or leave it "
+    "out",
+    "missing": "This field is required: add it",
+}
+"""Messages replacing those of pydantic, which are about Python's arguments."""
 
 
 def read_description(path: Path) -> Description:
@@ -126,4 +132,6 @@ def _first(error: ValidationError) -> InvalidArm:
     first = error.errors(include_url=False)[0]
     # Members of unions are not part of the path.
     place = ".".join(str(part) for part in first["loc"] if "[" not in str(part) and part != "float")
-    return InvalidArm(place, f"{place or 'The file'}: {first['msg']}.")
+    return InvalidArm(
+        place, f"{place or 'The file'}: {_MESSAGES.get(first['type'], first['msg'])}."
+    )
