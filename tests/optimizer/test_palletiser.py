@@ -187,7 +187,7 @@ def test_long_after_its_deadline_a_cycle_covers_no_further_pose(arm: Arm) -> Non
 
 def test_what_is_not_modelled_is_refused(arm: Arm) -> None:
     stops = [Stop(name="place", target=GOAL)]
-    line, pose = Line(direction=[0, 0, 1], distance=0.1), Pose(tcp_pose(arm, GOAL))
+    line, pose = Line(direction=np.array([0.0, 0.0, 1.0]), distance=0.1), Pose(tcp_pose(arm, GOAL))
     path = StopPath(goal=Pose(tcp_pose(arm, START)))
     for refused in (
         lambda: Problem(arm=arm, start=START, goal=Pose(tcp_pose(arm, GOAL)), tool_path=ToolPath()),
