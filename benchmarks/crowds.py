@@ -49,7 +49,7 @@ HEAD = (
     "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 )
 COUNTED_MESSAGES = ('"traceback"', "mended the queue", "did not end in time", "begins again")
-"""Texts that are counted in the log of the service."""
+"""Texts to count in the log of the service."""
 DISCONNECTED = 0
 """Replaces the status if the client disconnected before the answer."""
 
@@ -144,12 +144,12 @@ CROWDS: dict[str, tuple[Kind, int, int]] = {
     "tight": (tight, 60, len(ADDRESSES)),
     "mixed": (mixed, 24, len(ADDRESSES)),
 }
-"""Crowds by name: the request that every connection repeats, the number of connections, and the
-number of addresses."""
+"""Crowds by name: the repeated request of a connection, the number of connections, and the number
+of addresses."""
 
 
 async def crowd(service: Service, name: str, seconds: float, kill_every: float) -> Counter[int]:
-    """Counts of the statuses that a crowd receives within `seconds`.
+    """Counts of the statuses received by a crowd within `seconds`.
 
     A random worker is killed every `kill_every` seconds, or none if it is zero.
     """
@@ -177,8 +177,8 @@ async def crowd(service: Service, name: str, seconds: float, kill_every: float) 
 
 
 def workers_of(service: Service) -> list[int]:
-    """Process ids of the workers: the descendants of the service that are not its children, because
-    the fork server starts them."""
+    """Process ids of the workers: descendants of the service other than its children, because the
+    fork server starts them."""
     children = (
         Path(f"/proc/{service.process.pid}/task/{service.process.pid}/children").read_text().split()
     )

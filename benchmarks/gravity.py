@@ -1,13 +1,14 @@
-"""Slope of measured torques over those of the robot's own links, joint by joint, on public logs.
+"""Slopes of measured torques over computed rigid-body torques per joint, on public logs.
 
     JOULEPATH_TEST_DATA=FOLDER python -m benchmarks.gravity
 
-Links that are too light have a slope above 1 in the joints that carry much. The slope is that of a
-least-squares fit with Coulomb and viscous friction and an offset; RMSE is what is left with the
-slope 1. Currents count with the robot's torque constants. No public log of an FR3 is known: its
-links are compared on the logs of a Panda, whose links are those of another arm.
+The slope is fitted by least squares together with Coulomb friction, viscous friction and an offset.
+If the links of a robot model are too light, the slope of its loaded joints is above 1. The RMSE is
+the residual for the slope 1. Currents are multiplied by the torque constants of the robot. There is
+no known public log of an FR3, so its links are compared on the logs of a Panda, although the links
+of the two arms differ.
 
-The exit code is 1 if a joint that carries much is outside its range.
+The exit code is 1 if the slope of a loaded joint is outside its range.
 """
 
 from __future__ import annotations
@@ -28,11 +29,12 @@ from joulepath.optimizer.dynamics.link_regressor import rigid_torques
 from joulepath.optimizer.identify.logs.log import Log
 
 ROWS = 5000
-"""Largest number of compared rows per log, about."""
+"""Approximate largest number of compared rows per log."""
 KNEE = 0.02
-"""Range of speed in which Coulomb friction reverses [rad/s]."""
-MUCH = 0.3
-"""Share of the largest standard deviation of a rigid torque above which a joint is compared [1]."""
+"""Speed range in which Coulomb friction reverses [rad/s]."""
+LOADED = 0.3
+"""Smallest standard deviation of the rigid-body torque of a loaded joint, over the largest one of
+all joints [1]."""
 LEAST = 0.97
 """Smallest admissible slope of measured over computed torque [1]."""
 MOST = 1.03
@@ -40,7 +42,7 @@ MOST = 1.03
 
 
 def logs(place: Path) -> Iterator[tuple[str, Robot, Log]]:
-    """Logs with the robots whose links are compared on them."""
+    """Titles, robots and logs; the links of the robot are compared on the log."""
     for name, log in (
         ("Panda, Inria", panda_by_inria(place)),
         ("Panda, Unisa", panda_by_unisa(place)),
@@ -53,7 +55,8 @@ def logs(place: Path) -> Iterator[tuple[str, Robot, Log]]:
 
 
 def slopes(robot: Robot, log: Log) -> tuple[Array, Array, Array]:
-    """Slope, RMSE [N·m] with the slope 1, and deviation of the rigid torque [N·m], each (nq,)."""
+    """Slopes (nq,), RMSEs (nq,) with the slope 1 [N·m], and standard deviations (nq,) of the
+    rigid-body torques [N·m]."""
     every = max(1, len(log.time) // ROWS)
     assert log.effort is not None
     q, v, a, effort = (each[::every].astype(float) for each in (log.q, log.v, log.a, log.effort))
@@ -64,18 +67,19 @@ def slopes(robot: Robot, log: Log) -> tuple[Array, Array, Array]:
     if log.torque_side == "motor":
         rigid = rigid + robot.drives.rotor_inertia * a
     for joint in range(robot.nq):
-        others = np.column_stack([np.tanh(v[:, joint] / KNEE), v[:, joint], np.ones(len(q))])
-        columns = np.column_stack([rigid[:, joint], others])
+        friction = np.column_stack([np.tanh(v[:, joint] / KNEE), v[:, joint], np.ones(len(q))])
+        columns = np.column_stack([rigid[:, joint], friction])
         slope = np.linalg.lstsq(columns, torque[:, joint], rcond=None)[0][0]
         rest = torque[:, joint] - rigid[:, joint]
-        left = rest - others @ np.linalg.lstsq(others, rest, rcond=None)[0]
-        found.append([float(slope), float(np.sqrt(np.mean(left**2))), float(rigid[:, joint].std())])
-    slope, rmse, deviation = np.array(found).T
-    return slope, rmse, deviation
+        residual = rest - friction @ np.linalg.lstsq(friction, rest, rcond=None)[0]
+        rmse = float(np.sqrt(np.mean(residual**2)))
+        found.append([float(slope), rmse, float(rigid[:, joint].std())])
+    slopes_found, rmses, deviations = np.array(found).T
+    return slopes_found, rmses, deviations
 
 
 def main() -> int:
-    """Prints slope and RMSE of each joint. Returns 1 if the links of a robot do not fit."""
+    """Prints slope and RMSE of all joints. Returns 1 if the links of a robot do not fit a log."""
     given, place = parser(__doc__).parse_args(), folder()
     if place is None:
         print(MISSING)
@@ -83,20 +87,21 @@ def main() -> int:
     gates = list[Gate]()
     for name, robot, log in logs(place):
         slope, rmse, deviation = slopes(robot, log)
-        much = deviation >= MUCH * deviation.max()
+        loaded = deviation >= LOADED * deviation.max()
         shown = [
-            f"{each:.3f}{'' if carries else '*'}" for each, carries in zip(slope, much, strict=True)
+            f"{each:.3f}{'' if is_loaded else '*'}"
+            for each, is_loaded in zip(slope, loaded, strict=True)
         ]
         print(
             f"{name}: slope {' '.join(shown)}; RMSE {' '.join(f'{each:.2f}' for each in rmse)} N·m"
         )
-        # the slope of currents is that of the torque constants, too
+        # slopes of currents have no gate, because they also contain errors of the torque constants
         if robot.name == log.robot and log.effort_meaning == "torque":
             gates += [
                 Gate(f"{name}: slope of J{joint + 1}", float(slope[joint]), LEAST, MOST)
-                for joint in np.flatnonzero(much).tolist()
+                for joint in np.flatnonzero(loaded).tolist()
             ]
-    print("* carries little, so that friction and inertia tell more than weight")
+    print("* lightly loaded joint: friction and inertia affect its slope more than weight")
     for gate in gates:
         print(f"{'kept  ' if gate.kept else 'MISSED'}  {gate.what}: {gate.value:.3f}")
     write_json(given.json, {"gates": [gate.__dict__ | {"kept": gate.kept} for gate in gates]})

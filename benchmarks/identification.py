@@ -3,24 +3,24 @@
     JOULEPATH_TEST_DATA=FOLDER python -m benchmarks.identification
     python -m benchmarks.identification --only synthetic standins --runs 200
 
-- `ur3e`: power from motion alone. Each motion is left out with its reverse and predicted; then five
-  random moves at a time predict the rest of the log.
-- `tx40`: friction against published values from the same log, and each half of the log predicted
-  from the other.
-- `synthetic`: simulated UR10e with known figures: share of the figures within three standard
-  deviations, and of the energies of unseen moves between P5 and P95; the same with moves that draw
-  a power of their own beside the model's. The gates are those of 200 runs, which take some minutes;
-  fewer runs have a margin for their sampling error.
-- `cycles`: share of the energies of the cycles of another log of a simulated UR10e between P5 and
-  P95, with moves that draw a power of their own.
+- `ur3e`: power from motion alone. Every motion is held out with its reverse motion, and predicted.
+  Then fits to five random moves predict the rest of the log.
+- `tx40`: friction compared with published values from the same log, and predictions of each half of
+  the log by a fit to the other half.
+- `synthetic`: a simulated UR10e with known figures. The shares are of figures within three standard
+  deviations of the true value, and of energies of unseen moves between P5 and P95; the latter also
+  for moves with an additional random power. The limits of the gates are for 200 runs, which take
+  some minutes; fewer runs have a margin for their sampling error.
+- `cycles`: share of the energies of cycles between P5 and P95, in another log of a simulated UR10e,
+  for moves with an additional random power.
 - `standins`: simulated logs in place of real logs that are not public: another motion of the same
-  day and other days of a UR10e, a payload from two logs of different days, halves of a log of a
+  day and other days of a UR10e, a payload from two logs of different days, and halves of a log of a
   Panda.
-- `speed`: time of the processor to read a log of 41 s and to identify from it.
-- `outsider`: torques of held-out motions of a real UR10e and two Pandas, over those of an ordinary
-  least-squares fit without knowledge of the links.
-- `sessions`, `ur10e_sessions`: how often energies of other days lie between P5 and P95, by the
-  number of logs of the fit, of simulated arms whose friction drifts and of a real UR10e.
+- `speed`: processor time to read a log of 41 s and to identify the arm.
+- `outsider`: errors of torques of held-out motions of a real UR10e and two Pandas, relative to the
+  errors of an ordinary least-squares fit without knowledge of the links.
+- `sessions`, `ur10e_sessions`: share of the energies of other days between P5 and P95, by the
+  number of logs of the fit, for simulated arms with drifting friction and for a real UR10e.
 
 The exit code is 1 if a gate is missed.
 """
@@ -55,15 +55,18 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, csv_of, off_the_model, recorded, truth_of
 
-UNITS = 4  # simulated arms
-DAYS = 8  # logs per arm, one a day; the first one is fitted
-DAY_SD = 0.03  # standard deviation of the friction between days, relative
+UNITS = 4
+"""Number of simulated arms."""
+DAYS = 8
+"""Number of logs per arm, one per day; the first log is fitted."""
+DAY_SD = 0.03
+"""Relative standard deviation of the friction between days [1]."""
 DRAWS = 100
 MOVES_OF_A_DRAW = 5
-# share of the runs in which a figure is told, for its own share to count
 OFTEN = 0.2
-# how often a short log is identified
+"""Smallest share of runs in which a figure is identified, for a gate on this figure [1]."""
 REPEATS = 3
+"""Number of time measurements."""
 TX40_OPTIONS = IdentificationOptions(
     terms=("coulomb", "viscous", "offset"),
     couplings=(WRIST,),
@@ -95,8 +98,7 @@ def ur3e_power(place: Path | None, _: int) -> list[Gate]:
 
 
 def _draws(robot: Robot, rows: Rows, options: IdentificationOptions) -> float:
-    """P90 [%] of the error of the energy of all other motions, predicted from five moves at
-    random."""
+    """P90 of the error of the energy of all other motions, predicted from random moves [%]."""
     random, errors = np.random.default_rng(0), list[float]()
     moves = np.unique(rows.move)
     for _ in range(DRAWS):
@@ -134,10 +136,10 @@ def tx40_torque(place: Path | None, _: int) -> list[Gate]:
 
 
 def agreeing(fitted: Estimate, reference: dict[str, tuple[float, float]]) -> int:
-    """How many published friction figures with a standard deviation below 5 % are met within 3 of
-    them, or 3 %.
+    """The number of published friction figures with a standard deviation below 5 % that the fit
+    meets within three standard deviations or 3 %.
 
-    The published terms of joints 5 and 6 have the coupling's viscous friction in them.
+    The published terms of joints 5 and 6 contain the viscous friction of the coupling.
     """
     values = dict(zip(fitted.names, fitted.value.tolist(), strict=True))
     shared = values["coupling.viscous", 0]
@@ -145,17 +147,15 @@ def agreeing(fitted: Estimate, reference: dict[str, tuple[float, float]]) -> int
     for joint in range(6):
         ours[f"fv{joint + 1}"] = values["viscous", joint] + (shared if joint >= 4 else 0.0)
         ours[f"fs{joint + 1}"] = values["coulomb", joint]
-    told = [name for name in ours if reference[name][1] < 0.05 * abs(reference[name][0])]
+    precise = [name for name in ours if reference[name][1] < 0.05 * abs(reference[name][0])]
     return sum(
         abs(ours[n] - reference[n][0]) <= max(3 * reference[n][1], 0.03 * abs(reference[n][0]))
-        for n in told
+        for n in precise
     )
 
 
 def synthetic(_: Path | None, runs: int) -> list[Gate]:
-    """Simulated arms with known figures: from currents and power, and from power alone; with moves
-    off the model.
-    """
+    """Simulated arms with known figures, from currents and power or from power alone."""
     return [
         gate
         for channels in ("currents and power", "power alone")
@@ -179,14 +179,14 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
             if each.identified:
                 near = abs(each.value - _true(truth, each.figure, each.joint)) <= 3 * each.sd
                 within.setdefault((each.figure, each.joint), []).append(near)
-    # of a figure that is told in a few runs alone, a share says little
+    # a share over few runs has a large sampling error
     often = [each for each in within.values() if len(each) >= OFTEN * runs]
     title = f"synthetic, {runs} arms from {channels}" + f", moves off by {effect:g} W" * bool(
         effect
     )
     every = [near for each in within.values() for near in each]
     worst = min(often, key=lambda each: float(np.mean(each)))
-    # each figure has a gate only if the model holds
+    # a single figure has a gate only without additional power
     least = 0.0 if effect else 0.95 - sampling_margin(np.sqrt(0.95 * 0.05), len(worst))
     margin = sampling_margin(float(np.std(shares)), runs)
     return [
@@ -202,20 +202,20 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
 
 
 def _true(truth: Truth, figure: str, joint: int | None) -> float:
-    """The true value of a figure of a simulated arm, whose links are as heavy as the robot's."""
+    """The true value of a figure of a simulated arm with the link masses of the robot."""
     if joint is None:
         return {"idle_power": truth.idle_power, "link_mass_scale": 1.0}[figure]
     return float(getattr(truth, figure)[joint])
 
 
 def standins(_: Path | None, __: int) -> list[Gate]:
-    """Logs that are not at hand, simulated with what the model does not have."""
+    """Simulated logs in place of real logs, with effects that the fitted model lacks."""
     return [*_days(), *_payloads(), *_halves()]
 
 
 def _days() -> list[Gate]:
-    """Figures of a UR10e from 30 s of one day, on another motion of it and on other days."""
-    robot, same, unknown = load_robot("ur10e"), list[TorqueErrors](), list[TorqueErrors]()
+    """Figures of a UR10e from 30 s of a day, on another motion of this day and on other days."""
+    robot, same_day, other_days = load_robot("ur10e"), list[TorqueErrors](), list[TorqueErrors]()
     for unit in range(UNITS):
         truth, random = truth_of(robot, unit), np.random.default_rng(unit)
         found = identify(
@@ -228,8 +228,8 @@ def _days() -> list[Gate]:
             other = day_of(robot, truth, 200 + 10 * unit + day, friction, 6)
             errors = found.validate([log_of(robot, other)]).fitted.torque
             assert errors is not None
-            (unknown if day else same).append(errors)
-    relative = np.max([each.relative for each in same], axis=0)
+            (other_days if day else same_day).append(errors)
+    relative = np.max([each.relative for each in same_day], axis=0)
     gates = [
         Gate(
             f"stand-in of a UR10e, {UNITS} units, another motion: J{joint + 1} [%]",
@@ -239,8 +239,8 @@ def _days() -> list[Gate]:
         )
         for joint, most in enumerate((7.0, 1.7, 1.8, 3.3, 6.3, 6.2))
     ]
-    shaft = float(np.median([day.shaft_energy for day in unknown]))
-    copper = float(np.median([day.copper_energy for day in unknown]))
+    shaft = float(np.median([day.shaft_energy for day in other_days]))
+    copper = float(np.median([day.copper_energy for day in other_days]))
     title = f"stand-in of a UR10e, {DAYS - 1} other days each"
     return [
         *gates,
@@ -250,7 +250,7 @@ def _days() -> list[Gate]:
 
 
 def _payloads() -> list[Gate]:
-    """A payload of 2.805 kg from a log without it and one of another day with it."""
+    """A payload of 2.805 kg from a log without payload, and from a log of another day with it."""
     robot, payload = load_robot("ur10e"), Payload(2.805, np.array([0.0, 0.0, 0.06]))
     off, sd = list[float](), list[float]()
     for unit in range(UNITS):
@@ -271,7 +271,7 @@ def _payloads() -> list[Gate]:
 
 
 def _halves() -> list[Gate]:
-    """Each half of a log of a Panda from the other, with torques measured behind the gears."""
+    """Halves of a log of a Panda predict each other; torques are measured behind the gears."""
     robot, worst = load_robot("panda"), np.zeros(7)
     for unit in range(UNITS):
         truth = behind_the_gears(truth_of(robot, unit))
@@ -295,7 +295,7 @@ def _halves() -> list[Gate]:
 
 
 def speed(_: Path | None, __: int) -> list[Gate]:
-    """Time of the processor that a log of 41 s with all channels takes."""
+    """Processor time to read and identify a log of 41 s with all channels."""
     robot, times = load_robot("ur10e"), list[float]()
     recording = recorded(robot, truth_of(robot), moves=14, rate=RATE)
     file = csv_of(recording, "own")

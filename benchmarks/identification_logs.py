@@ -1,5 +1,4 @@
-"""Real logs of two arms, from the folder that the environment variable JOULEPATH_TEST_DATA
-names."""
+"""Real logs of two arms, from the folder in the environment variable JOULEPATH_TEST_DATA."""
 
 from __future__ import annotations
 
@@ -23,17 +22,18 @@ from joulepath.optimizer.identify.options import Coupling
 PLACE = "JOULEPATH_TEST_DATA"
 MISSING = f"{PLACE} does not name the folder of the real logs."
 
-# Stäubli TX40: motor turns per joint turn, of which the last motor is driven through joint 5, too;
-# and its rate [Hz]
 RATIOS = (32.0, 32.0, 45.0, -48.0, 45.0, 32.0)
+"""Motor turns per joint turn of a Stäubli TX40 [1]; joint 5 also turns the last motor."""
 TX40_RATE = 5000.0
-# rad; of joints 2 and 3 where the motors' positions are 0
+"""Sampling rate of the log of the TX40 [Hz]."""
 ZEROS = np.array([0.0, -np.pi / 2, np.pi / 2, 0.0, 0.0, 0.0])
+"""Joint positions of the TX40 at motor positions of 0 [rad]."""
 WRIST = Coupling(np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0]))
+"""Coupling of joints 5 and 6 of the TX40."""
 
 
 def folder() -> Path | None:
-    """The folder of the real logs; None if there is none."""
+    """The folder of the real logs; None without such a folder."""
     place = Path(os.environ.get(PLACE, "")) / "logs"
     return place if os.environ.get(PLACE) and place.is_dir() else _directly(os.environ.get(PLACE))
 
@@ -43,7 +43,7 @@ def _directly(place: str | None) -> Path | None:
 
 
 def ur3e(place: Path) -> tuple[Robot, Log]:
-    """A UR3e at 25 Hz over 19 moves, with currents and the power of its bus."""
+    """A UR3e, and its log over 19 moves at 25 Hz with currents and the power of the bus."""
     robot = load_robot("ur3e")
     return robot, read_log(
         place / "ur3e_rad" / "ur3e_power.csv", robot, LogOptions(name="ur3e")
@@ -51,8 +51,8 @@ def ur3e(place: Path) -> tuple[Robot, Log]:
 
 
 def tx40(place: Path) -> tuple[Robot, Log]:
-    """A TX40 at 5 kHz over 9 s: positions and torques of the motors, turned into those of the
-    joints.
+    """A TX40, and its log over 9 s at 5 kHz. Joint positions and torques are computed from motor
+    positions and torques.
     """
     files = place / "staubli_tx40"
     urdf = (files / "tx40.urdf").read_text()
@@ -78,8 +78,8 @@ def tx40(place: Path) -> tuple[Robot, Log]:
 
 
 def tx40_reference(place: Path) -> dict[str, tuple[float, float]]:
-    """Published base parameters of this log by weighted least squares: value and standard
-    deviation.
+    """Published base parameters of the log of the TX40 by weighted least squares: values and
+    standard deviations.
     """
     with (place / "staubli_tx40" / "bp5.csv").open() as file:
         found: dict[str, Array] = {

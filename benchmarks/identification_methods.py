@@ -1,12 +1,13 @@
-"""Methods of the literature against `automatic`, on the same logs, as a table in Markdown.
+"""Identification methods of the literature and `automatic` on the same logs, as a Markdown table.
 
     JOULEPATH_TEST_DATA=FOLDER python -m benchmarks.identification_methods
 
-Real logs are those of `benchmarks.identification_logs` and `benchmarks.public_logs`. No public log
-has a repeated motion, a sensor beneath the base or joints that warm up: simulated ones stand in.
-A cell has errors [%] on motions that no fit has seen, of other days, or of the same log where it is
-the only one: of torques, mean over the joints; of the energy at the shafts; of the energy of a
-move, where power was logged. It is empty if the method refuses the logs.
+The real logs are from `benchmarks.identification_logs` and `benchmarks.public_logs`. There are no
+public logs with a repeated motion, with a sensor beneath the base, or with joints that warm up, so
+these logs are simulated. A cell has three errors [%] on held-out motions, which are from other days
+or, for an arm with a single log, from this log: the mean error of torques over the joints, the
+error of the energy at the shafts, and the error of the energy of a move if power was logged. A cell
+is empty if the method refuses the logs.
 """
 
 from __future__ import annotations
@@ -38,16 +39,17 @@ WARMING = 20.0
 """Rise of the temperature of a joint over a simulated log [K]."""
 RATE = 0.012
 """Relative decrease of friction with temperature [1/K]."""
-# N and N·m, noise of a sensor beneath the base
 SENSOR = (0.5, 0.2)
-# of the masses of an arm over the robot's
+"""Noise of a sensor beneath the base: standard deviations of forces [N] and moments [N·m]."""
 HEAVIER = 1.05
+"""Link masses of a simulated arm over the link masses of the robot [1]."""
 UNIT = 3
+"""Seed of the simulated arm."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """Logs of one arm: of the fit, and others that validate it, or none."""
+    """Logs of one arm: the fitted logs, and further logs for validation, if any."""
 
     title: str
     robot: Robot
@@ -58,16 +60,16 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """Errors of a method [%], or `why` it does not fit the logs."""
+    """Errors of a method [%], or the reason `why` it refuses the logs."""
 
     case: str
     method: str
     torque: float | None = None
-    """Mean over the joints of the error over the measured torque."""
+    """Mean over the joints of the error relative to the measured torque."""
     shaft: float | None = None
     """Error of the energy at the shafts."""
     move: float | None = None
-    """Mean error of the electrical energy of a move, where power was logged."""
+    """Mean error of the electrical energy of a move, if power was logged."""
     why: str = ""
 
 
@@ -84,7 +86,7 @@ def real_cases(place: Path) -> Iterator[Case]:
 
 
 def simulated_cases() -> Iterator[Case]:
-    """Logs that no public source has."""
+    """Simulated logs, because no public logs of these kinds are known."""
     robot = load_robot("ur10e")
     truth = truth_of(robot, UNIT)
     other = recorded(robot, truth, moves=8, seed=31).log()
@@ -99,7 +101,7 @@ def simulated_cases() -> Iterator[Case]:
 
 
 def _warming(robot: Robot) -> Log:
-    """A log over which all joints warm up, with the mean friction of the other logs."""
+    """A log in which all joints warm up; the mean friction is the friction of the other logs."""
     truth = truth_of(robot, UNIT)
     log = recorded(robot, truth, moves=16, seed=UNIT + 1).log()
     above = np.tile(np.linspace(-0.5, 0.5, len(log.time))[:, None] * WARMING, robot.nq)
@@ -111,14 +113,14 @@ def _warming(robot: Robot) -> Log:
 
 
 def _heavier(robot: Robot) -> Robot:
-    """An arm whose links are heavier than the robot's."""
+    """The robot with heavier links."""
     mass = dict(robot.figures["inertials"]["mass"])
     mass["value"] = [HEAVIER * each for each in mass["value"]]
     return load_robot(robot.name, figures={"robot": robot.name, "inertials": {"mass": mass}})
 
 
 def _on_sensor(robot: Robot) -> Log:
-    """A log on a sensor beneath the base."""
+    """A log with a force-torque sensor beneath the base."""
     log = recorded(robot, truth_of(robot, UNIT), moves=16, seed=UNIT + 2).log()
     wrench: Array = base_wrench_regressor(robot.model, log.q, log.v, log.a) @ body_parameters(
         robot.model

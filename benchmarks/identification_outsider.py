@@ -1,8 +1,9 @@
-"""Torques of motions that no fit has seen, beside those of an outsider's ordinary least squares.
+"""Torque errors on held-out motions, relative to the errors of an outsider's ordinary least
+squares.
 
-The outsider knows the geometry of the arm, but neither its bodies nor its drives: base parameters
-and the friction of each joint are fitted by the pseudo-inverse, once with Coulomb and viscous
-friction and an offset, once with friction that grows with the load, too.
+The outsider knows the geometry of the arm, but neither its bodies nor its drives. It fits base
+parameters and the friction of all joints by the pseudo-inverse, in two variants: with Coulomb
+friction, viscous friction and an offset, and additionally with friction that grows with the load.
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 
 MOVING = 0.02
-"""Speed above which the errors of a joint count [rad/s]."""
+"""Smallest speed of a joint at which its errors count [rad/s]."""
 LEAST_SINGULAR = 1e-6
 """Share of the largest singular value below which a combination of parameters is undetermined."""
 UR10E = 1.03
-"""Largest admissible ratio of our error to the outsider's, per joint of the UR10e [1]."""
+"""Largest admissible ratio of our error to the outsider's error for a joint of the UR10e [1]."""
 PANDA = 1.0
-"""The same per joint of the Pandas [1]."""
+"""Largest admissible ratio for a joint of the Pandas [1]."""
 
 
 def outsider(place: Path | None, _: int) -> list[Gate]:
-    """RMSE of each joint over the smaller one of the outsider's two fits."""
+    """Gates of the RMSE of every joint over the smaller RMSE of the outsider's two fits."""
     assert place is not None
     robot, fitted, other = ur10e_split(place)
     every = rows_of(robot, [fitted, other], regressor=True)
@@ -59,7 +60,10 @@ def _gates(title: str, ratios: Array, most: float) -> list[Gate]:
 
 
 def _ratios(robot: Robot, logs: Sequence[Log], parts: Sequence[tuple[Rows, Rows]]) -> Array:
-    """RMSE (nq,) on the second rows of fits to the first, over the outsider's smaller one."""
+    """RMSE (nq,) over the smaller RMSE of the outsider, summed over the parts.
+
+    A part has the rows of the fit, and the rows of the prediction.
+    """
     _, options = prepare(robot, logs, IdentificationOptions(held_out=0.0))
     squares, own = list[list[Array]](), own_arm(robot)
     for seen, rest in parts:
@@ -74,7 +78,8 @@ def _ratios(robot: Robot, logs: Sequence[Log], parts: Sequence[tuple[Rows, Rows]
 
 
 def _outsiders(seen: Rows, torque: Array, rest: Rows) -> list[Array]:
-    """Torques (n, nq) [N·m] of the rest, without and with friction that grows with the load."""
+    """Torques (n, nq) [N·m] of the rest by fits to the seen rows, without and with friction that
+    grows with the load."""
     found, load = list[Array](), [np.zeros_like(each.v) for each in (seen, rest)]
     while len(found) < 2:
         left, right = (_columns(*each) for each in zip((seen, rest), load, strict=True))
@@ -94,8 +99,7 @@ def _outsiders(seen: Rows, torque: Array, rest: Rows) -> list[Array]:
 
 
 def _columns(rows: Rows, load: Array) -> Array:
-    """Columns (n nq, parameters) of all joints: of the bodies, then of the friction of each
-    joint."""
+    """Columns (n nq, parameters) of the bodies, and of the friction of all joints."""
     sign, joints = np.sign(rows.v), np.eye(rows.v.shape[1])
     terms = [sign, rows.v, np.ones_like(sign), load * sign]
     friction = [each[:, :, None] * joints for each in terms]

@@ -1,6 +1,6 @@
-"""How often energies of other days lie between their P5 and P95, by the number of logs of the fit.
+"""Share of the energies of other days between their P5 and P95, by the number of fitted logs.
 
-No power is logged: the measured energy of a move is that of its currents.
+No power is logged, so the measured energy of a move is computed from its currents.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ from joulepath.optimizer.identify.options import IdentificationOptions
 from tests.identification_logs import off_the_model, recorded, truth_of
 
 NUMBERS = (1, 2, 6)
+"""Numbers of fitted logs."""
 UNITS = 24
-"""Simulated arms; with fewer, the standard error of the share is like the width of the gate."""
+"""Number of simulated arms; with fewer arms, the standard error of the share would be as large as
+the width of the gate."""
 DAYS = 10
-"""Days per arm; the first ones are fitted."""
+"""Number of days per arm; the first days are fitted."""
 MOVES = 8
-"""Moves per day."""
-# of the friction of each joint, by itself
+"""Number of moves per day."""
 DAY_SD = 0.025
-# draws of the logs of a fit among the real ones
+"""Relative standard deviation of the friction of a joint between days [1]."""
 DRAWS = 12
-# W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a
-# move's energy
+"""Number of random choices of fitted logs among the real logs."""
+# standard deviation of the additional power of a simulated move [W]: 1 % of the energy of a move
 MOVE_EFFECT = 0.6
 WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 LEAST = 0.87
@@ -43,7 +44,7 @@ MOST = 0.93
 
 
 def sessions(_: Path | None, __: int) -> list[Gate]:
-    """Simulated arms whose joints have other friction on each day, each by itself."""
+    """Simulated arms with independent changes of the friction of all joints from day to day."""
     robot = load_robot("ur10e")
     units = [_days_of_unit(robot, unit) for unit in range(UNITS)]
     return [
@@ -69,7 +70,7 @@ def _days_of_unit(robot: Robot, unit: int) -> list[Log]:
 
 
 def ur10e_sessions(place: Path | None, _: int) -> list[Gate]:
-    """Real days of a UR10e: fits to random logs, and all logs of the days without one of them."""
+    """Logs of a real UR10e: fits to random logs, validated on all logs of the other days."""
     assert place is not None
     robot, days = ur10e_days(place)
     return [
@@ -82,7 +83,7 @@ def ur10e_sessions(place: Path | None, _: int) -> list[Gate]:
 
 
 def _draws(days: dict[str, list[Log]], number: int) -> Iterator[tuple[list[Log], list[Log]]]:
-    """Random logs, and all logs of the other days."""
+    """Random choices of `number` logs, with all logs of the other days."""
     random, every = np.random.default_rng(number), [(day, log) for day in days for log in days[day]]
     for _ in range(DRAWS):
         chosen = [every[k] for k in random.choice(len(every), number, replace=False)]
@@ -93,7 +94,8 @@ def _draws(days: dict[str, list[Log]], number: int) -> Iterator[tuple[list[Log],
 
 
 def _coverage(robot: Robot, fitted: list[Log], others: list[Log]) -> tuple[float, int]:
-    """Share of the moves of other logs within their interval, and the number of these moves."""
+    """Share of the moves in other logs with energies within their intervals, and number of these
+    moves."""
     found = identify(robot, fitted, WITHOUT_SPLIT).validate(others)
     assert found.coverage is not None
     return found.coverage, found.moves
@@ -108,7 +110,7 @@ def _gate(title: str, covered: list[tuple[float, int]]) -> Gate:
 
 
 def cycles(_: Path | None, runs: int) -> list[Gate]:
-    """Energies of whole cycles of logs that repeat, of the day of the fit."""
+    """Energies of whole cycles in logs of repeated motions, on the day of the fit."""
     robot, shares = load_robot("ur10e"), list[float]()
     for seed in range(runs):
         truth = truth_of(robot, seed)

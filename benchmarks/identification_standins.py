@@ -1,9 +1,8 @@
-"""Simulated logs in the place of real ones that are not public or not at hand, with what real logs
-have beside noise.
+"""Simulated logs in place of real logs that are not public, with further errors besides noise.
 
-Friction differs from day to day and falls while the arm warms up, the gears have ripple, the drive
-filters and quantises its currents, positions have the steps of their sensors, and times jitter.
-None of it is in the model that is fitted.
+Friction differs from day to day and decreases while the arm warms up. The gears have ripple, the
+drives filter and quantise the currents, positions are quantised by their sensors, and times have
+jitter. The fitted model has none of these effects.
 """
 
 from __future__ import annotations
@@ -29,12 +28,13 @@ from tests.identification_logs import (
 )
 
 RATE = 500.0
+"""Sampling rate [Hz]."""
 WARMING = 0.03
 """Relative decrease of the friction over a log [1]."""
 RIPPLE = 0.01
 """Amplitude of the ripple of the gears relative to the friction [1]."""
 WAVES = 37.0
-"""Angular frequency of this ripple over the joint position [1]."""
+"""Number of periods of the ripple per turn of the joint [1]."""
 FILTER = 0.004
 """Time constant of the filter of the logged current in the drive [s]."""
 CURRENT_STEP = 0.005
@@ -43,10 +43,10 @@ POSITION_STEP = 1e-5
 """Resolution of the logged positions [rad]."""
 JITTER = 1e-4
 """Largest jitter of the logged times [s]."""
-# of the friction beneath the gears that a torque sensor behind them sees
 BEHIND = 0.15
+"""Share of the friction that a torque sensor behind the gears measures [1]."""
 TORQUE_SENSOR = Noise(current=0.005)
-"""Of a sensor behind the gears: 0.05 N·m at 10 N·m/A."""
+"""Noise of a torque sensor behind the gears: 0.05 N·m at 10 N·m/A."""
 
 
 def day_of(
@@ -58,13 +58,22 @@ def day_of(
     payload: Payload | None = None,
     noise: Noise | None = None,
 ) -> Recording:
-    """What an arm records on a day with so many times its friction, of all joints or of each (nq,),
-    perhaps with a payload."""
+    """The recording of an arm on one day.
+
+    Args:
+        robot: the robot.
+        truth: true figures of the arm.
+        seed: seed of the motion and of the errors.
+        friction: friction on this day over the true friction, of all joints or (nq,).
+        moves: number of moves.
+        payload: payload, if any.
+        noise: noise of the channels.
+    """
     random = np.random.default_rng([seed, 7])
     parts = {name: getattr(truth, name) * friction for name in ("coulomb", "viscous", "load")}
     today = replace(truth, **parts, knee=2e-3, payload=payload or Payload())
     exact = recorded(robot, today, moves=moves, rate=RATE, seed=seed, noise=noise)
-    # the arm goes on between the times that were meant
+    # the arm moves between the nominal time of a sample and its actual time
     shift = np.append(0.0, random.uniform(-JITTER, JITTER, len(exact.time) - 1))
     q = exact.q + exact.exact_v * shift[:, None]
     rigid = rigid_torques(robot, today, exact.exact_q, exact.exact_v, exact.a)
@@ -86,7 +95,7 @@ def day_of(
 
 
 def _of_drive(current: Array) -> Array:
-    """Currents (n, nq) [A] as the drive says them."""
+    """Currents (n, nq) [A] with the filter and the resolution of the drive."""
     keep = float(np.exp(-1 / (RATE * FILTER)))
     filtered, _ = lfilter([1 - keep], [1, -keep], current, axis=0, zi=keep * current[:1])
     return np.asarray(np.round(filtered / CURRENT_STEP) * CURRENT_STEP)
@@ -95,7 +104,7 @@ def _of_drive(current: Array) -> Array:
 def log_of(
     robot: Robot, recording: Recording, payload: Payload | None = None, torque: bool = False
 ) -> Log:
-    """The recording as the reader reads it from its file, with torques or with currents."""
+    """The log that the reader reads from the file of a recording, with torques or with currents."""
     body = csv_of(recording, "own", without="aP", effort="torque" if torque else "current")
     return read_log(
         body,
@@ -105,7 +114,7 @@ def log_of(
 
 
 def behind_the_gears(truth: Truth) -> Truth:
-    """The truth of an arm whose torques are measured behind the gears."""
+    """The truth of an arm with torque sensors behind the gears."""
     return replace(
         truth,
         coulomb=BEHIND * truth.coulomb,

@@ -1,11 +1,11 @@
-"""Planners that alternate on the same seeded tasks, so that changes of the machine's speed hardly
-affect the ratios of their times.
+"""Times of planners that alternate on the same seeded tasks.
 
     python -m benchmarks.side_by_side answer drake --count 20 --repeat 3
 
 Every planner runs in its own process on one core. For every task, the first planner runs before
 and after every other planner, and this is repeated `--repeat` times. The result of a planner for a
-task is the median of its times.
+task is the median of its times. Changes of the machine's speed hardly affect the ratios of these
+medians.
 """
 
 from __future__ import annotations
