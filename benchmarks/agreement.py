@@ -38,9 +38,9 @@ Json = dict[str, Any]
 KINDS = ("plain", "payload", "tight limits", "TCP speed", "isolated bus")
 ROBOTS = ("ur5e", "panda", "kr10_r1100", "fr3", "ur10e", "iiwa14")
 """Robots of the requests; half of the requests are for the first robot."""
-SHORT = 1.5
+SHORT_MOVE = 1.5
 """Largest displacement of a joint in a short move [rad]; half of the moves are short."""
-AROUND = (0.93, 0.97, 1.03, 1.07)
+SCALES = (0.93, 0.97, 1.03, 1.07)
 """Durations around the duration of the free answer, relative to it [1]."""
 POINTS = 4
 """Number of points of a front."""
@@ -96,7 +96,7 @@ def _ends(rng: np.random.Generator, robot: Robot) -> tuple[Array, Array]:
     low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
     q_start, q_goal = rng.uniform(low, high, (2, len(low)))
     if rng.random() < 0.5:
-        q_goal = np.clip(q_start + rng.uniform(-SHORT, SHORT, len(low)), low, high)
+        q_goal = np.clip(q_start + rng.uniform(-SHORT_MOVE, SHORT_MOVE, len(low)), low, high)
     return q_start, q_goal
 
 
@@ -139,7 +139,7 @@ def examine(index: int, kind: str, body: Json) -> Outcome:
 def _compare_durations(outcome: Outcome, duration: float) -> None:
     """Fixes the duration of the free answer [s], and durations around it."""
     energy = least = outcome.energy
-    for scale in (1.0, *AROUND):
+    for scale in (1.0, *SCALES):
         name = "fixed" if scale == 1.0 else "fixed around"
         asked = OptimizeRequest.model_validate(outcome.request | {"duration": scale * duration})
         # a refusal of a shorter duration is no difference, because the motion may not exist

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
-NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
+NEAR_HOME = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
 
 
 def move() -> dict[str, Any]:
     """A short motion, as honest clients request it."""
-    return {"start": {"q": HOME}, "goal": {"q": NEAR}}
+    return {"start": {"q": HOME}, "goal": {"q": NEAR_HOME}}
 
 
 def sampled(period: float) -> dict[str, Any]:

@@ -18,20 +18,20 @@ from joulepath.models.robot import Array, Limits, Robot
 from joulepath.optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
 from joulepath.optimizer.problem.problem import Problem
 
-# the documentation of `POST /optimize` promises RATIO, REACH and BALANCE
-RATIO = 1 + 1e-6
+# the documentation of `POST /optimize` promises the first three constants
+LARGEST_RATIO = 1 + 1e-6
 """Largest ratio of a quantity to its limit [1]."""
-REACH = 1e-6
+LARGEST_END_ERROR = 1e-6
 """Largest error of an end: position [m], orientation and joint positions [rad]."""
-BALANCE = 1e-3
+LARGEST_BALANCE_ERROR = 1e-3
 """Largest relative error of the energy balance [1]."""
-SAME = 1e-9
+SAME_DURATION = 1e-9
 """Relative difference below which two durations are equal [1]; rounding."""
-SLACK = 1e-6
+ENERGY_SLACK = 1e-6
 """Relative difference of energy below which a baseline is no better [1]; quadrature error."""
-MERGED = 2e-5
-"""SLACK of Ruckig's motion [1]: its representation as a spline merges close jumps of jerk, and is
-slower by up to this share."""
+RUCKIG_SLACK = 2e-5
+"""ENERGY_SLACK for the motion of Ruckig [1]: its representation as a spline merges close jumps of
+jerk, and is slower by up to this share."""
 LIMITS = ("position", "velocity", "acceleration", "jerk", "torque")
 PARTS = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered")
 
@@ -85,14 +85,14 @@ def _certificate_errors(answer: dict[str, Any]) -> Iterator[str]:
     for name in LIMITS:
         ratio = certificate["worst_ratio"][name]
         # these comparisons are written so that NaN is an error
-        if ratio is None or not ratio <= RATIO:
+        if ratio is None or not ratio <= LARGEST_RATIO:
             yield f"certificate: {name} ratio {ratio}"
     for end in ("start_error", "goal_error"):
         for part, error in certificate[end].items():
-            if not error <= REACH:
+            if not error <= LARGEST_END_ERROR:
                 yield f"certificate: {end} {part} {error}"
     for name in ("energy_error", "balance_error"):
-        if not certificate[name] <= BALANCE:
+        if not certificate[name] <= LARGEST_BALANCE_ERROR:
             yield f"certificate: {name} {certificate[name]}"
 
 
@@ -104,7 +104,7 @@ def _replay_errors(
     spline = answer["trajectory"]["spline"]
     points = np.array(spline["control_points"])
     motion = SplineMotion(np.array(spline["knots"]), points, spline["degree"])
-    if abs(motion.duration - answer["duration"]) > SAME * motion.duration:
+    if abs(motion.duration - answer["duration"]) > SAME_DURATION * motion.duration:
         yield f"duration {answer['duration']} s, but the spline has {motion.duration} s"
     for name, q, T, asked in (
         ("start", points[0], T_start, body["start"]),
@@ -116,13 +116,13 @@ def _replay_errors(
             np.linalg.norm(pin.log3(np.ascontiguousarray(T[:3, :3].T @ reached[:3, :3])))
         )
         joints = float(np.abs(q - asked["q"]).max()) if "q" in asked else 0.0
-        if not max(error, rotation, joints) <= REACH:
+        if not max(error, rotation, joints) <= LARGEST_END_ERROR:
             yield (
                 f"replay: {name} is off by {error:.2g} m, {rotation:.2g} rad, joints by "
                 f"{joints:.2g} rad"
             )
     for name, ratio in worst_ratios(problem_of(body), motion).items():
-        if not ratio <= RATIO:
+        if not ratio <= LARGEST_RATIO:
             yield f"replay: {name} ratio {ratio}"
 
 
@@ -133,10 +133,10 @@ def gap_of(gap: float | None) -> float:
 
 def _energy_errors(body: dict[str, Any], answer: dict[str, Any]) -> Iterator[str]:
     error, energy = balance_error(answer), answer["energy"]
-    if not error <= BALANCE:
+    if not error <= LARGEST_BALANCE_ERROR:
         yield f"energy balance is off by {error:.2g} of the total"
     total, bound, gap = objective(answer), energy["lower_bound"], energy["optimality_gap"]
-    if not bound <= total * (1 + SLACK):
+    if not bound <= total * (1 + ENERGY_SLACK):
         yield f"lower bound {bound} above the energy {total}"
     expected = total / bound - 1 if bound > 0 else None
     if gap != expected and not abs(gap_of(gap) - gap_of(expected)) <= 1e-6:
@@ -154,11 +154,11 @@ def beats(body: dict[str, Any], answer: dict[str, Any], baseline: dict[str, Any]
         return False
     least, most = allowed(body.get("duration"))
     ours, theirs = answer["duration"], baseline["duration"]
-    same = abs(theirs - ours) <= SAME * ours
-    if not same and not least * (1 - SAME) <= theirs <= most * (1 + SAME):
+    same = abs(theirs - ours) <= SAME_DURATION * ours
+    if not same and not least * (1 - SAME_DURATION) <= theirs <= most * (1 + SAME_DURATION):
         return False
     total = objective(answer)
-    slack = MERGED if baseline["name"] == "ruckig" else SLACK
+    slack = RUCKIG_SLACK if baseline["name"] == "ruckig" else ENERGY_SLACK
     return bool(baseline[answer["objective"]] < total - slack * abs(total))
 
 

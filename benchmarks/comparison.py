@@ -13,10 +13,10 @@ from joulepath.models.robot import Array
 
 WHOLE = "joulepath, whole answer"
 PLOT = "time_against_energy.png"
-WITHIN = 1e-3
+LIMIT_TOLERANCE = 1e-3
 """Largest relative excess over a limit of a motion that counts as within limits [1]."""
 # The palette of Okabe and Ito can be distinguished by colour-blind readers.
-OURS = "#D55E00"
+OUR_COLOUR = "#D55E00"
 """Colour of joulepath."""
 COLOURS = ["#0072B2", "#56B4E9", "#009E73", "#CC79A7", "#E69F00", "#000000", "#999999"]
 MARKERS = "osD^vPX*<"
@@ -40,7 +40,7 @@ class Row:
     @property
     def feasible(self) -> Array:
         """Energies (n,) [J] of the motions within all limits; NaN for other motions."""
-        return np.where(self.ratio <= 1 + WITHIN, self.energy, np.nan)
+        return np.where(self.ratio <= 1 + LIMIT_TOLERANCE, self.energy, np.nan)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Comparison:
             "core each, in the same run. The same exact formulas give all energies on a grid of 1 "
             "ms, on which the "
             "limits are checked, too. A motion is within limits if it exceeds none of them by "
-            f"more than {WITHIN:.1%}. "
+            f"more than {LIMIT_TOLERANCE:.1%}. "
             "The best is the least energy of any motion within limits, task by task.\n\n"
         )
         text += "\n".join(f"| {' | '.join(line)} |" for line in lines)
@@ -169,7 +169,7 @@ def draw(planners: Comparison, path: Path) -> None:
     axes = figure.subplots()
     colours = iter(COLOURS)
     for row, marker in zip(planners.rows, MARKERS, strict=False):
-        colour = OURS if row.ours else next(colours)
+        colour = OUR_COLOUR if row.ours else next(colours)
         above = 100 * planners.above(row)
         known = np.isfinite(above)
         if not known.any():
@@ -177,7 +177,7 @@ def draw(planners: Comparison, path: Path) -> None:
         wall, above = 1e3 * row.wall[known], above[known]
         axes.scatter(wall, above, s=10, color=colour, alpha=0.3, linewidth=0, marker=marker)
         x, y = np.percentile(wall, [25, 50, 75]), np.percentile(above, [25, 50, 75])
-        within = bool((row.ratio[known] <= 1 + WITHIN).all())
+        within = bool((row.ratio[known] <= 1 + LIMIT_TOLERANCE).all())
         axes.errorbar(
             x[1],
             y[1],

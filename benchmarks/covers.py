@@ -11,7 +11,7 @@ nearest point of any mesh of the link. Points within the covers of a neighbourin
 angles of the joint between the links, do not count; neither do points of a tool inside the flange.
 The opening of 24 mm × 19 mm in the flange of Gen3 counts as closed by its lid in LIDS. A tool has
 one set of meshes per opening; the cover is also proven between the openings. The exit code is 1 if
-a hull leaves a piece uncovered or exceeds P99 or MOST.
+a hull leaves a piece uncovered or exceeds LARGEST_P99 or LARGEST_EXCESS.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from joulepath.models.robot import Array, LinkCapsule, LinkHull
 from joulepath.models.tool_meshes import TOOL_MESHES, between, installed_tool, on_flange
 from joulepath.models.tools.registry import tool_figures
 
-P99 = 3e-3
+LARGEST_P99 = 3e-3
 """Limit on the 99th percentile of the excess of hulls over the surface of an arm or tool [m]."""
-MOST = 8e-3
+LARGEST_EXCESS = 8e-3
 """Limit on the maximum of this excess [m]."""
 LIDS = {
     ("gen3", 7): np.array(
@@ -127,11 +127,13 @@ def of_robot(name: str, folder: Path, seed: int) -> list[Excess]:
             for link, own in of_links.items()
             if own
         }
-        own = [row for row, _ in found.values()]
-        if own:
-            bodies, missed = (sum(getattr(r, key) for r in own) for key in ("bodies", "uncovered"))
+        of_kind = [row for row, _ in found.values()]
+        if of_kind:
+            bodies, missed = (
+                sum(getattr(row, key) for row in of_kind) for key in ("bodies", "uncovered")
+            )
             excess = np.concatenate([each for _, each in found.values()])
-            rows += [*own, _row(name, "all", kind, bodies, missed, excess)]
+            rows += [*of_kind, _row(name, "all", kind, bodies, missed, excess)]
     return rows
 
 
@@ -177,7 +179,7 @@ def _row(name: str, link: str, kind: str, bodies: int, missed: int, excess: Arra
 
 def exceeds(row: Excess) -> bool:
     """Whether the hulls of an arm or tool leave a piece uncovered, or exceed the limits."""
-    return row.uncovered > 0 or row.p99 > P99 or row.maximum > MOST
+    return row.uncovered > 0 or row.p99 > LARGEST_P99 or row.maximum > LARGEST_EXCESS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

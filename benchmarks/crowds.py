@@ -29,11 +29,11 @@ from benchmarks.service import Service, running
 
 ADDRESSES = [f"127.0.0.{k}" for k in range(66, 70)]
 """Addresses of the crowd; the service counts every address as a client."""
-ALONE = 15.0
+QUIET_TIME = 15.0
 """Duration of the phases without a crowd [s]."""
 SETTLING = 5.0
 """Time from the end of a crowd until all workers must run again [s]."""
-SHORT = 30.0
+LONGEST_CROWD = 30.0
 """Longest duration of every crowd except `mixed` [s]."""
 IMPATIENT_TIMEOUT = 0.05
 """Timeout of an impatient client [s]."""
@@ -212,7 +212,7 @@ def observed(service: Service, name: str, attack: Callable[[], Counter[int]]) ->
 
 def alone() -> Counter[int]:
     """A phase without a crowd."""
-    time.sleep(ALONE)
+    time.sleep(QUIET_TIME)
     return Counter()
 
 
@@ -236,10 +236,10 @@ def report(name: str, minutes: float, kill_every: float) -> list[Phase]:
 
     Args:
         name: name of the crowd.
-        minutes: duration of the crowd [min]; every crowd except `mixed` lasts at most SHORT.
+        minutes: duration of the crowd [min], at most LONGEST_CROWD except for `mixed`.
         kill_every: period at which a worker is killed [s]; zero kills none.
     """
-    seconds = 60 * minutes if name == "mixed" else min(SHORT, 60 * minutes)
+    seconds = 60 * minutes if name == "mixed" else min(LONGEST_CROWD, 60 * minutes)
     with running() as service:
         phases = [
             observed(service, "before", alone),

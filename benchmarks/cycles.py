@@ -71,7 +71,7 @@ DWELL = 0.3
 SUMS = ("joins [rad]", "energy of the legs", "parts of the energy")
 """Quantities of a cycle that are zero up to rounding: the largest jump of a joint between legs, and
 the relative errors of the sum of the energies of all legs, and of the sum of the energy's parts."""
-EXACT = 1e-9
+ROUNDING = 1e-9
 """Largest rounding error of these quantities."""
 EXCESS = "excess over the least of all"
 NO_EXCESS = 1e-6
@@ -129,15 +129,15 @@ def _stop(
     return Stop(name=str(number), target=pose, dwell=dwell, payload=NOTHING if number % 2 else PART)
 
 
-def in_time(asked: Cycle, own: CycleSolution, factor: float) -> Cycle:
+def in_time(asked: Cycle, free: CycleSolution, factor: float) -> Cycle:
     """The cycle with a multiple `factor` of the duration of its solution of free duration."""
-    duration = factor * own.duration
+    duration = factor * free.duration
     return replace(asked, duration_min=duration, duration_max=duration)
 
 
-def excess(answer: CycleSolution, own: CycleSolution | None) -> float:
+def excess(answer: CycleSolution, free: CycleSolution | None) -> float:
     """Relative excess of a cycle over the least energy of the known feasible cycles: its baselines,
-    and the solution `own` of free duration followed by a wait on the motors, at the stop of least
+    and the solution `free` of free duration followed by a wait on the motors, at the stop of least
     power.
 
     The baseline `controller_default` does not count: its acceleration jumps at the start, so that
@@ -148,15 +148,15 @@ def excess(answer: CycleSolution, own: CycleSolution | None) -> float:
         for each in answer.baselines
         if each.within_limits and each.name != "controller_default"
     ]
-    if own is not None and answer.duration >= own.duration:
+    if free is not None and answer.duration >= free.duration:
         held = [
             holding_power(
                 move.planned.arm_after, _torque_at(move.planned.arm_after, move.solution.goal.q)
             )
-            for move in own.moves
+            for move in free.moves
         ]
         known.append(
-            own.energy.electrical.total + (answer.duration - own.duration) * float(min(held))
+            free.energy.electrical.total + (answer.duration - free.duration) * float(min(held))
         )
     return answer.energy.electrical.total / min(known) - 1 if known else 0.0
 
@@ -220,9 +220,9 @@ def main() -> None:
     how = (given.passes, given.free, given.dwell, given.anywhere, given.turned)
     size = (given.seed, given.count, given.stops, given.deadline)
     for asked in rounds(*size, *how):
-        own = None if given.time is None else plan_cycle(asked)
-        if own is not None:
-            asked = in_time(asked, own, given.time)
+        free = None if given.time is None else plan_cycle(asked)
+        if free is not None:
+            asked = in_time(asked, free, given.time)
         began = time.perf_counter()
         answer = plan_cycle(asked)
         least = answer.energy.electrical.total * (1 - NO_EXCESS)
@@ -235,7 +235,7 @@ def main() -> None:
             for each in answer.baselines
             if each.saving is not None
         }
-        row[EXCESS] = excess(answer, own)
+        row[EXCESS] = excess(answer, free)
         row["gap"] = gap_of(optimality_gap(answer.lower_bound, answer.energy.electrical.total))
         row["time [s]"] = time.perf_counter() - began
         row |= _sums(answer)
@@ -267,7 +267,7 @@ def _report(
         raise SystemExit(
             f"a cycle needs {results[EXCESS].maximum:.2%} more energy than a known cycle"
         )
-    if certified < legs or max(results[name].maximum for name in SUMS) > EXACT:
+    if certified < legs or max(results[name].maximum for name in SUMS) > ROUNDING:
         raise SystemExit("a leg is not certified, or the legs do not add up to the cycle")
 
 

@@ -37,14 +37,14 @@ from joulepath.optimizer.problem.problem import Problem
 
 Kind = Literal["joint to joint", "joint to pose", "mechanical", "payload", "cell"]
 KINDS: tuple[Kind, ...] = ("joint to joint", "joint to pose", "mechanical", "payload", "cell")
-AMPLE = 600.0
+UNREACHED_DEADLINE = 600.0
 """Deadline that no search reaches, so that results do not depend on the machine [s]."""
 RELATIVE = 1e-6
 """Relative difference of two equal energies [1]: rounding of reordered sums, amplified by the
 convergence criterion of the solver."""
 SAME_TASK = 1e-9
 """Rounding error of the numbers of a task: joint positions [rad] and entries of the goal pose."""
-MECHANICAL = (3.0, 6.0)
+LONGEST_MECHANICAL = (3.0, 6.0)
 """Range of the longest duration of mechanical tasks [s]."""
 
 
@@ -54,13 +54,13 @@ def problem_of(seed: int, index: int) -> tuple[Kind, Problem]:
     if kind == "cell":
         cell = cell_task(seed, index)
         return kind, Problem(
-            arm=cell.arm, start=cell.q_start, goal=Pose(cell.T_goal), deadline=AMPLE
+            arm=cell.arm, start=cell.q_start, goal=Pose(cell.T_goal), deadline=UNREACHED_DEADLINE
         )
     rng = np.random.default_rng([seed, index])
     q_start, q_goal = collision_free(rng, robot), collision_free(rng, robot)
     goal: Array | Pose = q_goal if kind == "joint to joint" else Pose(flange(robot, q_goal))
     if kind == "mechanical":
-        longest = float(rng.uniform(*MECHANICAL))
+        longest = float(rng.uniform(*LONGEST_MECHANICAL))
         # The lower bound of the mechanical objective excludes few candidates: eight remain without
         # full turns, and with full turns the search takes minutes.
         return kind, Problem(
@@ -70,14 +70,14 @@ def problem_of(seed: int, index: int) -> tuple[Kind, Problem]:
             objective="mechanical",
             duration_max=longest,
             windings=False,
-            deadline=AMPLE,
+            deadline=UNREACHED_DEADLINE,
         )
     payload = Payload()
     if kind == "payload":
         mass = float(rng.uniform(0.5, robot.rated_payload))
         payload = Payload(mass=mass, com=rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.15]))
     return kind, Problem(
-        arm=Arm(robot=robot, payload=payload), start=q_start, goal=goal, deadline=AMPLE
+        arm=Arm(robot=robot, payload=payload), start=q_start, goal=goal, deadline=UNREACHED_DEADLINE
     )
 
 

@@ -36,13 +36,13 @@ from joulepath.optimizer.search.errors import DurationTooShort
 from joulepath.optimizer.search.run import Run
 from joulepath.optimizer.solve.methods.duration_intervals import fastest
 
-NEAR = 1.5
+SHORT_RANGE = 1.5
 """Largest joint position of a short move [rad]."""
-LOAD = (0.5, 1.0)
+PAYLOADS = (0.5, 1.0)
 """Smallest and largest payload as a share of the rated payload [1]."""
-ASIDE = 0.05
+COM_OFFSET = 0.05
 """Largest lateral offset of the centre of mass of a payload in the flange frame [m]."""
-AHEAD = 0.12
+COM_DISTANCE = 0.12
 """Largest distance of this centre from the flange [m]."""
 AMPLITUDE = 0.6
 """Standard deviation of the amplitude of the first sine of a random start [rad]."""
@@ -50,7 +50,7 @@ SINES = 4
 """Number of sines of a random start."""
 SAMPLES = 121
 """Samples of a random start over time."""
-SLOWER = (1.0, 3.0)
+START_DURATIONS = (1.0, 3.0)
 """Smallest and largest duration of a random start over the least duration [1]."""
 FASTER = 0.01
 """Relative difference of durations above which another motion counts as faster [1]."""
@@ -83,7 +83,7 @@ def problems(robot: Robot, seed: int, count: int) -> Iterator[Problem]:
     limits = robot.limits
     for index in range(count):
         rng = np.random.default_rng([seed, index])
-        most = NEAR if index % 4 < 2 else np.pi
+        most = SHORT_RANGE if index % 4 < 2 else np.pi
         lower, upper = np.maximum(limits.q_min, -most), np.minimum(limits.q_max, most)
         # if the range of a joint is outside these bounds, the whole range is used
         lower, upper = (
@@ -93,8 +93,10 @@ def problems(robot: Robot, seed: int, count: int) -> Iterator[Problem]:
         q_start, q_goal = rng.uniform(lower, upper, (2, robot.nq))
         payload = Payload()
         if index % 2:
-            com = rng.uniform([-ASIDE, -ASIDE, 0.0], [ASIDE, ASIDE, AHEAD])
-            payload = Payload(float(rng.uniform(*LOAD)) * robot.rated_payload, com)
+            com = rng.uniform(
+                [-COM_OFFSET, -COM_OFFSET, 0.0], [COM_OFFSET, COM_OFFSET, COM_DISTANCE]
+            )
+            payload = Payload(float(rng.uniform(*PAYLOADS)) * robot.rated_payload, com)
         yield Problem(
             arm=Arm(robot=robot, payload=payload, limits=limits, collisions=False),
             start=q_start,
@@ -129,7 +131,7 @@ def from_random_starts(problem: Problem, starts: int, rng: np.random.Generator) 
     least, interval = candidate.shortest, fastest(run.state.prepared)
     for number in range(starts):
         q, t = _random(
-            candidate.q_start, candidate.q_goal, least * float(rng.uniform(*SLOWER)), rng
+            candidate.q_start, candidate.q_goal, least * float(rng.uniform(*START_DURATIONS)), rng
         )
         solver, fine = solver_of(state, candidate, interval), number % 2 == 0
         found = in_time(state, partial(solver.solve_from, q, t, fine)).spline

@@ -43,13 +43,13 @@ Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")
 DEADLINE = 10.0
 """Deadline of a request [s]."""
-REPLAY = 1e-3
+REPLAY_PERIOD = 1e-3
 """Period of the replay of capsules and hulls [s]."""
-MESH_REPLAY = 1e-4
+MESH_REPLAY_PERIOD = 1e-4
 """Period of the replay of meshes [s]."""
 ROBOT = "ur5e"
 """Default robot of the problems."""
-TOUCHED = 2
+TOUCHED_LINKS = 2
 """Number of last links that the gripper may touch: it was modelled for another arm, and overlaps
 the capsules of these links."""
 
@@ -85,7 +85,7 @@ class Outcome:
 def problems_of(path: Path, robot: str = ROBOT) -> list[ForeignProblem]:
     """The problems of a file for a robot, in the file's order."""
     given = orjson.loads(path.read_bytes())
-    touched = [*load_robot(robot).link_names[-TOUCHED:]]
+    touched = [*load_robot(robot).link_names[-TOUCHED_LINKS:]]
     capsules = [{"touches": touched, **capsule} for capsule in given["tool"]["capsules"]]
     shared = {"robot": robot, "tool": {"capsules": capsules}, "tcp": given["tcp"]}
     return [
@@ -150,9 +150,9 @@ def run(
         (c for c in solution.candidates if c.energy is not None), key=lambda c: c.energy or 0.0
     )
     spline = solution.trajectory.spline
-    hits = collisions(asked.arm, spline, REPLAY)
+    hits = collisions(asked.arm, spline, REPLAY_PERIOD)
     if meshes:
-        hits += mesh_collisions(asked.arm, meshes, spline, MESH_REPLAY)
+        hits += mesh_collisions(asked.arm, meshes, spline, MESH_REPLAY_PERIOD)
     return outcome(
         **took,
         energy=solution.energy.of(asked.objective),

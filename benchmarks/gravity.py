@@ -35,9 +35,9 @@ KNEE = 0.02
 LOADED = 0.3
 """Smallest standard deviation of the rigid-body torque of a loaded joint, over the largest one of
 all joints [1]."""
-LEAST = 0.97
+LEAST_SLOPE = 0.97
 """Smallest admissible slope of measured over computed torque [1]."""
-MOST = 1.03
+MOST_SLOPE = 1.03
 """Largest admissible slope of measured over computed torque [1]."""
 
 
@@ -98,7 +98,7 @@ def main() -> int:
         # slopes of currents have no gate, because they also contain errors of the torque constants
         if robot.name == log.robot and log.effort_meaning == "torque":
             gates += [
-                Gate(f"{name}: slope of J{joint + 1}", float(slope[joint]), LEAST, MOST)
+                Gate(f"{name}: slope of J{joint + 1}", float(slope[joint]), LEAST_SLOPE, MOST_SLOPE)
                 for joint in np.flatnonzero(loaded).tolist()
             ]
     print("* lightly loaded joint: friction and inertia affect its slope more than weight")

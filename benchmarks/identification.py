@@ -63,7 +63,7 @@ DAY_SD = 0.03
 """Relative standard deviation of the friction between days [1]."""
 DRAWS = 100
 MOVES_OF_A_DRAW = 5
-OFTEN = 0.2
+IDENTIFIED_SHARE = 0.2
 """Smallest share of runs in which a figure is identified, for a gate on this figure [1]."""
 REPEATS = 3
 """Number of time measurements."""
@@ -180,7 +180,7 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
                 near = abs(each.value - _true(truth, each.figure, each.joint)) <= 3 * each.sd
                 within.setdefault((each.figure, each.joint), []).append(near)
     # a share over few runs has a large sampling error
-    often = [each for each in within.values() if len(each) >= OFTEN * runs]
+    often = [each for each in within.values() if len(each) >= IDENTIFIED_SHARE * runs]
     title = f"synthetic, {runs} arms from {channels}" + f", moves off by {effect:g} W" * bool(
         effect
     )

@@ -37,11 +37,11 @@ METHODS: tuple[Method, ...] = get_args(Method)
 REFIT = "automatic, links refitted"
 WARMING = 20.0
 """Rise of the temperature of a joint over a simulated log [K]."""
-RATE = 0.012
+FRICTION_DECREASE = 0.012
 """Relative decrease of friction with temperature [1/K]."""
-SENSOR = (0.5, 0.2)
+SENSOR_NOISE = (0.5, 0.2)
 """Noise of a sensor beneath the base: standard deviations of forces [N] and moments [N·m]."""
-HEAVIER = 1.05
+MASS_FACTOR = 1.05
 """Link masses of a simulated arm over the link masses of the robot [1]."""
 UNIT = 3
 """Seed of the simulated arm."""
@@ -95,7 +95,7 @@ def simulated_cases() -> Iterator[Case]:
     options = IdentificationOptions(period=period)
     yield Case("repeated", robot, [repeated], [other], options)
     yield Case("warming up", robot, [_warming(robot)], [other])
-    heavier = _heavier(robot)
+    heavier = _with_heavier_links(robot)
     other = recorded(heavier, truth, moves=8, seed=31).log()
     yield Case("on a sensor", robot, [_on_sensor(heavier)], [other])
 
@@ -108,14 +108,14 @@ def _warming(robot: Robot) -> Log:
     assert log.effort is not None
     speed = log.v / np.hypot(log.v, truth.knee)
     friction = truth.coulomb * speed + truth.viscous * log.v
-    change = friction * np.expm1(-RATE * above) / truth.torque_constant
+    change = friction * np.expm1(-FRICTION_DECREASE * above) / truth.torque_constant
     return replace(log, effort=log.effort + change, temperature=30.0 + above)
 
 
-def _heavier(robot: Robot) -> Robot:
+def _with_heavier_links(robot: Robot) -> Robot:
     """The robot with heavier links."""
     mass = dict(robot.figures["inertials"]["mass"])
-    mass["value"] = [HEAVIER * each for each in mass["value"]]
+    mass["value"] = [MASS_FACTOR * each for each in mass["value"]]
     return load_robot(robot.name, figures={"robot": robot.name, "inertials": {"mass": mass}})
 
 
@@ -125,7 +125,7 @@ def _on_sensor(robot: Robot) -> Log:
     wrench: Array = base_wrench_regressor(robot.model, log.q, log.v, log.a) @ body_parameters(
         robot.model
     )
-    noise = np.random.default_rng(UNIT).normal(0.0, np.repeat(SENSOR, 3), wrench.shape)
+    noise = np.random.default_rng(UNIT).normal(0.0, np.repeat(SENSOR_NOISE, 3), wrench.shape)
     return replace(log, wrench=wrench + noise)
 
 

@@ -33,7 +33,7 @@ WARMING = 0.03
 """Relative decrease of the friction over a log [1]."""
 RIPPLE = 0.01
 """Amplitude of the ripple of the gears relative to the friction [1]."""
-WAVES = 37.0
+RIPPLE_PERIODS = 37.0
 """Number of periods of the ripple per turn of the joint [1]."""
 FILTER = 0.004
 """Time constant of the filter of the logged current in the drive [s]."""
@@ -43,7 +43,7 @@ POSITION_STEP = 1e-5
 """Resolution of the logged positions [rad]."""
 JITTER = 1e-4
 """Largest jitter of the logged times [s]."""
-BEHIND = 0.15
+SENSED_FRICTION = 0.15
 """Share of the friction that a torque sensor behind the gears measures [1]."""
 TORQUE_SENSOR = Noise(current=0.005)
 """Noise of a torque sensor behind the gears: 0.05 N·m at 10 N·m/A."""
@@ -83,7 +83,7 @@ def day_of(
     ripple = (
         RIPPLE
         * today.coulomb
-        * np.sin(WAVES * exact.exact_q + random.uniform(0, 6, robot.nq))
+        * np.sin(RIPPLE_PERIODS * exact.exact_q + random.uniform(0, 6, robot.nq))
         * moving
     )
     current = _of_drive((exact.torque + cooler * drag + ripple) / today.torque_constant)
@@ -117,8 +117,8 @@ def behind_the_gears(truth: Truth) -> Truth:
     """The truth of an arm with torque sensors behind the gears."""
     return replace(
         truth,
-        coulomb=BEHIND * truth.coulomb,
-        viscous=BEHIND * truth.viscous,
-        load=BEHIND * truth.load,
+        coulomb=SENSED_FRICTION * truth.coulomb,
+        viscous=SENSED_FRICTION * truth.viscous,
+        load=SENSED_FRICTION * truth.load,
         rotor_inertia=0.0 * truth.rotor_inertia,
     )

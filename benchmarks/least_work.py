@@ -51,7 +51,7 @@ SAMPLES = 4_001
 """Samples of a motion."""
 DEADLINE = 30.0
 """Deadline of a request [s]."""
-LONGER = 1.001
+DURATION_FACTOR = 1.001
 """Duration of a motion over the shortest known duration, if the duration asked for is shorter
 [1]."""
 
@@ -103,7 +103,7 @@ def fastest(problem: Problem) -> Spline | None:
     except DurationTooShort as error:
         if error.shortest is None:
             return None
-        least = LONGER * error.shortest
+        least = DURATION_FACTOR * error.shortest
         return motion(replace(problem, duration_min=least, duration_max=least))
     except JoulepathError:
         return None
@@ -124,7 +124,7 @@ def run(
     try:
         ours: Spline | None = optimize(asked("pose", duration)).trajectory.spline
     except DurationTooShort as error:
-        duration = LONGER * (error.shortest or duration)
+        duration = DURATION_FACTOR * (error.shortest or duration)
         ours = motion(asked("pose", duration))
     except JoulepathError:
         ours = None

@@ -61,7 +61,7 @@ MASSES = 0.5, 2.9
 """Smallest and largest payload [kg]."""
 MOST_EXCESS = 1e-2
 """Largest admissible 95th percentile of the relative excess [1]."""
-AMPLE = 600.0
+UNREACHED_DEADLINE = 600.0
 """Deadline that no search reaches [s]."""
 BATCH = 40
 """Number of coarse motions that are solved together."""
@@ -71,11 +71,11 @@ AMPLITUDES = 0.3, 5.0
 """Smallest and largest standard deviation of the amplitudes of half waves [rad]."""
 MOST_PAIRS = 2000
 """Number of pairs of postures from which guesses are drawn; they have the lowest estimates."""
-SLOWER = 1.05, 2.0
+GUESS_DURATIONS = 1.05, 2.0
 """Range of the durations of guesses over the shortest duration, for a free duration [1]."""
-SOLVED = 14
+SOLVED_GUESSES = 14
 """Number of coarse motions that are solved finely."""
-REFINED = 5
+REFINED_GUESSES = 5
 """Number of solved motions that are refined."""
 KIND_DISTANCE = 0.3
 """Distance between control points above which two motions are of different kinds [rad]."""
@@ -98,7 +98,7 @@ def problem_of(seed: int, index: int, objective: str) -> Problem:
         objective="mechanical" if objective == "mechanical" else "electrical",
         duration_min=longest if duration == "fixed" else None,
         duration_max=longest if timed else None,
-        deadline=AMPLE,
+        deadline=UNREACHED_DEADLINE,
     )
 
 
@@ -140,7 +140,7 @@ def guesses(rng: np.random.Generator, state: SearchState, count: int) -> list[Co
         )
     ]
     coarse.sort(key=lambda each: each.work)
-    return [coarse[k] for k in _kinds([each.points for each in coarse], SOLVED)]
+    return [coarse[k] for k in _kinds([each.points for each in coarse], SOLVED_GUESSES)]
 
 
 def best_of_many(problem: Problem, count: int, seed: Sequence[int]) -> tuple[float, Spline | None]:
@@ -157,13 +157,13 @@ def best_of_many(problem: Problem, count: int, seed: Sequence[int]) -> tuple[flo
     for each in guesses(rng, state, count):
         fresh = Candidate(*(getattr(each.candidate, name) for name in ENDS))
         fresh.shortest = each.candidate.shortest
-        duration = problem.duration_max or fresh.shortest * rng.uniform(*SLOWER)
+        duration = problem.duration_max or fresh.shortest * rng.uniform(*GUESS_DURATIONS)
         improve(state, fresh, partial(_solved, each.points, float(duration)))
         if fresh.energy is not None:
             solved.append(fresh)
     solved.sort(key=lambda each: each.energy or 0.0)
     best: tuple[float, Spline | None] = np.inf, None
-    for k in _kinds([each.spline.control_points for each in solved], REFINED):
+    for k in _kinds([each.spline.control_points for each in solved], REFINED_GUESSES):
         state.candidates = [solved[k]]
         refine(state, solved[k])
         energy, spline = solved[k].energy or 0.0, solved[k].spline

@@ -52,26 +52,26 @@ from joulepath.optimizer.problem.stops import Stop
 
 ROBOTS = ("ur5e", "ur10e", "kr10_r1100")
 NOTHING = Payload()
-NEAR = 0.5
+NEAREST = 0.5
 """Smallest distance of a stop from the nominal base as a share of the reach [1]."""
-FAR = 0.7
+FARTHEST = 0.7
 """Largest distance of a stop from the nominal base as a share of the reach [1]."""
 HEIGHTS = (0.05, 0.35)
 """Smallest and largest height of a stop as a share of the reach [1]."""
-AROUND = 0.4
+REGION_WIDTH = 0.4
 """Horizontal width of the region as a share of the reach [1]."""
-ABOVE = 0.2
+REGION_HALF_HEIGHT = 0.2
 """Vertical half width of the region as a share of the reach [1]."""
-SIDE = 0.5
+STOP_SPREAD = 0.5
 """Angle around the base over which the stops of one side spread [rad]."""
 CLEARANCE = 0.06
 """Height of the stops of a side above their table [m]."""
 GRID = 0.05
 """Step of the exhaustive grid [m]."""
-AMPLE = 1e6
+UNREACHED_DEADLINE = 1e6
 """Deadline that no computation on the exhaustive grid reaches [s]."""
-TOOL = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.12], [0, 0, 0, 1]])
-"""T_flange_tcp."""
+T_FLANGE_TCP = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.12], [0, 0, 0, 1]])
+"""Pose of the TCP in the flange frame (4, 4)."""
 
 
 def cell(robot: str, rng: np.random.Generator) -> Cycle:
@@ -91,7 +91,9 @@ def cell(robot: str, rng: np.random.Generator) -> Cycle:
     post = 0.6 * reach * np.array([np.cos(turn), np.sin(turn), 0.0])
     top = reach * rng.uniform(0.1, 0.3)
     tables.append(_box("post", np.array([*post[:2], top / 2]), [0.08, 0.08, top]))
-    tables.append(Obstacle("floor", HalfSpace(), _at(np.array([0.0, 0.0, -ABOVE * reach - 0.1]))))
+    tables.append(
+        Obstacle("floor", HalfSpace(), _at(np.array([0.0, 0.0, -REGION_HALF_HEIGHT * reach - 0.1])))
+    )
     part = Payload(mass=0.4 * model.rated_payload, com=np.array([0.0, 0.0, 0.15]))
     (a, b), (c, d) = poses
     stops = [
@@ -103,15 +105,15 @@ def cell(robot: str, rng: np.random.Generator) -> Cycle:
             ("place 2", d, NOTHING),
         )
     ]
-    arm = Arm(robot=model, T_flange_tcp=TOOL, scene=Scene(tables))
+    arm = Arm(robot=model, T_flange_tcp=T_FLANGE_TCP, scene=Scene(tables))
     above = np.mean([a.T[:3, 3], c.T[:3, 3]], axis=0) + np.array([0.0, 0.0, 0.3])
     start = Pose.from_rpy(above, [np.pi, 0.0, turn])
     return Cycle(arm=arm, start=start, stops=stops, deadline=20.0)
 
 
 def _around(rng: np.random.Generator, reach: float, angle: float, height: float) -> Array:
-    distance = reach * rng.uniform(NEAR, FAR)
-    angle += rng.uniform(-SIDE, SIDE) / 2
+    distance = reach * rng.uniform(NEAREST, FARTHEST)
+    angle += rng.uniform(-STOP_SPREAD, STOP_SPREAD) / 2
     return np.array([distance * np.cos(angle), distance * np.sin(angle), height])
 
 
@@ -136,7 +138,7 @@ def numbered(seed: int, number: int, deadline: float) -> Placement:
             continue
         break
     reach = Chain.of(cycle.arm.robot.model).length
-    around, above = AROUND * reach / 2, ABOVE * reach
+    around, above = REGION_WIDTH * reach / 2, REGION_HALF_HEIGHT * reach
     region = Region(x=(-around, around), y=(-around, around), z=(-above, above))
     return Placement(cycles=[WeightedCycle(cycle)], moved=[Moved(region)], deadline=deadline)
 
@@ -147,15 +149,16 @@ def exhaustive(placement: Placement) -> list[float]:
     Places with proven bounds above the least energy are left out.
     """
     space, energies = Space.of(replace(placement, resolution=GRID)), [np.inf]
-    rounds, ample = Rounds(space, time.process_time), Deadline.after(AMPLE, time.process_time)
+    rounds = Rounds(space, time.process_time)
+    ample = Deadline.after(UNREACHED_DEADLINE, time.process_time)
     reached = [rounds.checked(each, ample) for each in space.map()]
     reached = [each for each in reached if each.reason is None]
     for each in sorted(reached, key=lambda each: each.bound or 0.0):
         if each.bound is not None and each.bound >= min(energies):
             break
-        (own,) = space.cycles(each.place)
+        (cycle,) = space.cycles(each.place)
         try:
-            found = plan_cycle(replace(own, with_baselines=False), progress=False)
+            found = plan_cycle(replace(cycle, with_baselines=False), progress=False)
         except JoulepathError:
             continue
         energies.append(found.energy.electrical.total)

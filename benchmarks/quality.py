@@ -14,7 +14,7 @@ from joulepath.optimizer.dynamics.kernel_cache import compile_kernel
 from joulepath.optimizer.exceptions import JoulepathError
 from joulepath.optimizer.optimize import optimize
 
-AMPLE = 600.0
+UNREACHED_DEADLINE = 600.0
 """Deadline that no search reaches, so that results do not depend on the machine [s]."""
 
 
@@ -38,7 +38,9 @@ def main() -> None:
             continue
         task = move(reference["seed"], row["index"])
         try:
-            energy = optimize(replace(problem_of(task), deadline=AMPLE)).energy.electrical.total
+            energy = optimize(
+                replace(problem_of(task), deadline=UNREACHED_DEADLINE)
+            ).energy.electrical.total
         except JoulepathError as error:
             print(f"index {task.index}: {error!r}")
             energy = float("inf")

@@ -27,7 +27,7 @@ from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, RequestTask, request_tasks
 from joulepath.models.registry import robot_names
 
-ANSWERED = 0.99
+LEAST_VALID = 0.99
 """Smallest admissible fraction of valid answers [1]."""
 MOST_EXCESS = 1e-2
 """Largest admissible relative excess of the energy over that of the time-scaled motion [1]."""
@@ -54,7 +54,6 @@ class Outcome:
     solves: int = 0
     optimal: bool = False
     relative_excess: float | None = None
-    bytes: int = 0
 
     @property
     def name(self) -> str:
@@ -64,7 +63,7 @@ class Outcome:
 
 def examine(task: RequestTask, answer: Answer) -> Outcome:
     """The result of a request: its answer, checked."""
-    outcome = Outcome(task, answer.status, answer.wall, bytes=len(answer.raw))
+    outcome = Outcome(task, answer.status, answer.wall)
     content = answer.content
     if answer.status != 200:
         typed = answer.headers.get("content-type", "").startswith(PROBLEM) and answer.status < 500
@@ -141,7 +140,6 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "slowest": max(outcomes, key=lambda o: o.wall).name if outcomes else "",
         "candidates": Spread.of([o.candidates for o in solved]),
         "solves": Spread.of([o.solves for o in solved]),
-        "megabytes": Spread.of([o.bytes / 1e6 for o in solved]),
         "compared": len(relative_excess),
         "relative_excess": max(relative_excess, default=0.0),
         "worst": max(
@@ -156,10 +154,10 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 def failed_requirements(results: dict[str, Any]) -> list[str]:
     """A message for every failed requirement of a run."""
     found = list(results["errors"])
-    if results["valid_fraction"] < ANSWERED:
+    if results["valid_fraction"] < LEAST_VALID:
         found.append(
-            f"{results['valid_fraction']:.2%} of the answers are valid: required {ANSWERED:.0%} or "
-            "more"
+            f"{results['valid_fraction']:.2%} of the answers are valid: required {LEAST_VALID:.0%} "
+            "or more"
         )
     if results["relative_excess"] > MOST_EXCESS:
         found.append(

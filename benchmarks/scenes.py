@@ -15,7 +15,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,9 +34,9 @@ from joulepath.optimizer.problem.problem import MethodName, Problem
 from joulepath.optimizer.solve.methods import METHODS
 from joulepath.optimizer.solve.methods.solve_result import MotionOrigin
 
-REPLAY = 1e-4
+REPLAY_PERIOD = 1e-4
 """Period of the replay [s]."""
-SOLVED = 0.99
+LEAST_SOLVED = 0.99
 """Smallest admissible fraction of solved tasks of each kind [1]."""
 KINDS = ("one candidate", "whole request")
 PLANNED = (MotionOrigin.FROM_PLANNED_PATH.value, MotionOrigin.ALONG_PLANNED_PATH.value)
@@ -54,7 +54,6 @@ class Outcome:
     collisions: int = 0
     solves: int = 0
     proven: float = 0.0
-    tried: dict[str, int] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -91,10 +90,9 @@ def run(task: CellTask, kind: str, method: MethodName = "bspline") -> Outcome:
         for candidate in solution.candidates
         if candidate.status == "solved"
     )
-    outcome.tried = dict(Counter(c.status for c in solution.candidates))
     found = solution.certificate.clearance
     outcome.proven = np.nan if found is None else found.min_clearance
-    outcome.collisions = collisions(arm, solution.trajectory.spline, REPLAY)
+    outcome.collisions = collisions(arm, solution.trajectory.spline, REPLAY_PERIOD)
     return outcome
 
 
@@ -140,9 +138,10 @@ def failed_requirements(results: dict[str, Any]) -> list[str]:
     """A message for every failed requirement of a run."""
     found = list(results["collisions"])
     for kind, number in results["solved"].items():
-        if number < SOLVED * results["count"]:
+        if number < LEAST_SOLVED * results["count"]:
             found.append(
-                f"{kind}: {number} of {results['count']} solved, required {SOLVED:.0%} or more"
+                f"{kind}: {number} of {results['count']} solved, required {LEAST_SOLVED:.0%} or "
+                "more"
             )
     return found
 

@@ -21,11 +21,11 @@ from typing import IO, Any
 import orjson
 
 ROOT = Path(__file__).parents[1]
-START = 120.0
+START_TIMEOUT = 120.0
 """Longest time until the service is ready [s]."""
-STOP = 20.0
+STOP_TIMEOUT = 20.0
 """Longest time from SIGTERM to the end of the process [s]."""
-PAUSE = 0.005
+RETRY_PERIOD = 0.005
 """Time between two attempts to reach the service [s]."""
 
 
@@ -106,19 +106,21 @@ class Service:
 
     def wait(self, path: str) -> None:
         """Waits until `path` answers 200. Raises RuntimeError if the service ends or needs more
-        than START."""
+        than START_TIMEOUT."""
         client = self.client()
         while True:
             if self.process.poll() is not None:
                 raise RuntimeError("the service ended by itself:\n" + self.logged())
-            if self.age > START:
-                raise RuntimeError(f"no 200 from {path} within {START:g} s:\n" + self.logged())
+            if self.age > START_TIMEOUT:
+                raise RuntimeError(
+                    f"no 200 from {path} within {START_TIMEOUT:g} s:\n" + self.logged()
+                )
             try:
                 if client.get(path).status == 200:
                     return
             except (OSError, http.client.HTTPException):
                 pass
-            time.sleep(PAUSE)
+            time.sleep(RETRY_PERIOD)
 
     def logged(self) -> str:
         """The last 4000 bytes of the log."""
@@ -153,7 +155,7 @@ def running(**environment: str) -> Iterator[Service]:
         finally:
             process.send_signal(signal.SIGTERM)
             try:
-                process.wait(STOP)
+                process.wait(STOP_TIMEOUT)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()

@@ -107,14 +107,12 @@ def main() -> None:
     finally:
         for worker in workers:
             worker.end()
-    for name, own in zip(names, walls, strict=True):
-        print(f"{name:10s} {Spread.of(own.tolist()).times(1e3).formatted(' ms')}")
+    for name, times in zip(names, walls, strict=True):
+        print(f"{name:10s} {Spread.of(times.tolist()).times(1e3).formatted(' ms')}")
     ratios = {}
-    for name, own in zip(given.others, walls[1:], strict=True):
-        ratio, spread = (
-            float(np.median(own) / np.median(walls[0])),
-            Spread.of((own / walls[0]).tolist()),
-        )
+    for name, times in zip(given.others, walls[1:], strict=True):
+        ratio = float(np.median(times) / np.median(walls[0]))
+        spread = Spread.of((times / walls[0]).tolist())
         ratios[name] = ratio
         print(
             f"{name} / {given.first}: ratio of the medians {ratio:.1f}; ratio per task: "

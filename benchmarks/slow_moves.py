@@ -53,13 +53,13 @@ MOST_EXCESS = 3e-3
 """Largest admissible 95th percentile of the relative excess [1]."""
 NEAR = (0.9, 0.97, 0.99, 0.997, 1.003, 1.01, 1.03, 1.1)
 """Durations of variants over the duration of the answer [1]."""
-FEW = 13
+CONTROL_POINTS = 13
 """Control points of a first solve."""
-MORE = 4
+REFINEMENT = 4
 """Factor on the number of control points in the fine solve."""
 PROGRESS = 1e-5
 """Relative decrease of the energy at which a fine solve ends [1]."""
-AMPLE = 600.0
+UNREACHED_DEADLINE = 600.0
 """Deadline that no search reaches [s]."""
 
 
@@ -74,7 +74,7 @@ def slow_problem(seed: int, index: int) -> tuple[SlowKind, Problem]:
     else:
         v_max *= TENTH
     arm = Arm(robot=robot, limits=replace(robot.limits, v_max=v_max), collisions=False)
-    return kind, Problem(arm=arm, start=task.q_start, goal=task.q_goal, deadline=AMPLE)
+    return kind, Problem(arm=arm, start=task.q_start, goal=task.q_goal, deadline=UNREACHED_DEADLINE)
 
 
 def other_searches(problem: Problem, duration: float) -> Iterator[tuple[str, float]]:
@@ -99,7 +99,7 @@ def more_points(problem: Problem, spline: Spline) -> Iterator[tuple[str, float]]
     q_start, q_goal = spline.control_points[[0, -1]]
     solver = FreeSpline(SolveContext.of(prepared, q_start, q_goal, NEVER))
     q, t = sampled(spline)
-    space = bspline.uniform(MORE * FEW)
+    space = bspline.uniform(REFINEMENT * CONTROL_POINTS)
     points = bspline.smoothed(q, t / spline.duration, space.knots)
     evenly = solver.solve_control_points(space, points, spline.duration, PROGRESS)
     yield "evenly", prepared.cost_of(evenly.spline)
@@ -111,10 +111,10 @@ def _energy(problem: Problem) -> float:
 
 
 def _finer(solver: FreeSpline, spline: Spline) -> SolveResult:
-    """A solve from a motion, in a spline space with every span divided into MORE spans."""
+    """A solve from a motion, in a spline space with every span divided into REFINEMENT spans."""
     duration = spline.duration
     knots: Array = spline.knots / duration
-    inserted = [np.linspace(a, b, MORE + 1)[1:-1] for a, b in pairwise(np.unique(knots))]
+    inserted = [np.linspace(a, b, REFINEMENT + 1)[1:-1] for a, b in pairwise(np.unique(knots))]
     space = Basis.of(np.sort(np.concatenate([knots, *inserted])))
     points = bspline.refit(spline.control_points, knots, space.knots)
     return solver.improve(Guess(space, points, duration, nearly_feasible=True, progress=PROGRESS))

@@ -28,21 +28,21 @@ from tests.app.live import serving
 from tests.browser.pages import MESHES, SHOWN, findings, go, opened, until
 from tests.browsers import SOFTWARE, chromium
 
-PICTURE = 1.2
+LATEST_PICTURE = 1.2
 """Latest first picture [s]."""
-SIZE = 1.2e6
+LARGEST_SIZE = 1.2e6
 """Largest compressed size of the page without meshes [byte]."""
-FRAME = 8.0
+LARGEST_FRAME_TIME = 8.0
 """Largest mean processor time of the page's own code per frame [ms]: half of 1/60 s."""
-WORK = ("ScriptDuration", "LayoutDuration", "RecalcStyleDuration")
+OWN_WORK = ("ScriptDuration", "LayoutDuration", "RecalcStyleDuration")
 """Metrics of Chromium for the page's own code."""
-PLAYED = 5.0
+COUNTING_PERIOD = 5.0
 """Period in which frames are counted [s]."""
-SETTLED = 1500
+SETTLING_TIME = 1500
 """Time after which a still picture is complete [ms]."""
 BUILT = ROOT / "app" / "static" / "studio"
 LOOKS = (("light", 1440), ("dark", 1440), ("light", 390))
-TIMES = """(() => {
+RECORD_TIMES = """(() => {
     const seen = (window.seen = {});
     const look = () => {
         const now = window.studio;
@@ -53,14 +53,14 @@ TIMES = """(() => {
     look();
 })()"""
 """Records the instants of the first picture and the first answer [ms]."""
-FRAMES = """(time) => new Promise((resolve) => {
+FRAME_RATE = """(time) => new Promise((resolve) => {
     const first = studio.view.frames;
     document.querySelector("#play").click();
     setTimeout(() => resolve((studio.view.frames - first) / time), 1000 * time);
 })"""
-COUNT = 200
+FRAME_COUNT = 200
 """Number of frames over which the time of the page's own code is averaged."""
-OWN = """(count) => {
+STEP_THROUGH = """(count) => {
     const { view } = studio;
     const draw = view.renderer.render;
     view.renderer.render = () => {};
@@ -73,7 +73,7 @@ OWN = """(count) => {
     view.renderer.render = draw;
 }"""
 """Steps through the motion in `count` frames without drawing by WebGL."""
-STILL = """(time) => new Promise((resolve) => {
+STILL_FRAMES = """(time) => new Promise((resolve) => {
     const first = studio.view.frames;
     setTimeout(() => resolve(studio.view.frames - first), 1000 * time);
 })"""
@@ -90,7 +90,7 @@ def visits(browser: Browser, url: str, count: int) -> dict[str, Spread]:
     found: dict[str, list[float]] = {"picture": [], "answer": []}
     for _ in range(count):
         context = browser.new_context(viewport={"width": 1440, "height": 900})
-        context.add_init_script(TIMES)
+        context.add_init_script(RECORD_TIMES)
         page = context.new_page()
         page.goto(url)
         until(page, "() => Boolean(window.seen?.picture && seen.answer)")
@@ -104,7 +104,7 @@ def frames(page: Page) -> float:
     """Frames per second while the motion is played."""
     until(page, SHOWN)
     until(page, MESHES)
-    return float(page.evaluate(FRAMES, PLAYED))
+    return float(page.evaluate(FRAME_RATE, COUNTING_PERIOD))
 
 
 def still(page: Page) -> tuple[float, int]:
@@ -117,14 +117,14 @@ def still(page: Page) -> tuple[float, int]:
 
     def worked() -> float:
         """Processor time of scripts, styles and layout so far [ms]."""
-        told = session.send("Performance.getMetrics")["metrics"]
-        return 1000 * sum(float(each["value"]) for each in told if each["name"] in WORK)
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        return 1000 * sum(float(each["value"]) for each in metrics if each["name"] in OWN_WORK)
 
     before = worked()
-    page.evaluate(OWN, COUNT)
-    own = (worked() - before) / COUNT
-    page.wait_for_timeout(SETTLED)
-    return own, int(page.evaluate(STILL, PLAYED))
+    page.evaluate(STEP_THROUGH, FRAME_COUNT)
+    own = (worked() - before) / FRAME_COUNT
+    page.wait_for_timeout(SETTLING_TIME)
+    return own, int(page.evaluate(STILL_FRAMES, COUNTING_PERIOD))
 
 
 def compressed(folder: Path) -> int:
@@ -181,8 +181,8 @@ def main() -> None:
     print(f"{own:.2f} ms of the page's own code in a frame; {redrawn} frames while nothing moves")
     print(f"axe: {len(findings_of_axe)} serious findings", *findings_of_axe, sep="\n  ")
     write_json(args.json, results)
-    slow = times["picture"].p50 > PICTURE or own > FRAME
-    sys.exit(slow or size > SIZE or redrawn > 0 or bool(findings_of_axe))
+    slow = times["picture"].p50 > LATEST_PICTURE or own > LARGEST_FRAME_TIME
+    sys.exit(slow or size > LARGEST_SIZE or redrawn > 0 or bool(findings_of_axe))
 
 
 if __name__ == "__main__":

@@ -70,10 +70,11 @@ def limits_of(service: str, robot: str, request: dict[str, Any]) -> dict[str, li
     limits: dict[str, list[float]] = {}
     for name in ("velocity", "torque"):
         given = (request.get("limits") or {}).get(name)
-        own: list[float] = figures[name]["value"]
-        limits[name] = (
-            own if given is None else given if isinstance(given, list) else [given] * len(own)
-        )
+        of_robot: list[float] = figures[name]["value"]
+        if given is None:
+            limits[name] = of_robot
+        else:
+            limits[name] = given if isinstance(given, list) else [given] * len(of_robot)
     return limits
 
 

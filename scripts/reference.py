@@ -42,8 +42,8 @@ def reference(document: dict[str, Any]) -> str:
     schemas = document["components"]["schemas"]
     operations = [
         _operation(method, path, operation, schemas)
-        for path, own in document["paths"].items()
-        for method, operation in own.items()
+        for path, methods in document["paths"].items()
+        for method, operation in methods.items()
     ]
     shown = [name for name in sorted(schemas) if not _slug(schemas[name])]
     tables = [_table(name, schemas[name]) for name in shown]
@@ -58,14 +58,12 @@ def errors(document: dict[str, Any]) -> str:
 
 def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[str, Any]) -> str:
     lines = [f"### {method.upper()} {path}", "", f"{operation['summary']}.", ""]
-    for own in operation.get("parameters", ()):
-        node = own.get("schema") or own["content"]["application/json"]["schema"]
-        if own["in"] == "query":
-            limits = _limits(own["name"], node, {own["name"]} if own.get("required") else set())
-            lines.append(
-                f"- query `{own['name']}`: {_type(node)}{limits}. "
-                f"{_cell(own.get('description', ''))}"
-            )
+    for parameter in operation.get("parameters", ()):
+        node = parameter.get("schema") or parameter["content"]["application/json"]["schema"]
+        if parameter["in"] == "query":
+            name, text = parameter["name"], _cell(parameter.get("description", ""))
+            limits = _limits(name, node, {name} if parameter.get("required") else set())
+            lines.append(f"- query `{name}`: {_type(node)}{limits}. {text}")
     contents = {"request": operation.get("requestBody", {}).get("content", {})}
     contents |= {
         status: answer.get("content", {}) for status, answer in operation["responses"].items()
@@ -87,17 +85,17 @@ def _slug(schema: dict[str, Any]) -> str:
 
 
 def _problem(schema: dict[str, Any]) -> str:
-    own = schema["properties"]
+    properties = schema["properties"]
     fields = [
         f"- `{name}`: {_type(node, PAGE.name)}. {_cell(node['description'])}"
-        for name, node in own.items()
+        for name, node in properties.items()
         if name not in _COMMON
     ]
     return "\n".join(
         [
             f"## {_slug(schema)}",
             "",
-            f"{own['title']['enum'][0]}, status {own['status']['enum'][0]}. "
+            f"{properties['title']['enum'][0]}, status {properties['status']['enum'][0]}. "
             f"{_cell(schema['description'])}",
             "",
             *([*fields, ""] if fields else []),
@@ -108,12 +106,12 @@ def _problem(schema: dict[str, Any]) -> str:
 def _table(name: str, schema: dict[str, Any]) -> str:
     required = set(schema.get("required", ()))
     rows, group = list[str](), ""
-    for field, own in schema.get("properties", {}).items():
-        if own.get("x-group", "") != group:
-            group = own["x-group"]
+    for field, node in schema.get("properties", {}).items():
+        if node.get("x-group", "") != group:
+            group = node["x-group"]
             rows.append(f"| **{group}** | | |")
-        kind = f"{_type(own)}{_limits(field, own, required)}"
-        rows.append(f"| `{field}` | {kind} | {_cell(own.get('description', ''))} |")
+        kind = f"{_type(node)}{_limits(field, node, required)}"
+        rows.append(f"| `{field}` | {kind} | {_cell(node.get('description', ''))} |")
     text = _cell(schema.get("description", ""))
     if "properties" not in schema:
         return "\n".join([f"### {name}", "", text, "", f"{_type(schema)}.", ""])

@@ -19,9 +19,9 @@ ROUNDS = 3
 """Number of linearisations of jerk limits and friction around the previous profile."""
 THERMAL = 0.25
 """Weight of ThermalEnergy, which is four times ∫ Σ (normalize · tau)² dt in copp 0.2."""
-TYPICAL = 0.5
+TYPICAL_SPEED = 0.5
 """Speed at which concave friction is evaluated over the largest speed [1]."""
-FLOOR = 1e-3
+LEAST_SPEED = 1e-3
 """Smallest speed at which friction work is linearised over the largest speed [1]."""
 
 
@@ -115,7 +115,7 @@ class CoppLine:
         drives, electronics = self.robot.drives, self.robot.electronics
         viscous = float(self.robot.friction.viscous @ travel**2)
         weights = np.gradient(STATIONS)
-        speed = np.sqrt(np.maximum(around, FLOOR**2 * around.max()))
+        speed = np.sqrt(np.maximum(around, LEAST_SPEED**2 * around.max()))
         return [
             copp.objective.Time(electronics.idle_power + electronics.controller_power),
             copp.objective.ThermalEnergy(THERMAL, np.sqrt(drives.copper) / drives.torque_constant),
@@ -124,7 +124,7 @@ class CoppLine:
 
     def _arm(self, q_start: Array, travel: Array) -> copp.Robot:
         robot, limits, count = self.robot, self.robot.limits, len(STATIONS)
-        dry = robot.friction.torque(TYPICAL * limits.v_max * travel / np.abs(travel).max())
+        dry = robot.friction.torque(TYPICAL_SPEED * limits.v_max * travel / np.abs(travel).max())
 
         def torque(q: Array, v: Array, a: Array) -> Array:
             return np.asarray(pin.rnea(robot.model, self.data, q, v, a) + dry)

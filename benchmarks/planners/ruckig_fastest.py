@@ -8,7 +8,7 @@ import ruckig
 from benchmarks.motion import Motion
 from joulepath.models.robot import Array, Robot
 
-INSTANT = 1e-6
+STEP = 1e-6
 """Step of the finite differences from acceleration to jerk [s]."""
 
 
@@ -27,9 +27,9 @@ class RuckigMotion:
         """See `Motion.sample`."""
         states = np.array([self.trajectory.at_time(instant) for instant in t.tolist()])
         before = np.array(
-            [self.trajectory.at_time(max(instant - INSTANT, 0.0))[2] for instant in t.tolist()]
+            [self.trajectory.at_time(max(instant - STEP, 0.0))[2] for instant in t.tolist()]
         )
-        jerk = (states[:, 2] - before) / INSTANT
+        jerk = (states[:, 2] - before) / STEP
         return states[:, 0], states[:, 1], states[:, 2], jerk
 
 
