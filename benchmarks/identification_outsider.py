@@ -18,7 +18,6 @@ from benchmarks.public_logs import panda_by_inria, panda_by_unisa, ur10e_split
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.identify.arm.fitted_arm import own_arm
-from joulepath.optimizer.identify.arm.logged_torque import logged_torque
 from joulepath.optimizer.identify.fits.by_method import prepare
 from joulepath.optimizer.identify.fits.fitting import fit_rows
 from joulepath.optimizer.identify.logs.log import Log
@@ -67,10 +66,10 @@ def _ratios(robot: Robot, logs: Sequence[Log], parts: Sequence[tuple[Rows, Rows]
     _, options = prepare(robot, logs, IdentificationOptions(held_out=0.0))
     squares, own = list[list[Array]](), own_arm(robot)
     for seen, rest in parts:
-        arm, torque = fit_rows(robot, seen, options).arm, logged_torque(own, rest)
+        arm, torque = fit_rows(robot, seen, options).arm, own.logged_torque(rest)
         # in the outsider's unit: currents times the robot's own torque constants
         ours = arm.measured_torque(rest) * own.torque_constant / arm.torque_constant
-        predicted = [ours, *_outsiders(seen, logged_torque(own, seen), rest)]
+        predicted = [ours, *_outsiders(seen, own.logged_torque(seen), rest)]
         moving = np.abs(rest.v) > MOVING
         squares.append([(moving * (each - torque) ** 2).sum(axis=0) for each in predicted])
     ours, *others = np.sum(squares, axis=0)

@@ -2,7 +2,7 @@
 
 This module has the base classes and the errors shared by several rooms. Errors of a single room are
 declared there: `kinematics.errors`, `search.errors`, `cycle.errors`, `export.errors`,
-`excitation.errors`, `joint_limits.errors`, `identify.errors` and `identify.logs.log_errors`.
+`excitation.errors`, `joint_limits.errors` and `identify.errors`.
 """
 
 from __future__ import annotations

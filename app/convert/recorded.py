@@ -16,8 +16,8 @@ from joulepath.app.schemas.arm import Payload
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from joulepath.optimizer.context_value import assigned
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identify.errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import LogReading, check_header, read_log
 from joulepath.optimizer.problem import arm as library

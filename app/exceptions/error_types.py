@@ -12,7 +12,6 @@ from joulepath.optimizer.exceptions import DeclaredError
 from joulepath.optimizer.excitation import errors as excitation
 from joulepath.optimizer.export import errors as exports
 from joulepath.optimizer.identify import errors as identification
-from joulepath.optimizer.identify.logs import log_errors as logs
 from joulepath.optimizer.joint_limits import errors as joint_limits
 from joulepath.optimizer.kinematics import errors as kinematics
 from joulepath.optimizer.placement import errors as placements
@@ -20,7 +19,7 @@ from joulepath.optimizer.search import errors as search
 
 _MODULES = (
     *(base, library, kinematics, search, sequence, placements, given_motions, exports),
-    *(joint_limits, logs, identification, excitation, stored, queue, access, transport, report),
+    *(joint_limits, identification, excitation, stored, queue, access, transport, report),
 )
 """Modules with declared errors, in the order of the reference."""
 

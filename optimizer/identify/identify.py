@@ -11,7 +11,6 @@ import numpy as np
 from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.fitted_arm import own_arm
-from joulepath.optimizer.identify.arm.logged_torque import logged_torque, motor_torque
 from joulepath.optimizer.identify.document import document_of
 from joulepath.optimizer.identify.fits.by_method import fit_by_method, prepare
 from joulepath.optimizer.identify.fits.fitting import FitResult
@@ -26,14 +25,17 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.advice import advice_of
 from joulepath.optimizer.identify.quality.answered import AnsweredEnergies
-from joulepath.optimizer.identify.quality.curves import curves_of
-from joulepath.optimizer.identify.quality.figures import figures_of
+from joulepath.optimizer.identify.quality.figures import figures_of, parameters_of
 from joulepath.optimizer.identify.quality.interval import Spread, spread_of
 from joulepath.optimizer.identify.quality.mains import IdentifiedMains, fit_mains
-from joulepath.optimizer.identify.quality.parameters import parameters_of
 from joulepath.optimizer.identify.quality.residuals import residuals_of
 from joulepath.optimizer.identify.quality.structure import physical_of, structure_of
-from joulepath.optimizer.identify.quality.validation import Fold, validate
+from joulepath.optimizer.identify.quality.validation import (
+    Fold,
+    curves_of,
+    held_out_masks,
+    validate,
+)
 from joulepath.optimizer.identify.results import (
     Advice,
     Curves,
@@ -47,7 +49,6 @@ from joulepath.optimizer.identify.results import (
     Validation,
 )
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
-from joulepath.optimizer.identify.rows.split import held_out_masks
 from joulepath.optimizer.linear_algebra import one_thread
 from joulepath.optimizer.presentation.declared_fields import shown_fields
 from joulepath.optimizer.presentation.progress_bar import progress_bar
@@ -253,7 +254,7 @@ def _identified(
         physical=None if options.reduced else physical_of(robot, fitted.arm),
         residuals=residuals_of(fitted, rows, threshold),
         temperatures=temperatures_of(
-            rows, motor_torque(fitted.arm, rows), fitted.arm, fitted.clusters, threshold
+            rows, fitted.arm.motor_torque(rows), fitted.arm, fitted.clusters, threshold
         ),
         validation=validation,
         payload=payload,
@@ -298,7 +299,7 @@ def _payload(
     if "payload" not in options.fit:
         return None
     return fit_payload(
-        robot, rows, logged_torque(own_arm(robot), rows), last, options.velocity_threshold
+        robot, rows, own_arm(robot).logged_torque(rows), last, options.velocity_threshold
     )
 
 

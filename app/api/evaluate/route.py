@@ -22,7 +22,7 @@ from joulepath.app.http.openapi import problem_responses
 from joulepath.app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from joulepath.app.tasks.job_body import JobBodyTask
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
+from joulepath.optimizer.identify.errors import LogTooLarge
 
 router = APIRouter(tags=["motion"])
 

@@ -30,7 +30,7 @@ from joulepath.app.schemas.queries import NewName
 from joulepath.app.store import logs
 from joulepath.app.store.tables import StoredLog, new_id, now
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
+from joulepath.optimizer.identify.errors import EffortNotUsable, LogTooLarge
 
 router = APIRouter(prefix="/logs", tags=["logs"], route_class=JsonRoute)
 

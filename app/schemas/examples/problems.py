@@ -28,12 +28,13 @@ from joulepath.optimizer.exceptions import (
 from joulepath.optimizer.excitation.errors import ExcitationInfeasible
 from joulepath.optimizer.export.errors import FormatUnsuitable
 from joulepath.optimizer.identify.errors import (
+    EffortNotUsable,
+    LogTooLarge,
     MethodNotApplicable,
     NotExcited,
     NothingHeldOut,
     PayloadUnknown,
 )
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from joulepath.optimizer.joint_limits.errors import NoJointLimits
 from joulepath.optimizer.kinematics.errors import OrientationNotHeld
 from joulepath.optimizer.placement.errors import NoPlacement, ReasonCounts

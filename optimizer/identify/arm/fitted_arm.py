@@ -19,6 +19,7 @@ from joulepath.optimizer.identify.arm.power_model import (
     TorqueParts,
     bus_power,
     friction_torque,
+    power_of_torque,
 )
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.options import Coupling
@@ -107,6 +108,26 @@ class FittedArm:
         friction = sensor.sensor_coulomb * rows.drags[:, :, sensor.reversal]
         friction = friction + sensor.sensor_viscous * rows.v
         return np.asarray((1 + sensor.sensor_gain) * rigid + friction + sensor.offset)
+
+    def logged_torque(self, rows: Rows) -> Array:
+        """Logged torques (n, nq) [N·m] of motors or links, NaN if not logged."""
+        return rows.effort * self.torque_constant if rows.current else rows.effort
+
+    def motor_torque(self, rows: Rows) -> Array:
+        """Logged motor torques (n, nq) [N·m], NaN if not logged or measured behind the gears."""
+        return np.full_like(rows.v, np.nan) if rows.link_side else self.logged_torque(rows)
+
+    def measured_power(self, rows: Rows) -> Array:
+        """Power (n,) [W] on the bus: as logged, or else by the logged torques of the motors and the
+        arm's idle power and losses. NaN without either."""
+        by_torque = power_of_torque(
+            self.power_parameters,
+            rows.v,
+            self.motor_torque(rows),
+            self.torque_constant,
+            self.regeneration,
+        )
+        return np.where(np.isfinite(rows.power), rows.power, by_torque)
 
     def torque_parts(self, rows: Rows) -> TorqueParts:
         """Torque parts for the computation of the power."""

@@ -4,7 +4,7 @@ Residuals of neighbouring rows are correlated, so the textbook covariance counts
 as independent. Moves are independent of one another. The covariance here is the jackknife over
 moves (Quenouille, Tukey; for clustered rows it is the estimator CV3 of MacKinnon, Nielsen and Webb
 2023): the fit is repeated without one move at a time, and the spread of these estimates is the
-standard error.
+standard error. Weights of rows reject outliers, or balance joints of different noise.
 """
 
 from __future__ import annotations
@@ -213,3 +213,47 @@ def lag_one_correlation(residuals: Array, group: IntArray) -> float:
     if square <= 0:
         return 0.0
     return float(residuals[1:][neighbours] @ residuals[:-1][neighbours] / square)
+
+
+NORMAL_MEDIAN_ABS = 0.6744897501960817
+"""Median of |x| for a standard normal x."""
+
+
+@dataclass(frozen=True)
+class BisquareSettings:
+    """Settings of Tukey's bisquare weights."""
+
+    cutoff: float = 4.685
+    """Robust standard deviations from which on a residual has no weight [1]; 95 % efficient for
+    Gaussian errors."""
+
+
+BISQUARE = BisquareSettings()
+
+
+def bisquare_weights(residuals: Array, settings: BisquareSettings = BISQUARE) -> Array:
+    """Tukey's bisquare weights (n,) of residuals (n,).
+
+    Residuals are scaled by their median absolute value. If most residuals are 0, all weights are 1.
+    """
+    size = float(np.median(np.abs(residuals))) / NORMAL_MEDIAN_ABS if residuals.size else 0.0
+    if size <= 0:
+        return np.ones_like(residuals)
+    return np.asarray(np.maximum(1 - (residuals / (settings.cutoff * size)) ** 2, 0.0) ** 2)
+
+
+def inverse_variance_weights(joint: IntArray, residuals: Array, robust: bool) -> Array:
+    """Weights (n,) of rows by the inverse variance of the residuals of their joint.
+
+    Args:
+        joint: joint of a row (n,), from 0.
+        residuals: residuals (n,).
+        robust: whether to multiply by bisquare weights, against outliers.
+    """
+    weight = np.ones_like(residuals)
+    for number in np.unique(joint):
+        rows = joint == number
+        share = bisquare_weights(residuals[rows]) if robust else np.ones(int(rows.sum()))
+        variance = float(share @ residuals[rows] ** 2 / max(share.sum(), 1e-300))
+        weight[rows] = share / max(variance, 1e-12)
+    return weight

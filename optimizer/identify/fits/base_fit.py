@@ -16,12 +16,14 @@ from joulepath.models.robot import Array, Mask, Robot
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, body_parameters
 from joulepath.optimizer.identify.arm.base_parameters import BaseParameters, base_parameters
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, lower_bounds
-from joulepath.optimizer.identify.choices import Estimator
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, solve_bounded
-from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
-from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations, own_value
-from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
+from joulepath.optimizer.identify.estimates.grouped import (
+    GroupedEquations,
+    inverse_variance_weights,
+    solve_bounded,
+)
+from joulepath.optimizer.identify.fits.block import PASSES, JointBlock, LawEquations, own_value
+from joulepath.optimizer.identify.fits.curve_speed import with_curve_speeds
 from joulepath.optimizer.identify.fits.determined import (
     DETERMINED,
     IMPOSSIBLE,
@@ -43,26 +45,6 @@ from joulepath.optimizer.identify.rows.clusters import Clusters
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 ROTOR = "rotor_inertia"
-
-
-@dataclass(frozen=True)
-class BaseFitSettings:
-    """Solutions of each estimator; all but the first reweight the rows."""
-
-    ols_passes: int = 1
-    wls_passes: int = 3
-    irls_passes: int = 8
-
-    def passes(self, estimator: Estimator) -> int:
-        """Solutions of an estimator."""
-        return {
-            "ols": self.ols_passes,
-            "wls": self.wls_passes,
-            "irls": self.irls_passes,
-        }[estimator]
-
-
-BASE_FIT = BaseFitSettings()
 
 
 class Doubts(NamedTuple):
@@ -186,10 +168,8 @@ def fit_base(
         clusters: partition of the rows for the jackknife.
         options: requested figures and estimator.
     """
-    speeds = curve_speeds(robot, rows, torque, clusters, options)
-    return with_speeds(
-        robot, speeds, lambda speeds: _fit(robot, rows, torque, clusters, options, speeds)
-    )
+    given = robot, rows, torque, clusters, options
+    return with_curve_speeds(lambda speeds: _fit(*given, speeds), *given)
 
 
 def _fit(
@@ -205,7 +185,7 @@ def _fit(
     terms = base_terms(robot, arm, options)
     columns, lower, block = terms.columns(arm), terms.lower, arm.block
     weight, every = np.ones_like(arm.values), (columns, block.unrequested_columns)
-    for _ in range(BASE_FIT.passes(options.estimator)):
+    for _ in range(PASSES.of(options.estimator, PASSES.wls_of_arm)):
         equations = LawEquations(
             GroupedEquations.of(every, arm.values, weight, block.cluster, clusters.count), robot.nq
         )

@@ -22,9 +22,9 @@ from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
     IntArray,
+    inverse_variance_weights,
     solve_bounded,
 )
-from joulepath.optimizer.identify.estimates.robust import inverse_variance_weights
 from joulepath.optimizer.identify.fits.own_ranges import own_deviations
 from joulepath.optimizer.identify.options import Coupling, IdentificationOptions
 from joulepath.optimizer.identify.rows.clusters import Clusters
@@ -32,24 +32,21 @@ from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
 @dataclass(frozen=True)
-class BlockFitSettings:
-    """Number of solutions per estimator; the second and later ones use new weights of the rows."""
+class PassSettings:
+    """Numbers of solutions; the second and later ones use new weights of the rows."""
 
-    ols_passes: int = 1
-    wls_passes: int = 2
-    """For several joints; the rows of one joint have equal weights."""
-    irls_passes: int = 8
+    wls_of_block: int = 2
+    """With `wls`, for several joints; the rows of one joint have equal weights."""
+    wls_of_arm: int = 3
+    """With `wls`, for base parameters and friction of the whole arm."""
+    irls: int = 8
 
-    def passes(self, estimator: Estimator, joints: int) -> int:
-        """Number of solutions of an estimator for a block of some joints."""
-        return {
-            "ols": self.ols_passes,
-            "wls": self.wls_passes if joints > 1 else 1,
-            "irls": self.irls_passes,
-        }[estimator]
+    def of(self, estimator: Estimator, wls: int) -> int:
+        """Number of solutions of an estimator, which is `wls` for weighted least squares."""
+        return {"ols": 1, "wls": wls, "irls": self.irls}[estimator]
 
 
-BLOCK_FIT = BlockFitSettings()
+PASSES = PassSettings()
 SCALE = "scale"
 """Factor on the rigid torque: the robot's own torque constant over the real one."""
 
@@ -258,7 +255,9 @@ def weighted_solution(
 ) -> tuple[Array, Array]:
     """Solution (p,) and weights (n,) of the rows."""
     weight = np.ones_like(block.values)
-    for step in range(passes := BLOCK_FIT.passes(options.estimator, len(np.unique(block.joint)))):
+    one_joint = len(np.unique(block.joint)) <= 1
+    passes = PASSES.of(options.estimator, 1 if one_joint else PASSES.wls_of_block)
+    for step in range(passes):
         grouped = GroupedEquations.of(
             block.columns, block.values, weight, block.cluster, clusters.count
         )

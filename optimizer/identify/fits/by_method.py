@@ -11,7 +11,6 @@ from joulepath.models.robot import Robot
 from joulepath.models.trust import trust_letters
 from joulepath.models.uncertainty.ranges import ENGINEERING
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.arm.logged_torque import motor_torque
 from joulepath.optimizer.identify.errors import MethodNotApplicable
 from joulepath.optimizer.identify.fits.fitting import FitResult, fit_rows
 from joulepath.optimizer.identify.fits.periodic import cut_into_periods
@@ -71,13 +70,13 @@ def fit_by_method(robot: Robot, rows: Rows, options: IdentificationOptions) -> F
     """Fit the rows of prepared logs by the method of the options."""
     fitted = fit_rows(robot, rows, options)
     if options.method == "threshold_velocity":
-        found = thresholds_of(fitted.arm, rows, motor_torque(fitted.arm, rows))
+        found = thresholds_of(fitted.arm, rows, fitted.arm.motor_torque(rows))
         thresholds = np.maximum(found, options.velocity_threshold)
         fast_rows = without_slow_efforts(rows, thresholds)
         return replace(fit_rows(robot, fast_rows, options), thresholds=thresholds)
     if options.method == "temperature":
         for _ in range(TEMPERATURE.passes):
-            torque = motor_torque(fitted.arm, rows)
+            torque = fitted.arm.motor_torque(rows)
             warm = temperatures_of(
                 rows, torque, fitted.arm, fitted.clusters, options.velocity_threshold
             )

@@ -34,18 +34,10 @@ class CurveSpeedSettings:
 CURVE_SPEED = CurveSpeedSettings()
 
 
-def curve_speeds(
+def _best_speeds(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: IdentificationOptions
 ) -> Array | None:
-    """Best speeds (nq,) [rad/s] of the curved terms; None if these are not fitted.
-
-    Args:
-        robot: the robot with its own figures.
-        rows: rows of the logs.
-        torque: torques (n, nq) [N·m], NaN if not logged.
-        clusters: partition of the rows.
-        options: requested figures; coupled joints share a speed.
-    """
+    """Best speeds (nq,) [rad/s] of the curved terms; None if these are not fitted."""
     if "curved" not in options.terms or "friction" not in options.targets:
         return None
     found = np.array(robot.friction.speed)
@@ -81,18 +73,27 @@ def coupled_joints(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
     return [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
 
 
-def with_speeds(
-    robot: Robot, speeds: Array | None, fit: Callable[[Array | None], Estimate]
+def with_curve_speeds(
+    fit: Callable[[Array | None], Estimate],
+    robot: Robot,
+    rows: Rows,
+    torque: Array,
+    clusters: Clusters,
+    options: IdentificationOptions,
 ) -> Estimate:
-    """Fit with the speeds of the curved terms as further figures.
+    """Fit with the best speeds of the curved terms as further figures.
 
     A curved term kept at the robot's own value also keeps the robot's own speed scale.
 
     Args:
+        fit: fit for given speeds (nq,) [rad/s]; for None if the curved terms are not fitted.
         robot: the robot with its own figures.
-        speeds: speeds (nq,) [rad/s]; None if the curved terms are not fitted.
-        fit: fit for given speeds (nq,).
+        rows: rows of the logs.
+        torque: torques (n, nq) [N·m], NaN if not logged.
+        clusters: partition of the rows.
+        options: requested figures; coupled joints share a speed.
     """
+    speeds = _best_speeds(robot, rows, torque, clusters, options)
     while True:
         found = fit(speeds)
         if speeds is None:

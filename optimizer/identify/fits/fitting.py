@@ -11,7 +11,6 @@ from joulepath.models.robot import Array, Robot
 from joulepath.models.uncertainty.spread import root_of
 from joulepath.optimizer.dynamics.link_regressor import body_parameters
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm, with_torques
-from joulepath.optimizer.identify.arm.logged_torque import logged_torque
 from joulepath.optimizer.identify.arm.power_model import PowerParameters, packed_size
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name, join_estimates
 from joulepath.optimizer.identify.fits.base_fit import BaseTerms, fit_base
@@ -91,7 +90,7 @@ class FitResult:
 def fit_rows(robot: Robot, rows: Rows, options: IdentificationOptions) -> FitResult:
     """Fit the logged channels: torques, power or both; or the wrench beneath the base."""
     clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
-    torque, with_power = logged_torque(arm, rows), bool(np.isfinite(rows.power).any())
+    torque, with_power = arm.logged_torque(rows), bool(np.isfinite(rows.power).any())
     size = packed_size(robot.nq)
     moving_power = rows.power[np.isfinite(rows.power) & ~rows.rest]
     fitted = FitResult(

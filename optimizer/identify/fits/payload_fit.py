@@ -16,7 +16,6 @@ from joulepath.models.robot import Array, Robot, flange_placement
 from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, rigid_torques
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.arm.friction_columns import columns
-from joulepath.optimizer.identify.arm.link_errors import link_deviations
 from joulepath.optimizer.identify.estimates.estimate import Name
 from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
@@ -27,6 +26,7 @@ from joulepath.optimizer.identify.estimates.grouped import (
 )
 from joulepath.optimizer.identify.fits.block import moving_rows
 from joulepath.optimizer.identify.fits.determined import DETERMINED
+from joulepath.optimizer.identify.fits.own_ranges import link_deviations
 from joulepath.optimizer.identify.fits.torque_fit import TORQUE_FIT
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.results import IdentifiedParameter

@@ -21,7 +21,7 @@ from joulepath.optimizer.identify.fits.base_fit import (
     base_regression,
     base_terms,
 )
-from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
+from joulepath.optimizer.identify.fits.curve_speed import with_curve_speeds
 from joulepath.optimizer.identify.fits.determined import with_reasons
 from joulepath.optimizer.identify.fits.torque_fit import by_held_values, held_deviations
 from joulepath.optimizer.identify.fits.whole_arm import WholeArmRegression
@@ -116,8 +116,7 @@ def fit_periodic(
         measured = replace(measured, excess=excess)
         return found
 
-    found = with_speeds(robot, curve_speeds(robot, mean, torque, one, options), fit)
-    return found, measured
+    return with_curve_speeds(fit, robot, mean, torque, one, options), measured
 
 
 def _most_likely(

@@ -25,7 +25,6 @@ from joulepath.models.uncertainty.ranges import (
     lognormal,
     range_of,
 )
-from joulepath.optimizer.identify.arm.link_errors import LINK_ERRORS
 from joulepath.optimizer.identify.arm.power_model import (
     PowerParameters,
     TorqueParts,
@@ -34,12 +33,17 @@ from joulepath.optimizer.identify.arm.power_model import (
 )
 from joulepath.optimizer.identify.estimates.grouped import (
     GroupedEquations,
+    bisquare_weights,
     jackknife,
     leave_one_out,
     residual_replicates,
 )
-from joulepath.optimizer.identify.estimates.robust import bisquare_weights
-from joulepath.optimizer.identify.fits.own_ranges import friction_width, own_range, rotor_width
+from joulepath.optimizer.identify.fits.own_ranges import (
+    LINK_ERRORS,
+    friction_width,
+    own_range,
+    rotor_width,
+)
 from joulepath.optimizer.identify.rows.clusters import Clusters, effective_variance
 
 

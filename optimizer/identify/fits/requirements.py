@@ -9,11 +9,15 @@ import numpy as np
 
 from joulepath.models.robot import Robot
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.errors import NoPowerChannel, NotExcited, PayloadUnknown
+from joulepath.optimizer.identify.errors import (
+    EffortNotUsable,
+    NoPowerChannel,
+    NotExcited,
+    PayloadUnknown,
+)
 from joulepath.optimizer.identify.fits.block import SCALE, terms_of
 from joulepath.optimizer.identify.fits.payload_fit import joints_without_gravity
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.results import IdentifiedParameter
 from joulepath.optimizer.identify.rows.fit_rows import Rows

@@ -23,11 +23,7 @@ from joulepath.optimizer.identify.fits.block import (
     joint_block,
     weighted_solution,
 )
-from joulepath.optimizer.identify.fits.curve_speed import (
-    coupled_joints,
-    curve_speeds,
-    with_speeds,
-)
+from joulepath.optimizer.identify.fits.curve_speed import coupled_joints, with_curve_speeds
 from joulepath.optimizer.identify.fits.determined import (
     AT_BOUND,
     DETERMINED,
@@ -90,7 +86,7 @@ def fit_torques(
         constants = "torque_constant" in options.targets
         return _with_torque_constants(robot, found) if constants else found
 
-    return with_speeds(robot, curve_speeds(robot, rows, torque, clusters, options), fit)
+    return with_curve_speeds(fit, robot, rows, torque, clusters, options)
 
 
 def _with_torque_constants(robot: Robot, found: Estimate) -> Estimate:

@@ -18,11 +18,10 @@ from joulepath.optimizer.dynamics.link_regressor import PARAMETERS_PER_BODY, bod
 from joulepath.optimizer.identify.arm.friction_columns import COUPLED, SENSOR_GAIN
 from joulepath.optimizer.identify.arm.pseudo_inertia import distance_metric
 from joulepath.optimizer.identify.estimates.estimate import Estimate, Name
-from joulepath.optimizer.identify.estimates.grouped import GroupedEquations
-from joulepath.optimizer.identify.estimates.robust import bisquare_weights
+from joulepath.optimizer.identify.estimates.grouped import GroupedEquations, bisquare_weights
 from joulepath.optimizer.identify.fits.block import JointBlock, LawEquations
 from joulepath.optimizer.identify.fits.consistent import solve_consistent
-from joulepath.optimizer.identify.fits.curve_speed import curve_speeds, with_speeds
+from joulepath.optimizer.identify.fits.curve_speed import with_curve_speeds
 from joulepath.optimizer.identify.fits.determined import (
     unbounded,
     with_reasons,
@@ -80,10 +79,8 @@ def fit_whole(
         clusters: partition of the rows for the jackknife.
         options: requested figures and weight of the prior.
     """
-    speeds = curve_speeds(robot, rows, torque, clusters, options)
-    return with_speeds(
-        robot, speeds, lambda speeds: _fit(robot, rows, torque, clusters, options, speeds)
-    )
+    given = robot, rows, torque, clusters, options
+    return with_curve_speeds(lambda speeds: _fit(*given, speeds), *given)
 
 
 def _fit(

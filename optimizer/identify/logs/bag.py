@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import RawIOBase
 from itertools import chain, islice
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -16,8 +17,7 @@ import numpy as np
 
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
-from joulepath.optimizer.identify.logs.piece_reader import PieceReader
+from joulepath.optimizer.identify.errors import LogTooLarge
 
 _MAGIC = {b"SQLite format 3\x00": ".db3", b"\x89MCAP0\r\n": ".mcap"}
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -126,3 +126,37 @@ def _on_disk(file: BinaryIO, kind: str, max_bytes: int) -> Iterator[Path]:
             copy.write(part)
         copy.flush()
         yield Path(os.fspath(copy.name))
+
+
+class PieceReader(RawIOBase):
+    """A readable binary file over a source of pieces.
+
+    Args:
+        next_piece: returns the next piece, of any size, for a requested number of bytes; returns
+            an empty piece at the end of the file.
+        close: closes the source of the pieces.
+    """
+
+    def __init__(
+        self, next_piece: Callable[[int], bytes], close: Callable[[], object] | None = None
+    ) -> None:
+        self._next_piece, self._close = next_piece, close
+        self._rest = b""
+
+    def readable(self) -> bool:
+        """Always true."""
+        return True
+
+    def readinto(self, buffer: Any, /) -> int:
+        """Read into a buffer; raises the errors of the pieces."""
+        view = memoryview(buffer)
+        piece = self._rest or self._next_piece(len(view))
+        count = min(len(view), len(piece))
+        view[:count], self._rest = piece[:count], piece[count:]
+        return count
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._close is not None:
+            self._close()
+        super().close()

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identify.errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.lag import smooth, without_spikes
 from joulepath.optimizer.identify.logs.log import EffortMeaning
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log_warnings import named_joints
 from joulepath.optimizer.identify.logs.motion import LoggedMotion, smooth_sign, thinned
 

@@ -17,10 +17,9 @@ from joulepath.optimizer.csv_table import line_of, names_of, numbers_of, with_po
 from joulepath.optimizer.deadline import checkpoint
 from joulepath.optimizer.evaluate.recording import MOTION_LIMITS
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.bag import bag_text, kind_of_bag
+from joulepath.optimizer.identify.errors import LogTooLarge
+from joulepath.optimizer.identify.logs.bag import PieceReader, bag_text, kind_of_bag
 from joulepath.optimizer.identify.logs.head import HEAD, Head, is_comment
-from joulepath.optimizer.identify.logs.log_errors import LogTooLarge
-from joulepath.optimizer.identify.logs.piece_reader import PieceReader
 
 _GZIP_MAGIC = b"\x1f\x8b"
 

@@ -13,7 +13,12 @@ import numpy as np
 from joulepath.models.robot import Array, Robot
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.logs.columns import EFFORTS, NOT_LOGGED, Columns
-from joulepath.optimizer.identify.logs.effort import EffortReport, effort_report
+from joulepath.optimizer.identify.logs.effort import (
+    EffortReport,
+    choose_meaning,
+    effort_report,
+    unmeasured,
+)
 from joulepath.optimizer.identify.logs.effort_checks import (
     check_signs,
     effort_warnings,
@@ -28,12 +33,10 @@ from joulepath.optimizer.identify.logs.lag import effort_lag, power_lag
 from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.log_formats import ChannelName
 from joulepath.optimizer.identify.logs.log_options import LogOptions
-from joulepath.optimizer.identify.logs.log_report import Channel, LogReport
 from joulepath.optimizer.identify.logs.log_warnings import held_warning, log_warnings, named_joints
 from joulepath.optimizer.identify.logs.motion import LoggedMotion
 from joulepath.optimizer.identify.logs.moves import cut_into_moves, rests_by_command, rests_by_speed
 from joulepath.optimizer.identify.logs.speeds import speeds_of
-from joulepath.optimizer.identify.logs.usable_effort import choose_meaning, unmeasured
 from joulepath.optimizer.problem.arm import Payload
 from joulepath.optimizer.problem.arrays import frozen
 
@@ -294,3 +297,33 @@ def _range(values: Array) -> tuple[float, float]:
     """Least and greatest value, with the digits of single precision."""
     low, high = (float(f"{each:.7g}") for each in (values.min(), values.max()))
     return low, high
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel of a log."""
+
+    name: str
+    column: str | None
+    """Column of the file; None for a channel computed from another one."""
+    unit: str
+    min: float
+    max: float
+    noise: float
+    """Robust standard deviation of the part above the band of the filter."""
+
+
+@dataclass(frozen=True)
+class LogReport:
+    """Findings of the reading of a log."""
+
+    rows: int
+    """Number of rows."""
+    dropped: int
+    """Number of lines dropped for their number of cells."""
+    jitter: tuple[float, float]
+    """5th and 95th percentile of the deviation of a time step [s]."""
+    channels: tuple[Channel, ...]
+    effort: EffortReport | None
+    """Meaning of the efforts; None if no efforts were logged."""
+    warnings: tuple[str, ...]

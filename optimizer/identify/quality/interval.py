@@ -2,7 +2,7 @@
 
 The covariance of the figures alone is far too narrow. Every move has an error beyond the figures of
 the model, and friction differs from day to day. Both errors are measured: the first with moves left
-out of the fit, the second with logs of different days.
+out of the fit, the second with logs of different days, by their measured over fitted friction.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import stdtrit
 
-from joulepath.models.robot import Array
+from joulepath.models.robot import Array, Mask
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm
-from joulepath.optimizer.identify.arm.logged_torque import measured_power
 from joulepath.optimizer.identify.estimates.grouped import jackknife
 from joulepath.optimizer.identify.fits.fitting import FitResult
-from joulepath.optimizer.identify.quality.measured_friction import MeasuredFriction
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
 
@@ -117,7 +115,7 @@ def _move_sd(fitted: FitResult, rows: Rows, friction: MeasuredFriction) -> float
     friction is scaled to the other rows of the same log, because a difference between days is no
     error of the move.
     """
-    measured = measured_power(fitted.arm, rows)
+    measured = fitted.arm.measured_power(rows)
     use = np.isfinite(measured) & ~rows.rest
     days = len(np.unique(rows.log)) > 1
     squares, explained = list[float](), list[float]()
@@ -183,3 +181,42 @@ def session_sd(factors: Array) -> Array:
         wider = float(stdtrit(logs[joint] - 1, 0.95)) / P95
         found[joint] = max(found[joint], wider * spread)
     return np.asarray(found * np.sqrt(1 + 1 / np.maximum(logs, 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFriction:
+    """Products of measured and fitted friction torques per row and joint, shape (n, nq) [N²·m²].
+
+    The products are 0 for slow joints and without a logged motor torque.
+    """
+
+    product: Array
+    """Product of measured and fitted friction."""
+    square: Array
+    """Square of the fitted friction."""
+
+    @classmethod
+    def of(cls, arm: FittedArm, rows: Rows, threshold: float) -> MeasuredFriction:
+        """Friction of the joints at speeds above `threshold` [rad/s]."""
+        torque = arm.motor_torque(rows)
+        use = np.isfinite(torque) & (np.abs(rows.v) > threshold)
+        fitted = np.where(use, arm.friction_torque(rows) - arm.offset, 0.0)
+        measured = np.where(use, torque - arm.link_torque(rows) - arm.offset, 0.0)
+        return cls(fitted * measured, fitted**2)
+
+    def factor(self, use: Mask) -> Array:
+        """Least-squares ratio of measured to fitted friction per joint.
+
+        Args:
+            use: mask of the rows, shape (n,).
+
+        Returns:
+            Ratio, shape (nq,) [1]; NaN for a joint without a fast row.
+        """
+        product, square = self.product[use].sum(axis=0), self.square[use].sum(axis=0)
+        return np.asarray(product / np.where(square > 0, square, np.nan))
+
+    def mean_factor(self, use: Mask) -> float:
+        """Least-squares ratio of measured to fitted friction over all joints [1]."""
+        square = self.square[use].sum()
+        return float(self.product[use].sum() / square) if square > 0 else np.nan

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joulepath.optimizer.identify.arm.logged_torque import logged_torque
 from joulepath.optimizer.identify.estimates.grouped import lag_one_correlation
 from joulepath.optimizer.identify.fits.fitting import FitResult
-from joulepath.optimizer.identify.quality.measured_friction import MeasuredFriction
+from joulepath.optimizer.identify.quality.interval import MeasuredFriction
 from joulepath.optimizer.identify.results import Residuals
 from joulepath.optimizer.identify.rows.fit_rows import Rows
 
@@ -33,7 +32,7 @@ def residuals_of(fitted: FitResult, rows: Rows, threshold: float) -> Residuals:
         rows: rows of the fit.
         threshold: speed above which the torque of a joint counts [rad/s].
     """
-    error = logged_torque(fitted.arm, rows) - fitted.arm.measured_torque(rows)
+    error = fitted.arm.logged_torque(rows) - fitted.arm.measured_torque(rows)
     moving = np.abs(rows.v) > threshold
     of_torque = np.full(rows.v.shape[1], np.nan)
     for joint in range(len(of_torque)):

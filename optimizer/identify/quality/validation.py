@@ -1,4 +1,7 @@
-"""Errors of figures on rows that were not part of their fit."""
+"""Rows that are held out of a fit, the errors of its figures on them, and their curves.
+
+The split is by whole motions, never by single samples.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joulepath.models.robot import Array, Robot
+from joulepath.models.robot import Array, Mask, Robot
 from joulepath.models.uncertainty.ranges import P95
 from joulepath.optimizer.identify.arm.fitted_arm import FittedArm, own_arm
-from joulepath.optimizer.identify.arm.logged_torque import logged_torque, measured_power
+from joulepath.optimizer.identify.errors import NothingHeldOut
 from joulepath.optimizer.identify.estimates.grouped import IntArray
 from joulepath.optimizer.identify.fits.fitting import FitResult
-from joulepath.optimizer.identify.quality.curves import curves_of
 from joulepath.optimizer.identify.quality.interval import Spread, energy_sd
 from joulepath.optimizer.identify.results import (
     ComparedEnergy,
+    Curves,
     PowerErrors,
     Prediction,
     TorqueErrors,
@@ -81,7 +84,7 @@ def torque_errors(folds: Sequence[tuple[FittedArm, Rows]], threshold: float) -> 
         threshold: smallest speed of a moving joint [rad/s].
     """
     parts = [
-        (logged_torque(arm, rows), arm.measured_torque(rows), rows.v, rows.weight)
+        (arm.logged_torque(rows), arm.measured_torque(rows), rows.v, rows.weight)
         for arm, rows in folds
     ]
     measured, predicted, v, weight = (np.concatenate(each) for each in zip(*parts, strict=True))
@@ -153,7 +156,7 @@ def compared(fold: Fold, part: IntArray) -> dict[int, ComparedEnergy]:
         fold: the held-out rows with their fit.
         part: number of the part of each row (n,), which is of one log; below 0 for no part.
     """
-    measured = measured_power(fold.fitted.arm, fold.rows)
+    measured = fold.fitted.arm.measured_power(fold.rows)
     use = ~fold.rows.rest & np.isfinite(measured) & (part >= 0)
     rows, measured, part = fold.rows.take(use), measured[use], part[use]
     found = dict[int, ComparedEnergy]()
@@ -197,3 +200,76 @@ def _together(one: ComparedEnergy, other: ComparedEnergy) -> ComparedEnergy:
 
 def _in_order(energies: Sequence[ComparedEnergy]) -> tuple[ComparedEnergy, ...]:
     return tuple(sorted(energies, key=lambda each: (each.log, each.start)))
+
+
+def held_out_masks(rows: Rows, fraction: float) -> list[Mask]:
+    """Rows held out for validation, the same for the same input.
+
+    Args:
+        rows: rows of all logs.
+        fraction: share of the moving time to hold out; 1 holds out one motion after another.
+
+    Returns:
+        Masks (n,), one for every fit.
+
+    Raises:
+        NothingHeldOut: there are fewer than two motions.
+    """
+    groups = rows.groups
+    if len(groups) < 2:
+        raise NothingHeldOut(len(np.unique(rows.move[~rows.rest])))
+    if fraction == 1:
+        return [rows.group == group for group in groups]
+    time = np.array([rows.weight[(rows.group == group) & ~rows.rest].sum() for group in groups])
+    order = np.random.default_rng(0).permutation(len(groups))
+    time_before = np.cumsum(time[order]) - time[order]
+    wanted = int((time_before < fraction * time.sum()).sum())
+    # at least one motion on each side
+    chosen = order[: max(1, min(wanted, len(groups) - 1))]
+    return [np.isin(rows.group, groups[chosen])]
+
+
+@dataclass(frozen=True)
+class CurveSettings:
+    """Settings of the curves."""
+
+    max_rows: int = 1500
+    """Rows of all parts together; every part may exceed its share by one row."""
+
+
+CURVES = CurveSettings()
+
+
+def curves_of(parts: Sequence[tuple[FittedArm, Rows, Mask]], threshold: float) -> Curves:
+    """Measured and modelled curves of rows in motion.
+
+    Args:
+        parts: arm, rows and mask (n,) of the rows to show.
+        threshold: speed above which the torque of a joint is modelled [rad/s].
+    """
+    allowed = [mask & ~rows.rest for _, rows, mask in parts]
+    every = max(1, -(-sum(int(mask.sum()) for mask in allowed) // CURVES.max_rows))
+    curves = list[Curves]()
+    for (arm, rows, _), mask in zip(parts, allowed, strict=True):
+        thinned = np.zeros_like(mask)
+        thinned[np.flatnonzero(mask)[::every]] = True
+        shown = rows.take(thinned)
+        torque = arm.logged_torque(shown)
+        moving = np.isfinite(torque) & (np.abs(shown.v) > threshold)
+        curves.append(
+            Curves(
+                log=shown.log,
+                move=shown.move,
+                time=shown.time,
+                torque=torque,
+                modelled_torque=np.where(moving, arm.measured_torque(shown), np.nan),
+                power=shown.power,
+                modelled_power=np.where(np.isfinite(shown.power), arm.power(shown)[0], np.nan),
+            )
+        )
+    return Curves(
+        **{
+            name: np.concatenate([getattr(part, name) for part in curves])
+            for name in vars(curves[0])
+        }
+    )

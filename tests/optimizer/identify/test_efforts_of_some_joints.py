@@ -9,9 +9,9 @@ import pytest
 
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidProblem
+from joulepath.optimizer.identify.errors import EffortNotUsable
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import LogReading, read_log
 from joulepath.optimizer.identify.logs.recorded import measured

@@ -11,6 +11,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidProblem
 from joulepath.optimizer.identify.errors import (
+    EffortNotUsable,
     MethodNotApplicable,
     NoPowerChannel,
     NotExcited,
@@ -18,9 +19,8 @@ from joulepath.optimizer.identify.errors import (
 )
 from joulepath.optimizer.identify.identify import Identification, identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
 from joulepath.optimizer.identify.options import IdentificationOptions
-from joulepath.optimizer.identify.quality import curves as curves_module
+from joulepath.optimizer.identify.quality import validation as validation_module
 from joulepath.optimizer.problem.arm import Payload
 from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
 from tests.refusals import refusal_of
@@ -106,7 +106,7 @@ def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
 
 @pytest.mark.long
 def test_curves_of_long_logs_are_thinned(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(curves_module, "CURVES", curves_module.CurveSettings(max_rows=MOST))
+    monkeypatch.setattr(validation_module, "CURVES", validation_module.CurveSettings(max_rows=MOST))
     truth = truth_of(ROBOT)
     logs = [recorded(ROBOT, truth, moves=4, seed=seed).log() for seed in (0, 1, 2)]
     found = identify(ROBOT, logs[:2], IdentificationOptions(held_out=1.0))

@@ -13,7 +13,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable
+from joulepath.optimizer.identify.errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import LogReading, read_log
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current

@@ -18,7 +18,6 @@ from joulepath.optimizer.dynamics.link_regressor import (
     rigid_torques,
 )
 from joulepath.optimizer.identify.arm.base_parameters import base_parameters
-from joulepath.optimizer.identify.arm.logged_torque import motor_torque
 from joulepath.optimizer.identify.choices import Method, Term
 from joulepath.optimizer.identify.errors import MethodNotApplicable
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
@@ -320,7 +319,7 @@ def test_a_curved_rise_is_predicted_at_the_speed_at_which_it_was_fitted(
         ROBOT, [log], IdentificationOptions(method=method, terms=(*PLAIN, "curved"), held_out=0.0)
     )
     rows = rows_of(ROBOT, [log], regressor=True)
-    error = motor_torque(found.fitted.arm, rows) - found.fitted.arm.torque(rows)
+    error = found.fitted.arm.motor_torque(rows) - found.fitted.arm.torque(rows)
     moving = np.abs(rows.v) > 0.02
     rms = np.sqrt((moving * error**2).sum(axis=0) / moving.sum(axis=0))
     assert (rms < 3 * 0.1 * SIZES + 0.05).all()

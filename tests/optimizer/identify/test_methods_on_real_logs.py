@@ -12,7 +12,6 @@ import pytest
 
 from benchmarks.identification_logs import tx40, ur3e
 from joulepath.models.robot import Array, Robot
-from joulepath.optimizer.identify.arm.logged_torque import motor_torque
 from joulepath.optimizer.identify.fits.fitting import fit_rows
 from joulepath.optimizer.identify.fits.threshold import velocity_threshold
 from joulepath.optimizer.identify.identify import identify
@@ -29,7 +28,7 @@ def friction_of(robot: Robot, log: Log, options: IdentificationOptions) -> tuple
     """Speeds and friction torques (n, nq), without what links and rotors take; NaN at rest."""
     rows = rows_of(robot, [log], options.refit)
     arm = fit_rows(robot, rows, options).arm
-    friction = motor_torque(arm, rows) - arm.link_torque(rows) - arm.rotor_inertia * rows.a
+    friction = arm.motor_torque(rows) - arm.link_torque(rows) - arm.rotor_inertia * rows.a
     return rows.v, np.where((rows.v != 0) & ~rows.rest[:, None], friction, np.nan)
 
 

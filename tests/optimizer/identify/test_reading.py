@@ -14,9 +14,9 @@ from scipy.interpolate import CubicSpline
 
 from joulepath.models.registry import load_robot
 from joulepath.optimizer.exceptions import InvalidProblem, InvalidTable
+from joulepath.optimizer.identify.errors import EffortNotUsable, LogTooLarge
 from joulepath.optimizer.identify.logs.grid import grid_of
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.problem.arm import Payload
