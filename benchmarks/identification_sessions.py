@@ -18,8 +18,7 @@ from joulepath.models.registry import load_robot
 from joulepath.models.robot import Robot
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log
-from joulepath.optimizer.identify.options import IdentificationOptions
-from tests.identification_logs import off_the_model, recorded, truth_of
+from tests.identification_logs import WITHOUT_SPLIT, off_the_model, recorded, truth_of
 
 NUMBERS = (1, 2, 6)
 """Numbers of fitted logs."""
@@ -36,7 +35,6 @@ DRAWS = 12
 """Number of random choices of fitted logs among the real logs."""
 # standard deviation of the additional power of a simulated move [W]: 1 % of the energy of a move
 MOVE_EFFECT = 0.6
-WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 LEAST = 0.87
 """Smallest admissible share of energies in their interval, with a promise of 0.9 [1]."""
 MOST = 0.93

@@ -6,18 +6,26 @@ Torques come from Pinocchio's recursion and the formulas below, not from the cod
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
+from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Robot
+from joulepath.optimizer.identify.identify import Identification
 from joulepath.optimizer.identify.logs.log import EffortMeaning, Log, LogMove
+from joulepath.optimizer.identify.options import IdentificationOptions
+from joulepath.optimizer.identify.results import PowerErrors, TorqueErrors, Validation
 from joulepath.optimizer.problem.arm import Payload
 from tests.by_pinocchio import torques_of
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
+WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
+FAR = 4.0
+"""Standard deviations that one of a thousand figures exceeds [1]."""
 
 
 @dataclass(frozen=True)
@@ -300,6 +308,24 @@ def with_current(recording: Recording, current: Array) -> Recording:
     return replace(
         recording, current=current, torque=current * recording.robot.drives.torque_constant
     )
+
+
+def written(found: Identification) -> Robot:
+    """The robot with the figures of the document, as a file holds them."""
+    document = json.loads(json.dumps(found.document("2026-01-31"), allow_nan=False))
+    return load_robot(found.robot.name, figures=document)
+
+
+def torque_errors(found: Validation | None) -> tuple[TorqueErrors, TorqueErrors]:
+    """Errors of the torques by the fitted figures, and by the robot's own."""
+    assert found is not None and found.fitted.torque is not None and found.own.torque is not None
+    return found.fitted.torque, found.own.torque
+
+
+def power_errors(found: Validation | None) -> tuple[PowerErrors, PowerErrors]:
+    """Errors of the power by the fitted figures, and by the robot's own."""
+    assert found is not None and found.fitted.power is not None and found.own.power is not None
+    return found.fitted.power, found.own.power
 
 
 def off_the_model(log: Log, effect: float, seed: int) -> Log:

@@ -82,28 +82,24 @@ class IdentificationOptions:
                     name, f"{name} must name some of {', '.join(allowed)}, each once."
                 )
             object.__setattr__(self, name, given)
-        if self.estimator not in get_args(Estimator):
-            raise InvalidProblem(
-                "estimator", f"estimator must be one of {', '.join(get_args(Estimator))}."
-            )
-        if self.method not in get_args(Method):
-            raise InvalidProblem("method", f"method must be one of {', '.join(get_args(Method))}.")
-        if self.period is not None and not 0.1 <= self.period <= 1e4:
-            raise InvalidProblem("period", "period must be from 0.1 to 10000 s.")
+        for name, choices in (("estimator", Estimator), ("method", Method)):
+            if getattr(self, name) not in get_args(choices):
+                raise InvalidProblem(name, f"{name} must be one of {', '.join(get_args(choices))}.")
         if self.refit and self.links_unknown:
             raise InvalidProblem(
                 "inertials",
                 f"The method {self.method} finds the links by itself: keep the inertials.",
             )
-        for name, least, most in (
-            ("held_out", 0.0, 1.0),
-            ("velocity_threshold", 0.0, 10.0),
-            ("prior_weight", 1e-6, 1e6),
+        for name, least, most, unit in (
+            ("period", 0.1, 1e4, " s"),
+            ("held_out", 0.0, 1.0, ""),
+            ("velocity_threshold", 0.0, 10.0, " rad/s"),
+            ("prior_weight", 1e-6, 1e6, ""),
+            ("knee", 1e-6, 1.0, " rad/s"),
         ):
-            if not least <= getattr(self, name) <= most:
-                raise InvalidProblem(name, f"{name} must be from {least:g} to {most:g}.")
-        if self.knee is not None and not 1e-6 <= self.knee <= 1.0:
-            raise InvalidProblem("knee", "knee must be from 1e-6 to 1 rad/s.")
+            value = getattr(self, name)
+            if value is not None and not least <= value <= most:
+                raise InvalidProblem(name, f"{name} must be from {least:g} to {most:g}{unit}.")
         object.__setattr__(self, "couplings", tuple(self.couplings))
         object.__setattr__(self, "mains", tuple(self.mains))
         if not all(each is None or 0 < each <= 1e6 for each in self.mains):

@@ -33,14 +33,12 @@ from joulepath.optimizer.exceptions import DeclaredError
 from tests.app.problems import checked
 from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
-from tests.identification_logs import Truth, csv_of, recorded, truth_of
+from tests.identification_logs import FAR, Truth, csv_of, recorded, truth_of
 from tests.selection import long_but
 
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
 CSV = {"Content-Type": "text/csv"}
-# of the standard deviations: what one of a thousand figures exceeds
-FAR = 4.0
 # relative; every k-th row stands for all of them
 THINNED = 0.15
 MOST_BYTES = 500_000  # of the residuals of logs of any length

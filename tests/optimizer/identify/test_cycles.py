@@ -17,7 +17,7 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.logs.reading import read_log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Arm
-from tests.identification_logs import recorded, truth_of
+from tests.identification_logs import WITHOUT_SPLIT, recorded, truth_of
 
 RATE = 125.0
 # of the bounds of a cycle [s]: the ends of a rest are found late, where they are noisy
@@ -145,17 +145,11 @@ def test_rests_and_small_motions_are_no_cycles() -> None:
         assert log_of(q, 1e-5).cycle_rows.size == 0
 
 
-def test_cycles_of_a_recording_are_whole_segments() -> None:
-    log, _ = log_through([HOME, PICK, PLACE] * 4 + [HOME])
-    rows = np.array(log.segment_rows)
-    assert rows[list(log.recording().cycles)].tolist() == log.cycle_rows.tolist()
-
-
 def test_held_out_cycles_are_compared_as_the_sum_of_their_moves() -> None:
     robot, truth = load_robot("ur10e"), truth_of(load_robot("ur10e"))
     fitted = recorded(robot, truth, moves=8).log()
     cycles = recorded(robot, truth, moves=4, seed=1, closed=True, cycles=3).log()
-    found = identify(robot, [fitted], IdentificationOptions(held_out=0.0)).validate([cycles])
+    found = identify(robot, [fitted], WITHOUT_SPLIT).validate([cycles])
     assert (len(found.energies), len(found.cycles), found.moves) == (12, 3, 12)
     for name in ("measured", "predicted", "time"):
         moves = [getattr(each, name) for each in found.energies]

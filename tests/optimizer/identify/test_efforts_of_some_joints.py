@@ -17,15 +17,12 @@ from joulepath.optimizer.identify.logs.reading import LogReading, read_log
 from joulepath.optimizer.identify.logs.recorded import measured
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Arm, Payload
-from tests.identification_logs import csv_of, recorded, truth_of, with_current
+from tests.identification_logs import FAR, WITHOUT_SPLIT, csv_of, recorded, truth_of, with_current
 
 ROBOT = load_robot("ur10e")
 TRUTH = truth_of(ROBOT)
 RECORDING = recorded(ROBOT, TRUTH, moves=10)
 ELBOW = 2
-# standard deviations
-FAR = 4.0
-WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 NOTHING = LogOptions(payload=Payload())
 
 

@@ -22,14 +22,22 @@ from joulepath.optimizer.identify.logs.log import Log, LogMove
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality import validation as validation_module
 from joulepath.optimizer.problem.arm import Payload
-from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
+from tests.identification_logs import (
+    FAR,
+    GRAVITY,
+    WITHOUT_SPLIT,
+    Noise,
+    Recording,
+    Truth,
+    power_errors,
+    recorded,
+    torque_errors,
+    truth_of,
+)
 from tests.refusals import refusal_of
 from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
-WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
-# of the standard deviations: what one of a thousand figures exceeds
-FAR = 4.0
 # rows of all curves together, in place of the service's number: logs are shorter, too
 MOST = 100
 # joints of which the load term is told
@@ -68,16 +76,12 @@ def test_every_friction_figure_is_found_within_its_standard_deviations() -> None
 
 def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() -> None:
     _, found = run(options=IdentificationOptions())
-    errors = found.validation
-    assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
+    torque, own_torque = torque_errors(found.validation)
     # what is left is the noise of the current
-    assert (errors.fitted.torque.relative < 0.5 * errors.own.torque.relative).all()
-    assert (
-        errors.fitted.power is not None
-        and errors.own.power is not None
-        and errors.constant is not None
-    )
-    assert errors.fitted.power.energy_max < errors.own.power.energy_max < errors.constant.energy_max
+    assert (torque.relative < 0.5 * own_torque.relative).all()
+    power, own_power = power_errors(found.validation)
+    assert found.validation is not None and found.validation.constant is not None
+    assert power.energy_max < own_power.energy_max < found.validation.constant.energy_max
 
 
 @pytest.mark.long
@@ -128,34 +132,13 @@ def test_what_was_not_measured_is_not_modelled() -> None:
     assert np.isnan(curves.modelled_torque).all() and np.isfinite(curves.modelled_power).all()
 
 
-def test_another_log_validates() -> None:
-    truth, found = run()
-    other = recorded(ROBOT, truth, moves=6, seed=77).log()
-    errors = found.validate([other])
-    assert errors.moves == 6
-    assert errors.fitted.torque is not None
-    # noise of the current is all that is left
-    assert errors.fitted.torque.shaft_energy < 0.5
-
-
 def test_load_friction_makes_the_difference_where_there_is_load() -> None:
-    _, with_load = run(options=IdentificationOptions())
-    _, without = run(options=IdentificationOptions(terms=("coulomb", "viscous", "offset")))
-    assert with_load.validation is not None and without.validation is not None
-    better, worse = with_load.validation.fitted.torque, without.validation.fitted.torque
-    assert better is not None and worse is not None
+    plain = IdentificationOptions(terms=("coulomb", "viscous", "offset"))
+    better, worse = (
+        torque_errors(run(options=options)[1].validation)[0]
+        for options in (IdentificationOptions(), plain)
+    )
     assert (better.rmse[list(LOADED)] < 0.5 * worse.rmse[list(LOADED)]).all()
-
-
-def test_power_alone_gives_idle_power_and_the_size_of_friction() -> None:
-    truth = truth_of(ROBOT, 3)
-    log = recorded(ROBOT, truth, moves=14, seed=3).log()
-    found = identify(ROBOT, [replace(log, effort=None, effort_meaning=None)])
-    idle = next(each for each in found.parameters if each.figure == "idle_power")
-    assert idle.identified and abs(idle.value - truth.idle_power) <= FAR * idle.sd
-    assert found.validation is not None
-    fitted, own = found.validation.fitted.power, found.validation.own.power
-    assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
 
 
 @pytest.mark.parametrize("scale", long_but([0.88], [0.88, 1.0]))
@@ -172,9 +155,10 @@ def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
         and links.previous == 1.0
         and abs(links.value - scale) <= FAR * links.sd < 0.1
     )
-    assert found.validation is not None
-    fitted, own = found.validation.fitted.power, found.validation.own.power
-    assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
+    idle = next(each for each in found.parameters if each.figure == "idle_power")
+    assert idle.identified and abs(idle.value - truth.idle_power) <= FAR * idle.sd
+    fitted, robots = power_errors(found.validation)
+    assert fitted.energy_mean < 0.5 * robots.energy_mean
     document = found.document("2026-01-01")
     heavier = load_robot("ur10e", figures=document).model
     for own, body in zip(list(ROBOT.model.inertias)[1:], list(heavier.inertias)[1:], strict=True):
@@ -361,38 +345,28 @@ def test_more_noise_gives_larger_standard_deviations() -> None:
     assert 3 < np.median([loud_sd[key] / quiet_sd[key] for key in shared]) < 20
 
 
-def test_torque_constants_follow_from_gravity() -> None:
+def test_torque_constants_follow_from_gravity_where_the_payload_is_known() -> None:
     """Paes: with known links, the current that holds them says how much torque an ampere gives."""
     truth = truth_of(ROBOT, 2)
     real = truth.torque_constant * np.array([1.0, 1.06, 0.95, 1.04, 1.0, 1.0])
     log = without_power(recorded(ROBOT, replace(truth, torque_constant=real), moves=14).log())
-    found = identify(
-        ROBOT,
-        [log],
-        IdentificationOptions(fit=("friction", "rotor", "torque_constant"), held_out=0.0),
-    )
-    constants = {each.joint: each for each in found.parameters if each.figure == "torque_constant"}
+    asked = replace(WITHOUT_SPLIT, fit=("friction", "rotor", "torque_constant"))
+    found = identify(ROBOT, [log], asked)
+    by_name = {(each.figure, each.joint): each for each in found.parameters}
     for joint in LOADED:
-        assert constants[joint].identified
-        assert (
-            abs(constants[joint].value - real[joint])
-            <= FAR * constants[joint].sd
-            < 0.02 * real[joint]
-        )
+        constant = by_name["torque_constant", joint]
+        assert constant.identified and constant.sd < 0.02 * real[joint] / FAR
+        assert abs(constant.value - real[joint]) <= FAR * constant.sd
     # nothing hangs on wrist 3
-    assert not constants[5].identified and constants[5].value == ROBOT.drives.torque_constant[5]
-    coulomb = next(each for each in found.parameters if (each.figure, each.joint) == ("coulomb", 1))
+    wrist = by_name["torque_constant", 5]
+    assert not wrist.identified and wrist.value == ROBOT.drives.torque_constant[5]
+    coulomb = by_name["coulomb", 1]
     assert abs(coulomb.value - truth.coulomb[1]) <= FAR * coulomb.sd
-
-
-def test_torque_constants_are_found_by_themselves_where_the_payload_is_known() -> None:
-    truth = truth_of(ROBOT, 2)
-    real = truth.torque_constant * np.array([1.0, 1.06, 0.95, 1.04, 1.0, 1.0])
-    log = without_power(recorded(ROBOT, replace(truth, torque_constant=real), moves=14).log())
+    # by themselves, unless the payload or the links are not known
     letters = dict(ROBOT.figures)
     mass = letters["inertials"]["mass"] | {"trust": "E"}
     letters["inertials"] = letters["inertials"] | {"mass": mass}
-    constants = [
+    told, *kept = (
         identify(robot, [given], options).fitted.arm.torque_constant
         for robot, given, options in (
             (ROBOT, log, WITHOUT_SPLIT),
@@ -401,9 +375,8 @@ def test_torque_constants_are_found_by_themselves_where_the_payload_is_known() -
             (ROBOT, log, replace(WITHOUT_SPLIT, constants=False)),
             (ROBOT, log, replace(WITHOUT_SPLIT, refit=True)),
         )
-    ]
-    told, *kept = constants
-    assert told[list(LOADED)] == pytest.approx(real[list(LOADED)], rel=0.02)
+    )
+    np.testing.assert_array_equal(told, found.fitted.arm.torque_constant)
     assert all((each == ROBOT.drives.torque_constant).all() for each in kept)
 
 

@@ -303,16 +303,6 @@ def test_accelerations_that_are_none(recording: Recording, factor: float) -> Non
     )
 
 
-def test_speeds_of_one_joint_that_are_none(recording: Recording) -> None:
-    v = recording.v * (np.arange(6) != 1)
-    reading = read_log(csv_of(replace(recording, v=v)), ROBOT)
-    assert any("speeds of joint 2 do not fit" in each for each in reading.report.warnings)
-    assert (
-        np.abs(reading.log.v[:, 1] - recording.exact_v[:, 1]).std()
-        < 0.02 * recording.exact_v[:, 1].std()
-    )
-
-
 @pytest.mark.parametrize("robot", long_but(["ur5e"], ["ur5e", "gen3"]))
 def test_efforts_of_one_joint_with_the_other_sign(robot: str) -> None:
     arm = load_robot(robot)

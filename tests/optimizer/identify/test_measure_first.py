@@ -10,19 +10,24 @@ import pytest
 from joulepath.models.from_figures import robot_of
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array, Mains, Robot
-from joulepath.models.uncertainty.document import InvalidFigures, with_document
+from joulepath.models.uncertainty.document import InvalidFigures
 from joulepath.models.uncertainty.parameters import index
 from joulepath.models.uncertainty.spread import spread_of
 from joulepath.optimizer.dynamics.dwell import with_dwell
 from joulepath.optimizer.evaluate.evaluate import evaluate
 from joulepath.optimizer.exceptions import InvalidProblem
-from joulepath.optimizer.identify.errors import NotExcited
-from joulepath.optimizer.identify.identify import Identification, identify
+from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.logs.log import Log, LogMove
-from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.problem.arm import Arm
 from joulepath.optimizer.problem.dwell import Dwell
-from tests.identification_logs import Truth, recorded, rigid_torques, truth_of
+from tests.identification_logs import (
+    WITHOUT_SPLIT,
+    Truth,
+    recorded,
+    rigid_torques,
+    truth_of,
+    written,
+)
 from tests.selection import long_but
 
 ROBOT = load_robot("ur10e")
@@ -33,7 +38,6 @@ STRETCHED = np.zeros(6)
 POWER_NOISE = 0.5
 # relative, of rows of 10 ms and of draws of figures
 COARSE = 0.03
-WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 FACTOR, CONSTANT = 1.14, 71.0
 
 
@@ -56,13 +60,6 @@ def resting(truth: Truth, q: Array, seconds: float = 10.0, seed: int = 0) -> Log
     )
 
 
-def known(found: Identification) -> Robot:
-    """The robot with identified figures."""
-    return robot_of(
-        ROBOT.name, with_document(ROBOT.name, ROBOT.figures, found.document("2026-01-31"))
-    )
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_ten_seconds_at_rest_tell_the_idle_power(seed: int) -> None:
     truth = truth_of(ROBOT, seed)
@@ -71,7 +68,7 @@ def test_ten_seconds_at_rest_tell_the_idle_power(seed: int) -> None:
     assert idle.identified and abs(idle.value - truth.idle_power) < 4 * idle.sd < 0.5
     assert [each.figure for each in found.parameters if each.identified] == ["idle_power"]
     assert found.validation is None
-    assert known(found).electronics.idle_power == pytest.approx(idle.value)
+    assert written(found).electronics.idle_power == pytest.approx(idle.value)
     figures = found.document("2026-01-31")
     assert figures["electronics"]["idle_power"]["trust"] == "B"
 
@@ -95,14 +92,6 @@ def test_a_pose_that_takes_power_to_hold_tells_it_less() -> None:
     assert sd[1] > 10 * sd[0]
 
 
-def test_a_rest_without_power_is_refused() -> None:
-    log = recorded(ROBOT, TRUTH, moves=2).log()
-    still = replace(log, q=np.tile(STRETCHED, (len(log.time), 1)), v=0 * log.v, a=0 * log.a)
-    still = replace(still, power=None, moves=(LogMove(0, len(log.time), True),))
-    with pytest.raises(NotExcited):
-        identify(ROBOT, [still])
-
-
 def test_ten_seconds_at_rest_are_asked_for_where_no_power_was_logged() -> None:
     """The advice is worth its share: the interval shrinks by it, and no other figure is first."""
     log = replace(recorded(ROBOT, TRUTH, moves=10).log(), power=None)
@@ -122,7 +111,7 @@ def test_a_known_figure_takes_its_share_out_of_the_interval(channels: str) -> No
     log = replace(log, power=None) if channels == "currents" else _of_power(log)
     found = identify(ROBOT, [log], WITHOUT_SPLIT)
     first = found.measure[0]
-    before = known(found)
+    before = written(found)
     section = {"idle_power": "electronics", "coulomb": "friction_laws.identified"}
     path = f"{section.get(first.figure, 'drives')}.{first.figure}"
     path += "" if first.joint is None else f".{first.joint}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import os
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -383,21 +382,3 @@ def test_bombs_are_defused(recording: Recording) -> None:
     many = b"t,q1,q2,q3,q4,q5,q6\n" + b"0,0,0,0,0,0,0\n" * 1_000_001
     with pytest.raises(LogTooLarge, match="1000000 rows"):
         read_log(gzip.compress(many), ROBOT)
-
-
-@pytest.fixture(scope="module")
-def real_logs() -> Path:
-    place = os.environ.get("JOULEPATH_TEST_DATA")
-    if place is None:
-        pytest.skip("JOULEPATH_TEST_DATA does not name the folder of real logs")
-    return Path(place) / "logs"
-
-
-def test_a_controllers_full_record(real_logs: Path) -> None:
-    reading = read_log(real_logs / "ur3e_rad" / "ur3e_power.csv", load_robot("ur3e"))
-    log = reading.log
-    assert (len(log.time), sum(not move.at_rest for move in log.moves)) == (888, 19)
-    assert log.rate == pytest.approx(25.0)
-    assert log.effort_meaning == "current" and log.payload.mass == 1.07
-    assert log.power is not None and 30 < log.power.min() < log.power.max() < 200
-    assert reading.report.dropped == 0 and reading.report.warnings == ()

@@ -11,6 +11,7 @@ from benchmarks.identification import tx40_torque
 from benchmarks.identification_logs import ur3e
 from joulepath.optimizer.identify.identify import identify
 from joulepath.optimizer.identify.options import IdentificationOptions
+from tests.identification_logs import power_errors, torque_errors
 
 
 def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
@@ -22,12 +23,8 @@ def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:
         robot, [replace(log, effort=None, effort_meaning=None)], IdentificationOptions(held_out=1.0)
     )
     assert found.validation is not None and found.validation.moves == 19
-    fitted, own, constant = (
-        found.validation.fitted.power,
-        found.validation.own.power,
-        found.validation.constant,
-    )
-    assert fitted is not None and own is not None and constant is not None
+    (fitted, own), constant = power_errors(found.validation), found.validation.constant
+    assert constant is not None
     assert fitted.rmse <= 2.0 and fitted.energy_mean <= 1.3 and fitted.energy_max <= 4.0
     assert fitted.energy_mean < own.energy_mean < constant.energy_mean
     assert found.validation.coverage is not None and 0.85 <= found.validation.coverage <= 1.0
@@ -39,9 +36,7 @@ def test_currents_tell_friction_that_the_factory_does_not_know(place: Path) -> N
     robot, log = ur3e(place)
     assert log.effort_meaning == "current"
     found = identify(robot, [log], IdentificationOptions(held_out=1.0))
-    assert found.validation is not None
-    fitted, own = found.validation.fitted.torque, found.validation.own.torque
-    assert fitted is not None and own is not None
+    fitted, own = torque_errors(found.validation)
     assert (fitted.relative[:5] < own.relative[:5]).all()
     assert fitted.shaft_energy < 5.0 < own.shaft_energy
     # wrist 3 turns by 0.06 rad in these moves

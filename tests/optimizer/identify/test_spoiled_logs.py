@@ -12,8 +12,7 @@ import pytest
 from joulepath.models.registry import load_robot
 from joulepath.models.robot import Array
 from joulepath.optimizer.exceptions import InvalidTable
-from joulepath.optimizer.identify.errors import EffortNotUsable, NotExcited
-from joulepath.optimizer.identify.identify import identify
+from joulepath.optimizer.identify.errors import EffortNotUsable
 from joulepath.optimizer.identify.logs.log_options import LogOptions
 from joulepath.optimizer.identify.logs.reading import read_log
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
@@ -190,17 +189,3 @@ def test_a_channel_that_is_empty_counts_as_not_logged(recording: Recording) -> N
     body = "\n".join([*lines[:-1], lines[-1].rpartition(",")[0] + ",nan"]).encode()
     with pytest.raises(InvalidTable, match="p in line"):
         read_log(body, ROBOT)
-
-
-def test_a_log_of_rest_is_not_excited(recording: Recording) -> None:
-    first = recording.moves[0]
-    assert first.at_rest
-    # at rest, power tells the idle power
-    lines = csv_of(recording, without="P").split(b"\n")[: first.end]
-    log = read_log(b"\n".join(lines), ROBOT, LogOptions(effort="current")).log
-    with pytest.raises(NotExcited) as caught:
-        identify(ROBOT, [log])
-    assert "coulomb" in caught.value.parameters and caught.value.advice["parameters"] == [
-        "rotor",
-        "friction",
-    ]

@@ -21,9 +21,8 @@ from joulepath.optimizer.identify.estimates.grouped import (
     residual_replicates,
 )
 from joulepath.optimizer.identify.identify import identify
-from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.quality.interval import INTERVAL, own_variance, session_sd
-from tests.identification_logs import off_the_model, recorded, truth_of
+from tests.identification_logs import WITHOUT_SPLIT, off_the_model, recorded, truth_of
 
 GROUPS, SIZE = 12, 30
 
@@ -143,7 +142,7 @@ def test_friction_of_another_day_is_no_error_of_the_moves() -> None:
             replace(recorded(robot, day, moves=8, seed=seed).log(), power=None)
             for seed, day in enumerate(days)
         ]
-        spread = identify(robot, logs, IdentificationOptions(held_out=0.0)).spread
+        spread = identify(robot, logs, WITHOUT_SPLIT).spread
         found.append(spread.move_sd)
     assert (spread.session_sd > 0.05).all()
     assert found[1] < 1.5 * found[0]
@@ -152,7 +151,7 @@ def test_friction_of_another_day_is_no_error_of_the_moves() -> None:
 def test_a_document_may_have_the_friction_of_other_days_joint_by_joint() -> None:
     robot = load_robot("ur10e")
     log = replace(recorded(robot, truth_of(robot), moves=8).log(), power=None)
-    document = identify(robot, [log], IdentificationOptions(held_out=0.0)).document("2026-01-31")
+    document = identify(robot, [log], WITHOUT_SPLIT).document("2026-01-31")
     assert len(document["session_sd"]) == robot.nq
     spread = drawn(load_robot("ur10e", figures=document), "identified")
     session = spread.covariances["session"][place("coulomb", 6), place("coulomb", 6)]

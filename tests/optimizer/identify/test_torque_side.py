@@ -22,18 +22,20 @@ from joulepath.optimizer.problem.arm import Arm
 from tests.identification_logs import (
     GRAVITY,
     SILENT,
+    WITHOUT_SPLIT,
     Recording,
     Truth,
     csv_of,
+    power_errors,
     recorded,
     rigid_torques,
+    torque_errors,
     truth_of,
 )
 from tests.refusals import refusal_of
 from tests.selection import long_but
 
 PANDA = load_robot("panda")
-WITHOUT_SPLIT = IdentificationOptions(held_out=0.0)
 # N·m of the bearings and the reading at rest of torque sensors behind the gears
 BEARING, OFFSET = 0.3, 0.4
 # % of the energy of a move, from six moves without noise: the power of four moves tells the
@@ -62,7 +64,9 @@ def heavier() -> tuple[Robot, Log]:
     scale = np.full(PANDA.nq, HEAVIER)
     real = replace(PANDA, model=PANDA.loaded_model(0.0, none[0], none, GRAVITY, scale))
     truth = truth_of(PANDA)
-    return real, behind_the_gears(real, truth, recorded(real, truth, moves=14))
+    # the sensor of joint 4 reads too much
+    gain = np.where(np.arange(PANDA.nq) == 3, 0.05, 0.0)
+    return real, behind_the_gears(real, truth, recorded(real, truth, moves=14), gain)
 
 
 def test_torques_behind_the_gears_identify_links_and_keep_the_drives(
@@ -78,11 +82,9 @@ def test_torques_behind_the_gears_identify_links_and_keep_the_drives(
             assert kept.value == kept.previous
     offsets = [by_name["offset", joint].value for joint in (1, 3)]
     assert offsets == pytest.approx([OFFSET] * 2, abs=0.1)
-    errors = found.validation
-    assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
-    loaded = [1, 3]
-    assert (errors.fitted.torque.rmse[loaded] < 0.1 * errors.own.torque.rmse[loaded]).all()
-    assert np.isnan(errors.fitted.torque.copper_energy)
+    (fitted, own), loaded = torque_errors(found.validation), [1, 3]
+    assert (fitted.rmse[loaded] < 0.1 * own.rmse[loaded]).all()
+    assert np.isnan(fitted.copper_energy)
 
     document = found.document("2026-01-31")
     assert "drives" not in document and "friction_laws" not in document
@@ -94,8 +96,8 @@ def test_torques_behind_the_gears_identify_links_and_keep_the_drives(
     truth = truth_of(PANDA)
     weight = rigid_torques(real, truth, q, still, still)
     near = rigid_torques(written, truth, q, still, still)
-    own = rigid_torques(PANDA, truth, q, still, still)
-    assert np.abs(near - weight).max() < 0.15 * np.abs(own - weight).max()
+    robots = rigid_torques(PANDA, truth, q, still, still)
+    assert np.abs(near - weight).max() < 0.15 * np.abs(robots - weight).max()
 
 
 @pytest.mark.long
@@ -111,10 +113,8 @@ def test_gains_of_sensors_are_not_taken_for_links() -> None:
     friction = [each.value for each in found.parameters if each.figure == "sensor_coulomb"]
     assert friction == pytest.approx([BEARING] * PANDA.nq, rel=0.05)
     # a fit without gains leaves some per cent of the torque of joints 4 and 6
-    errors = found.validation
-    assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
-    ratio = errors.fitted.torque.rmse / errors.own.torque.rmse
-    assert (ratio[[3, 5]] < 0.1).all()
+    fitted, own = torque_errors(found.validation)
+    assert (fitted.rmse < 0.1 * own.rmse)[[3, 5]].all()
 
 
 @pytest.mark.parametrize("distance", long_but([2e-3], [1e-5, 2e-3]))
@@ -148,9 +148,8 @@ def test_power_tells_the_friction_that_torques_behind_the_gears_do_not() -> None
     found = identify(PANDA, [log])
     names = {each.figure for each in found.parameters if each.identified}
     assert "coulomb" in names and "link_mass_scale" not in names
-    assert found.validation is not None
-    fitted, own = found.validation.fitted.power, found.validation.own.power
-    assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
+    fitted, own = power_errors(found.validation)
+    assert fitted.energy_mean < 0.5 * own.energy_mean
 
 
 def test_torques_of_the_same_robots_motors_identify_its_friction() -> None:
@@ -235,6 +234,4 @@ def test_torques_behind_the_gears_without_noise_predict_energies() -> None:
     silent = recorded(robot, truth, moves=6, seed=3, noise=SILENT)
     torque = rigid_torques(robot, truth, silent.exact_q, silent.exact_v, silent.a)
     log = replace(silent.log("torque"), effort=torque, torque_side="link")
-    found = identify(robot, [log]).validation
-    assert found is not None and found.fitted.power is not None
-    assert found.fitted.power.energy_mean < NOISE_FREE
+    assert power_errors(identify(robot, [log]).validation)[0].energy_mean < NOISE_FREE

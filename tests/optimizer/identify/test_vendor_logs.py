@@ -83,14 +83,6 @@ def test_rows_of_joint_states_with_names_of_other_makers(panda: Recording, name:
     np.testing.assert_allclose(found, panda.q, atol=1e-4)
 
 
-def test_joints_with_the_prefix_of_an_arm(ur: Recording) -> None:
-    names = [f"left_{name}" for name in UR.joint_names]
-    header = ["t", *(f"{name}/position" for name in names), *(f"{n}/velocity" for n in names)]
-    rows = np.column_stack([ur.time, ur.q, ur.v]).tolist()
-    text = "\n".join([",".join(header), *(",".join(f"{x:.12g}" for x in row) for row in rows)])
-    np.testing.assert_allclose(positions(text.encode()), ur.q, atol=WRITTEN)
-
-
 @pytest.mark.parametrize("prefix", ["", "left_", "cell/ur5e::"])
 def test_a_table_of_positions_under_the_names_of_the_joints(ur: Recording, prefix: str) -> None:
     order = np.argsort(UR.joint_names)

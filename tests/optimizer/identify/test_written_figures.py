@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -23,7 +22,14 @@ from joulepath.optimizer.identify.logs.log import Log
 from joulepath.optimizer.identify.options import IdentificationOptions
 from joulepath.optimizer.identify.rows.fit_rows import Rows, rows_of
 from joulepath.optimizer.problem.arm import Arm
-from tests.identification_logs import Recording, recorded, truth_of, with_current
+from tests.identification_logs import (
+    WITHOUT_SPLIT,
+    Recording,
+    recorded,
+    truth_of,
+    with_current,
+    written,
+)
 from tests.identification_logs import rigid_torques as true_torques
 from tests.selection import long_but
 
@@ -44,13 +50,6 @@ def log_of(robot: Robot = ROBOT, bend: float = 0.3, still: int | None = 5, **par
         q[:, still], v[:, still], a[:, still] = q[0, still], 0.0, 0.0
         log = replace(log, q=q, v=v, a=a)
     return replace(log, **parts)
-
-
-def written(found: Identification) -> Robot:
-    """The robot with the figures of the document, as a file holds them."""
-    return load_robot(
-        found.robot.name, figures=json.loads(json.dumps(found.document("2026-01-31")))
-    )
 
 
 def torques(robot: Robot, rows: Rows) -> tuple[Array, Array]:
@@ -76,22 +75,6 @@ def check(found: Identification, log: Log) -> None:
             tau = rigid[at] + robot.drives.rotor_inertia * rows.a[at]
             energy = breakdown(np.ones(1), rows.v[at], rows.a[at], tau, 0.0, Arm(robot=robot))
             assert energy.electrical.total == pytest.approx(power[row], rel=EXACT)
-
-
-@pytest.mark.parametrize(
-    "terms",
-    [
-        ("coulomb",),
-        ("coulomb", "viscous"),
-        ("viscous", "offset"),
-        ("coulomb", "curved"),
-        ("coulomb", "viscous", "load", "offset"),
-        CURVED,
-    ],
-)
-def test_a_law_of_any_terms_is_written_as_it_was_fitted(terms: tuple[Term, ...]) -> None:
-    log = log_of(power=None)
-    check(identify(ROBOT, [log], IdentificationOptions(terms=terms, held_out=0.0)), log)
 
 
 @pytest.mark.parametrize("name", long_but(["ur5e"], ["ur10e", "ur5e"]))
@@ -200,7 +183,7 @@ def test_power_alone_is_identified_where_efforts_were_logged() -> None:
     log = log_of()
     found = identify(ROBOT, [log], IdentificationOptions(fit=("power",), held_out=0.0))
     without = replace(log, effort=None, effort_meaning=None)
-    same = identify(ROBOT, [without], IdentificationOptions(held_out=0.0))
+    same = identify(ROBOT, [without], WITHOUT_SPLIT)
     values = [[each.value for each in one.parameters] for one in (found, same)]
     assert values[0] == pytest.approx(values[1], rel=1e-9)
     check(found, log)
@@ -211,7 +194,7 @@ def test_what_power_hardly_determines_keeps_its_letter_and_says_so() -> None:
     found = identify(
         ROBOT,
         [replace(log, effort=None, effort_meaning=None)],
-        IdentificationOptions(held_out=0.0),
+        WITHOUT_SPLIT,
     )
     document, told = found.document("2026-01-31"), found.figures().identified
     sections = {
@@ -231,37 +214,37 @@ def test_what_power_hardly_determines_keeps_its_letter_and_says_so() -> None:
     assert seen >= 4
 
 
-@pytest.mark.parametrize(
-    "options",
-    long_but(
-        [{"fit": ("friction",)}, {"method": "threshold_velocity"}],
-        [
-            {"fit": ("friction",)},
-            {"fit": ("rotor",)},
-            {"fit": ("friction", "rotor", "torque_constant"), "terms": CURVED},
-            {"knee": 0.02},
-            {"estimator": "irls", "terms": CURVED},
-            {"method": "threshold_velocity"},
-        ],
-    ),
+TERMS: tuple[tuple[Term, ...], ...] = (
+    ("coulomb",),
+    ("coulomb", "viscous"),
+    ("viscous", "offset"),
+    ("coulomb", "curved"),
+    DEFAULT_TERMS,
+    CURVED,
 )
-def test_figures_of_any_options_are_written_as_they_were_fitted(options: dict[str, Any]) -> None:
-    log = log_of()
-    check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0, **options)), log)
+WITHOUT_POWER, POWER_ALONE = {"power": None}, {"effort": None, "effort_meaning": None}
+CASES: list[tuple[dict[str, Any], dict[str, Any]]] = [
+    *(({"terms": terms}, WITHOUT_POWER) for terms in TERMS),
+    ({}, POWER_ALONE),
+    ({"fit": ("friction",)}, {}),
+    ({"method": "threshold_velocity"}, {}),
+    ({"refit": True, "terms": CURVED}, {}),
+]
+LONG_CASES: list[tuple[dict[str, Any], dict[str, Any]]] = [
+    ({"fit": ("rotor",)}, {}),
+    ({"fit": ("friction", "rotor", "torque_constant"), "terms": CURVED}, {}),
+    ({"knee": 0.02}, {}),
+    ({"estimator": "irls", "terms": CURVED}, {}),
+    ({"refit": True, "terms": ("coulomb", "viscous", "offset")}, {}),
+]
 
 
-def test_figures_of_power_alone_are_written_as_they_were_fitted() -> None:
-    log = log_of(effort=None, effort_meaning=None)
-    check(identify(ROBOT, [log], IdentificationOptions(held_out=0.0)), log)
-
-
-@pytest.mark.parametrize(
-    "terms", [pytest.param(("coulomb", "viscous", "offset"), marks=pytest.mark.long), CURVED]
-)
-def test_refitted_links_are_written_as_they_were_fitted(terms: tuple[Term, ...]) -> None:
-    log = log_of()
-    options = IdentificationOptions(held_out=0.0, refit=True, terms=terms)
-    check(identify(ROBOT, [log], options), log)
+@pytest.mark.parametrize(("options", "parts"), long_but(CASES, [*CASES, *LONG_CASES]))
+def test_figures_of_any_options_are_written_as_they_were_fitted(
+    options: dict[str, Any], parts: dict[str, Any]
+) -> None:
+    log = log_of(**parts)
+    check(identify(ROBOT, [log], replace(WITHOUT_SPLIT, **options)), log)
 
 
 def test_losses_that_the_power_does_not_separate_are_not_counted_twice() -> None:
@@ -277,7 +260,7 @@ def test_losses_that_the_power_does_not_separate_are_not_counted_twice() -> None
     }
     lossy = replace(ROBOT, drives=drives, figures=figures)
     log = log_of()
-    found = identify(lossy, [log], IdentificationOptions(held_out=0.0))
+    found = identify(lossy, [log], WITHOUT_SPLIT)
     document = found.document("2026-01-31")
     idle = document["electronics"]["idle_power"]["value"]
     constants = document.get("drives", {}).get("inverter_constant", {}).get("value", [2.0] * nq)
@@ -298,27 +281,6 @@ def test_the_bend_of_a_curved_law_is_the_best_one_and_is_written() -> None:
         # the candidates are apart by a factor of 1.45
         assert law.speed[told] == pytest.approx([bend] * len(told), rel=0.5)
         assert (law.speed[told] != ROBOT.friction.speed[told]).all()
-
-
-def test_what_was_not_identified_keeps_the_robots_value_and_letter() -> None:
-    log = log_of(power=None)
-    for options in ({}, {"refit": True}, {"method": "base_parameters"}):
-        found = identify(ROBOT, [log], IdentificationOptions(held_out=0.0, **options))
-        for each in found.parameters:
-            figures = ("coulomb", "viscous", "load", "rotor_inertia")
-            if not each.identified and each.figure in figures:
-                assert each.value == each.previous, (options, each)
-        document, robot = found.document("2026-01-31"), written(found)
-        law = document["friction_laws"]["identified"]
-        own = ROBOT.figures["friction_laws"][ROBOT.friction.name]
-        # joint 6 does not move
-        for part in ("coulomb", "viscous", "curved"):
-            assert getattr(robot.friction, part)[5] == getattr(ROBOT.friction, part)[5]
-        letters = [law["coulomb"]["trust"], own["coulomb"]["trust"]]
-        assert letters[0] == max("B", letters[1], key="ABCTE".index)
-        assert "the robot's own values" in law["coulomb"]["note"]
-        names = document["covariance"]["names"]
-        assert "friction_laws.identified.coulomb.5" not in names
 
 
 def test_nothing_is_written_of_what_stays_the_robots_own() -> None:
@@ -357,7 +319,7 @@ def test_a_figure_at_its_bound_keeps_the_robots_own_if_the_log_allows_it() -> No
     small = replace(ROBOT, drives=replace(ROBOT.drives, rotor_inertia=np.full(ROBOT.nq, 1e-4)))
     truth = replace(truth_of(ROBOT), rotor_inertia=np.full(ROBOT.nq, -1e-3))
     log = replace(recorded(ROBOT, truth, moves=14).log(), power=None)
-    found = identify(small, [log], IdentificationOptions(held_out=0.0))
+    found = identify(small, [log], WITHOUT_SPLIT)
     kept = [
         each for each in found.parameters if each.figure == "rotor_inertia" and not each.identified
     ]
