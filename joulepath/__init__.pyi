@@ -49,6 +49,8 @@ from .optimizer.export.ros_messages import MoveitOptions, Ros2Options
 from .optimizer.export.rows import TableOptions
 from .optimizer.export.urscript import UrscriptOptions
 from .optimizer.identify.errors import (
+    EffortNotUsable,
+    LogTooLarge,
     MethodNotApplicable,
     NoPowerChannel,
     NotExcited,
@@ -57,10 +59,8 @@ from .optimizer.identify.errors import (
 )
 from .optimizer.identify.identify import Identification, identify
 from .optimizer.identify.logs.log import Log, LogMove
-from .optimizer.identify.logs.log_errors import EffortNotUsable, LogTooLarge
 from .optimizer.identify.logs.log_options import LogOptions
-from .optimizer.identify.logs.log_report import LogReport
-from .optimizer.identify.logs.reading import LogReading, read_log
+from .optimizer.identify.logs.reading import LogReading, LogReport, read_log
 from .optimizer.identify.options import Coupling, IdentificationOptions
 from .optimizer.identify.results import Advice, IdentifiedParameter, Validation
 from .optimizer.inverse_kinematics import IKSolution, IKSolutions, inverse_kinematics
