@@ -15,7 +15,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -180,7 +180,7 @@ def run(kind: str, seed: int, index: int) -> Outcome:
     return Outcome(kind, index, deadline, time.perf_counter() - began - deadline, result)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Runs the command; returns the exit code."""
     command = parser(__doc__)
     command.add_argument(
@@ -190,7 +190,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--only", nargs="+", choices=KINDS, default=list(KINDS), help="kinds (all)"
     )
     command.add_argument("--verbose", action="store_true", help="a line for each request")
-    given = command.parse_args(arguments)
+    given = command.parse_args()
     on_one_core()
     warm_up(ROBOT)
     outcomes: list[Outcome] = []

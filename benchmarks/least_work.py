@@ -187,14 +187,14 @@ def print_summary(results: dict[str, Any]) -> None:
         )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Runs the command; returns the exit code."""
     command = problem_parser(__doc__, "panda", DEADLINE)
     command.add_argument("--mass", type=float, default=2.9, help="payload [kg] (%(default)s)")
     command.add_argument(
         "--duration", type=float, default=1.362, help="duration of the motions [s] (%(default)s)"
     )
-    given = command.parse_args(arguments)
+    given = command.parse_args()
     problems = selected(command, given)
     on_one_core()
     robot = rigid(load_robot(given.robot))
